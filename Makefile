@@ -1,0 +1,56 @@
+# make demo   the main job on the trials that ship with the project; needs no torch
+# make test   everything that is checked: format, lint, types, tests
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
+PACKAGES := shipgym identification agents
+
+.PHONY: demo test lint format type bench soak docs clean
+
+demo: $(VENV)/demo-installed
+	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
+
+test: lint type
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2
+
+lint: $(VENV)/dev-installed
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+
+format: $(VENV)/dev-installed
+	$(BIN)/ruff format .
+	$(BIN)/ruff check --fix .
+
+type: $(VENV)/dev-installed
+	$(BIN)/mypy
+
+bench: $(VENV)/dev-installed
+	OMP_NUM_THREADS=1 $(BIN)/python scripts/benchmark_speed.py
+
+soak: $(VENV)/dev-installed
+	$(BIN)/python scripts/soak.py
+
+docs: $(VENV)/docs-installed
+	$(BIN)/mkdocs build --strict
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "shipgym needs Python 3.11 or later; set PYTHON=")'
+	$(PYTHON) -m venv $(VENV)
+
+# what the tests need includes what the demo needs
+$(VENV)/demo-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	test -e $(VENV)/dev-installed || $(PIP) -e ".[report]"
+	touch $@
+
+$(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) -e ".[dev]"
+	touch $@
+
+$(VENV)/docs-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PIP) -e ".[docs]"
+	touch $@
+
+clean:
+	rm -rf $(VENV) report site build *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

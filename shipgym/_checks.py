@@ -1,0 +1,112 @@
+"""Checks of what a user wrote, each answering with one message that names the place and the remedy."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Collection, Iterable, Mapping
+from numbers import Real
+from typing import Any
+
+from shipgym.errors import InputError
+
+
+def quoted(words: Iterable[str]) -> str:
+    """List words for a message: ``'x', 'y', 'psi'``."""
+    return ", ".join(f"'{word}'" for word in words) or "none"
+
+
+def did_you_mean(word: str, options: Iterable[str]) -> str:
+    """``" Did you mean 'beam'?"`` where one of the options looks like `word`, else an empty string."""
+    by_lower_case = {option.lower(): option for option in options}
+    text = str(word).strip().lower()
+    close = difflib.get_close_matches(text, list(by_lower_case), n=1, cutoff=0.6)
+    close = close or [option for option in by_lower_case if len(text) > 2 and (text in option)]
+    return f" Did you mean '{by_lower_case[close[0]]}'?" if close else ""
+
+
+def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str) -> None:
+    """Refuse a key that is not among `allowed`.
+
+    Raises
+    ------
+    InputError
+        Naming the first unknown key, the nearest known one, and all that are known.
+    """
+    for key in mapping:
+        if key not in allowed:
+            raise InputError(
+                f"{where}: unknown key '{key}'.{did_you_mean(key, allowed)} Known keys: {quoted(allowed)}"
+            )
+
+
+def check_table(value: Any, where: str) -> Mapping[str, Any]:
+    """Return `value`, which must be a table (a mapping with text as keys)."""
+    if not isinstance(value, Mapping):
+        raise InputError(f"{where}: {value!r} found, expected a table of keys and values")
+    return value
+
+
+def check_text(value: Any, where: str) -> str:
+    """Return `value`, which must be text that is not empty."""
+    if not isinstance(value, str) or not value.strip():
+        raise InputError(f"{where}: {value!r} found, expected a text that is not empty")
+    return value
+
+
+def check_choice(value: Any, options: Collection[str], where: str) -> str:
+    """Return `value`, which must be one of the words in `options`."""
+    if not isinstance(value, str) or value not in options:
+        hint = did_you_mean(value, options) if isinstance(value, str) else ""
+        raise InputError(f"{where}: {value!r} found, expected one of {quoted(options)}.{hint}")
+    return value
+
+
+def check_number(
+    value: Any,
+    where: str,
+    *,
+    above: float | None = None,
+    at_least: float | None = None,
+    below: float | None = None,
+    at_most: float | None = None,
+    hint: str = "",
+) -> float:
+    """Return `value` as float; it must be a finite number within the bounds.
+
+    Parameters
+    ----------
+    value : Any
+        What the user wrote. Truth values and numbers in quotes are refused.
+    where : str
+        The place for the message, such as ``"ship.toml: [ship] length"``.
+    above, at_least, below, at_most : float, optional
+        The open and closed bounds.
+    hint : str, optional
+        What to do about it, appended to the message.
+
+    Raises
+    ------
+    InputError
+        Naming the place, the value and what is expected.
+    """
+    bounds = ((">", above), (">=", at_least), ("<", below), ("<=", at_most))
+    stated = " and ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
+    expected = f"expected a number {stated}".rstrip() + (f"; {hint}" if hint else "")
+    if isinstance(value, bool) or not isinstance(value, Real):
+        quotes = " (a text; write the number without quotes)" if isinstance(value, str) else ""
+        raise InputError(f"{where}: {value!r}{quotes} found, {expected}")
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    within = (
+        math.isfinite(number)
+        and (above is None or number > above)
+        and (at_least is None or number >= at_least)
+        and (below is None or number < below)
+        and (at_most is None or number <= at_most)
+    )
+    if not within:
+        raise InputError(f"{where}: {number:g} found, {expected}")
+    return number

@@ -1,0 +1,28 @@
+"""The errors a user of shipgym meets, each with one message that says what to do."""
+
+from __future__ import annotations
+
+
+class InputError(ValueError):
+    """Something the user gave is wrong: a file, a row, a field or an argument.
+
+    The message names the file, the row or field, the value found, what is expected, and the remedy.
+    The command line prints it and exits with code 2.
+    """
+
+
+class UnstableModelError(RuntimeError):
+    """A simulated ship left every physical range: its model runs away.
+
+    Attributes
+    ----------
+    time_s : float
+        Simulated time at which it was noticed, s.
+    state : dict of str to float
+        The last state that was still physical, SI units.
+    """
+
+    def __init__(self, message: str, time_s: float, state: dict[str, float]) -> None:
+        super().__init__(message)
+        self.time_s = time_s
+        self.state = state
