@@ -1,0 +1,259 @@
+"""Reading numbers from CSV files: fast where the file is sound, exact about the place where it is not."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym._checks import did_you_mean, quoted
+from shipgym.errors import InputError
+
+#: Cells that stand for "no value".
+MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+
+_REMEDY_TEXT = "save the table as comma-separated text in UTF-8"
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A CSV file, split into header and rows whose cells are not parsed yet.
+
+    Attributes
+    ----------
+    path : Path
+        The file, for messages.
+    header : tuple of str
+        Names of the columns, stripped of blanks.
+    rows : list of str
+        The rows that are not blank.
+    line_numbers : list of int
+        Line of the file on which each row stands; the file begins with line 1.
+    delimiter : str
+        Comma, semicolon or tab.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    rows: list[str]
+    line_numbers: list[int]
+    delimiter: str
+
+    def place(self, row: int) -> str:
+        """Return the place of a row for a message: ``line 12 (data row 11)``."""
+        return f"line {self.line_numbers[row]} (data row {row + 1})"
+
+    def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
+        """Return some columns as numbers.
+
+        Parameters
+        ----------
+        names : sequence of str
+            Columns, each of which must be in the header.
+
+        Returns
+        -------
+        ndarray of shape (n_rows, n_names)
+            The values; nan where a cell is empty or says nan or NA.
+
+        Raises
+        ------
+        InputError
+            For a missing column, a row with more or fewer cells than the header, or text in a number.
+        """
+        for name in names:
+            if name not in self.header:
+                raise InputError(
+                    f"{self.path}: column '{name}' not found.{did_you_mean(name, self.header)} "
+                    f"Columns present: {quoted(self.header)}. Name the column in [columns] (or columns=...)"
+                )
+        self._check_ragged()
+        if not self.rows:
+            return np.empty((0, len(names)))
+        indices = [self.header.index(name) for name in names]
+        rows = self._with_decimal_points()
+        try:
+            values = np.loadtxt(
+                rows, delimiter=self.delimiter, usecols=indices, comments=None, quotechar='"', ndmin=2
+            )
+        except ValueError:
+            values = self._cell_by_cell(rows, indices)
+        return np.asarray(values, dtype=np.float64)
+
+    def _check_ragged(self) -> None:
+        expected = len(self.header)
+        for row, text in enumerate(self.rows):
+            if text.count(self.delimiter) + 1 == expected:
+                continue
+            found = len(self._cells(text))
+            if found != expected:
+                raise InputError(
+                    f"{self.path}: {self.place(row)} has {found} cells, expected {expected} as in the "
+                    "header; complete or remove the row"
+                )
+
+    def _cells(self, text: str) -> list[str]:
+        return _split(self.path, text, self.delimiter)
+
+    def _with_decimal_points(self) -> list[str]:
+        """Read decimal commas as points, where the delimiter leaves no doubt."""
+        if self.delimiter == "," or not any("," in row for row in self.rows):
+            return self.rows
+        return [row if "." in row else row.replace(",", ".") for row in self.rows]
+
+    def _cell_by_cell(self, rows: list[str], indices: list[int]) -> npt.NDArray[np.float64]:
+        values = np.empty((len(rows), len(indices)))
+        for row, text in enumerate(rows):
+            cells = self._cells(text)
+            for k, index in enumerate(indices):
+                cell = cells[index].strip()
+                try:
+                    values[row, k] = math.nan if cell.lower() in MISSING_WORDS else float(cell)
+                except ValueError:
+                    raise InputError(
+                        f"{self.path}: {self.place(row)}, column '{self.header[index]}': "
+                        f"'{cell}' found, expected a number; correct the cell, or leave it empty where the "
+                        'value is missing and import with repair = "interpolate"'
+                    ) from None
+        return values
+
+
+def read_table(path: str | Path) -> CsvTable:
+    """Read a CSV file with one header line; delimiter comma, semicolon or tab.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, in UTF-8.
+
+    Raises
+    ------
+    InputError
+        For a missing file, a folder, an empty or binary file, and a header without names or with a
+        name twice.
+    """
+    path = Path(path)
+    lines = _read_lines(path)
+    first = next((k for k, line in enumerate(lines) if line.strip()), None)
+    if first is None:
+        raise InputError(
+            f"{path}: the file is empty, expected a header line with column names and rows below"
+        )
+    header_line = lines[first]
+    delimiter = max(",;\t", key=re.sub('"[^"]*"', "", header_line).count)
+    header = tuple(name.strip() for name in _split(path, header_line, delimiter))
+    _check_header(path, header, first + 1)
+    blank = delimiter + " \t"
+    kept = [(k + 1, line) for k, line in enumerate(lines) if k > first and line.strip(blank)]
+    return CsvTable(
+        path=path,
+        header=header,
+        rows=[line for _, line in kept],
+        line_numbers=[number for number, _ in kept],
+        delimiter=delimiter,
+    )
+
+
+def read_bytes(path: Path, what: str) -> bytes:
+    """Return the contents of a file, which must be there and readable.
+
+    Raises
+    ------
+    InputError
+        As :func:`check_readable`.
+    """
+    check_readable(path, what)
+    return path.read_bytes()
+
+
+def check_readable(path: Path, what: str) -> None:
+    """Refuse a file that cannot be read.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    what : str
+        What is expected there, such as ``"a CSV file"``.
+
+    Raises
+    ------
+    InputError
+        For a missing file, a folder, or one that cannot be opened.
+    """
+    try:
+        with path.open("rb"):
+            return
+    except FileNotFoundError:
+        near = did_you_mean(path.name, _names_beside(path))
+        raise InputError(f"{path}: no such file, expected {what}.{near}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: this is a folder, expected {what}") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read ({error}), expected {what}") from None
+
+
+def _names_beside(path: Path) -> list[str]:
+    try:
+        return [other.name for other in path.parent.iterdir()]
+    except OSError:
+        return []
+
+
+def _split(path: Path, line: str, delimiter: str) -> list[str]:
+    try:
+        return next(csv.reader([line], delimiter=delimiter))
+    except csv.Error as error:
+        raise InputError(
+            f"{path}: not CSV text ({error}), expected rows of short cells; {_REMEDY_TEXT}"
+        ) from None
+
+
+def _read_lines(path: Path) -> list[str]:
+    data = read_bytes(path, "a CSV file")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(f"{path}: the file is in UTF-16, expected UTF-8; {_REMEDY_TEXT}")
+    if b"\x00" in data:
+        position = data.index(b"\x00")
+        raise InputError(
+            f"{path}: binary content (a zero byte at byte {position}), expected CSV text; {_REMEDY_TEXT}"
+        )
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text "
+            f"(binary content, or another encoding); {_REMEDY_TEXT}"
+        ) from None
+    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+
+
+def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+    unprintable = next((name for name in header if not name.isprintable()), None)
+    if unprintable is not None:
+        raise InputError(f"{path}: line {line} holds {unprintable!r}, expected column names; {_REMEDY_TEXT}")
+    for k, name in enumerate(header):
+        if name and name in header[:k]:
+            raise InputError(
+                f"{path}: line {line}: column '{name}' stands twice in the header; rename or remove one"
+            )
+    if all(_is_number(name) for name in header):
+        raise InputError(
+            f"{path}: line {line} holds only numbers, expected a header with column names "
+            "such as t,psi,u,v,r,delta"
+        )
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

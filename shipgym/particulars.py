@@ -1,0 +1,346 @@
+"""Particulars of a ship, and what can be estimated from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+from shipgym._checks import check_keys, check_number, check_table, check_text
+from shipgym.errors import InputError
+
+#: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
+ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
+
+_LIMITS: dict[str, tuple[float | None, float | None]] = {  # open bounds
+    "length": (0.0, None),
+    "beam": (0.0, None),
+    "draught": (0.0, None),
+    "mass": (0.0, None),
+    "xg": (None, None),
+    "yaw_gyradius": (0.0, None),
+    "block_coefficient": (0.0, 1.0),
+    "speed": (0.0, 50.0),
+    "rudder_area": (0.0, None),
+    "propeller_diameter": (0.0, None),
+    "water_density": (500.0, 1500.0),
+    "X_udot": (-1.0, 0.0),
+    "Y_vdot": (-1.0, 0.0),
+    "Y_rdot": (-1.0, 1.0),
+    "N_vdot": (-1.0, 1.0),
+    "N_rdot": (-1.0, 0.0),
+}
+
+_HINTS: dict[str, str] = {
+    "speed": "in m/s (a knot is 0.514 m/s)",
+    "water_density": "in kg/m3 (fresh water 1000, sea water 1025)",
+    **dict.fromkeys(
+        ADDED_MASSES,
+        "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the added mass",
+    ),
+}
+
+#: Largest share of the length that each of these can be.
+_SHARES_OF_LENGTH = {"beam": 1.0, "draught": 0.5, "xg": 0.5, "yaw_gyradius": 0.7, "propeller_diameter": 0.5}
+
+
+@dataclass(frozen=True)
+class Particulars(Mapping[str, Any]):
+    """Main dimensions, mass and added masses of a ship; also a mapping from name to value.
+
+    What is not known is None. :meth:`completed` estimates what the models need.
+
+    Parameters
+    ----------
+    length : float
+        Between perpendiculars, m.
+    name : str
+        The ship's name.
+    beam, draught : float, optional
+        m.
+    mass : float, optional
+        Displacement mass, kg.
+    xg : float, optional
+        Centre of gravity forward of midship, m.
+    yaw_gyradius : float, optional
+        Radius of gyration in yaw about the centre of gravity, m.
+    block_coefficient : float, optional
+        Displaced volume by length * beam * draught.
+    speed : float, optional
+        Service speed, m/s.
+    rudder_area : float, optional
+        Movable area, m2.
+    propeller_diameter : float, optional
+        m.
+    water_density : float, optional
+        kg/m3.
+    X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot : float, optional
+        Added-mass derivatives in the prime system: the first two by rho L^3 / 2, Y_rdot and N_vdot by
+        rho L^4 / 2, N_rdot by rho L^5 / 2; about midship.
+    estimated : frozenset of str
+        Names of the values that were estimated.
+
+    Raises
+    ------
+    InputError
+        For values that no ship has.
+    """
+
+    length: float
+    name: str = "ship"
+    beam: float | None = None
+    draught: float | None = None
+    mass: float | None = None
+    xg: float | None = None
+    yaw_gyradius: float | None = None
+    block_coefficient: float | None = None
+    speed: float | None = None
+    rudder_area: float | None = None
+    propeller_diameter: float | None = None
+    water_density: float | None = None
+    X_udot: float | None = None
+    Y_vdot: float | None = None
+    Y_rdot: float | None = None
+    N_vdot: float | None = None
+    N_rdot: float | None = None
+    estimated: frozenset[str] = frozenset()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "estimated", frozenset(self.estimated))
+        for name, value in _checked(self, "particulars").items():
+            object.__setattr__(self, name, value)
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in FIELDS:
+            raise KeyError(name)
+        return getattr(self, name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(FIELDS)
+
+    def __len__(self) -> int:
+        return len(FIELDS)
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Particulars:
+        """Make particulars from the keys of the ship file's ``[ship]``.
+
+        Parameters
+        ----------
+        mapping : mapping of str to Any
+            Values by name; added masses there or in a table ``added_mass``; ``estimated`` as
+            :meth:`to_dict` writes it. None stands for a value that is not known.
+        where : str, optional
+            Start of each message, such as ``"ship.toml: [ship]"``.
+
+        Raises
+        ------
+        InputError
+            For an unknown key, a missing length, a wrong type or a value that no ship has.
+        """
+        table = dict(check_table(mapping, where))
+        added = dict(check_table(table.pop("added_mass", None) or {}, f"{where} added_mass"))
+        check_keys(table, (*FIELDS, "added_mass", "estimated"), where)
+        check_keys(added, ADDED_MASSES, f"{where} added_mass")
+        twice = table.keys() & added.keys()
+        if twice:
+            raise InputError(f"{where} added_mass: {min(twice)} is given twice, expected it in one place")
+        values = table | added
+        estimated = values.pop("estimated", None) or ()
+        if isinstance(estimated, str) or not all(name in FIELDS for name in estimated):
+            raise InputError(f"{where} estimated: {estimated!r} found, expected a list of names of values")
+        if values.get("length") is None:
+            raise InputError(f"{where} length: missing, expected the length between perpendiculars in m")
+        return cls(**_checked(values, where), estimated=frozenset(estimated))
+
+    @classmethod
+    def from_dict(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Particulars:
+        """Read what :meth:`to_dict` wrote; the same as :meth:`from_mapping`."""
+        return cls.from_mapping(mapping, where)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
+        return {**{name: getattr(self, name) for name in FIELDS}, "estimated": sorted(self.estimated)}
+
+    def require(self, name: str) -> float:
+        """Return a value that must be known.
+
+        Raises
+        ------
+        InputError
+            Where it is None.
+        """
+        value = self[name]
+        if value is None:
+            raise InputError(f"particulars of {self.name}: {name} is needed and not known; give it in [ship]")
+        return float(value)
+
+    @property
+    def mass_prime(self) -> float:
+        """Mass by rho L^3 / 2."""
+        return self.require("mass") / (0.5 * self.require("water_density") * self.length**3)
+
+    @property
+    def xg_prime(self) -> float:
+        """Centre of gravity forward of midship by L."""
+        return self.require("xg") / self.length
+
+    @property
+    def inertia_prime(self) -> float:
+        """Yaw inertia about MIDSHIP by rho L^5 / 2: that about the centre of gravity and m xg^2."""
+        return self.mass_prime * ((self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2)
+
+    def completed(self) -> Particulars:
+        """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
+
+        Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass from the block
+        coefficient, X_udot five per cent of the mass, the other added masses by the regressions of Clarke,
+        Gedling and Hine 1983 (The application of manoeuvring criteria in hull design using linear theory,
+        Transactions of RINA 125).
+
+        Raises
+        ------
+        InputError
+            Naming what is missing, where not even that is possible.
+        """
+        ship = self
+        for name, estimate in _ESTIMATES.items():
+            if getattr(ship, name) is None:
+                value = estimate(ship)
+                if value is not None:
+                    changes: dict[str, Any] = {name: value, "estimated": ship.estimated | {name}}
+                    ship = replace(ship, **changes)
+        return ship
+
+
+#: Names of all values, in the order of the ship file.
+FIELDS: tuple[str, ...] = tuple(field.name for field in fields(Particulars) if field.name != "estimated")
+
+
+def clarke_added_masses(
+    length: float, beam: float, draught: float, block_coefficient: float
+) -> dict[str, float]:
+    """Estimate added masses in sway and yaw from a hull's proportions.
+
+    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2 in the prime system, about midship.
+
+    Parameters
+    ----------
+    length, beam, draught : float
+        m.
+    block_coefficient : float
+        Displaced volume by length * beam * draught.
+
+    Returns
+    -------
+    dict of str to float
+        ``Y_vdot``, ``Y_rdot``, ``N_vdot``, ``N_rdot``, prime system.
+    """
+    scale = -math.pi * (draught / length) ** 2
+    fullness = block_coefficient * beam / draught
+    slenderness, flatness = beam / length, beam / draught
+    return {
+        "Y_vdot": scale * (1.0 + 0.16 * fullness - 5.1 * slenderness**2),
+        "Y_rdot": scale * (0.67 * slenderness - 0.0033 * flatness**2),
+        "N_vdot": scale * (1.1 * slenderness - 0.041 * flatness),
+        "N_rdot": scale * (1.0 / 12.0 + 0.017 * fullness - 0.33 * slenderness),
+    }
+
+
+def _block_coefficient(ship: Particulars) -> float | None:
+    if ship.mass is None or ship.beam is None or ship.draught is None:
+        return None
+    return ship.mass / (ship.require("water_density") * ship.length * ship.beam * ship.draught)
+
+
+def _mass(ship: Particulars) -> float:
+    _check_known(ship, "mass", "give mass (kg), or beam, draught and block_coefficient, in [ship]")
+    volume = ship.length * ship.require("beam") * ship.require("draught") * ship.require("block_coefficient")
+    return ship.require("water_density") * volume
+
+
+def _clarke(name: str) -> Callable[[Particulars], float]:
+    def estimate(ship: Particulars) -> float:
+        remedy = (
+            "give beam, draught and block_coefficient (or mass) in [ship], or all of "
+            f"{', '.join(ADDED_MASSES)} in [ship.added_mass]"
+        )
+        _check_known(ship, name, remedy)
+        beam, draught = ship.require("beam"), ship.require("draught")
+        value = clarke_added_masses(ship.length, beam, draught, ship.require("block_coefficient"))[name]
+        if name in ("Y_vdot", "N_rdot") and value >= 0.0:
+            raise InputError(
+                f"particulars of {ship.name}: length/beam {ship.length / beam:.2f} and beam/draught "
+                f"{beam / draught:.2f} found, for which the regression of {name} gives {value:.3g}, expected "
+                "< 0: the proportions are outside its range; check them, or give [ship.added_mass]"
+            )
+        return value
+
+    return estimate
+
+
+def _check_known(ship: Particulars, name: str, remedy: str) -> None:
+    """Refuse to estimate `name` from proportions of the hull that are not all known."""
+    absent = [field for field in ("beam", "draught", "block_coefficient") if ship[field] is None]
+    if absent:
+        raise InputError(
+            f"particulars of {ship.name}: {name} is not given and cannot be estimated without "
+            f"{', '.join(absent)}; {remedy}"
+        )
+
+
+_ESTIMATES: dict[str, Callable[[Particulars], float | None]] = {  # in this order
+    "water_density": lambda ship: 1025.0,
+    "xg": lambda ship: 0.0,
+    "yaw_gyradius": lambda ship: 0.25 * ship.length,
+    "block_coefficient": _block_coefficient,
+    "mass": _mass,
+    "X_udot": lambda ship: -0.05 * ship.mass_prime,
+    **{name: _clarke(name) for name in ("Y_vdot", "Y_rdot", "N_vdot", "N_rdot")},
+}
+
+
+def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Return the values, numbers as float, after checking each and all together."""
+    checked = {name: values[name] for name in values if name in FIELDS}
+    check_text(checked.get("name", "ship"), f"{where} name")
+    for name, value in checked.items():
+        if name == "name" or (value is None and name != "length"):
+            continue
+        above, below = _LIMITS[name]
+        place = f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
+        checked[name] = check_number(value, place, above=above, below=below, hint=_HINTS.get(name, ""))
+    _check_together({k: v for k, v in checked.items() if k != "name" and v is not None}, where)
+    return checked
+
+
+def _check_together(values: Mapping[str, float], where: str) -> None:
+    """Refuse values that do not fit each other: most often a wrong unit."""
+    length = values["length"]
+    for name, share in _SHARES_OF_LENGTH.items():
+        if name in values and abs(values[name]) > share * length:
+            raise InputError(
+                f"{where} {name}: {values[name]:g} found with length {length:g}, expected at most {share:g} "
+                "of the length; check the units (m)"
+            )
+    if "mass" in values:
+        low, high, reason = _mass_range(values)
+        if not low <= values["mass"] <= high:
+            raise InputError(
+                f"{where} mass: {values['mass']:g} found, expected {low:.4g} to {high:.4g} kg ({reason}); "
+                "check the units (kg, not tonnes)"
+            )
+
+
+def _mass_range(values: Mapping[str, float]) -> tuple[float, float, str]:
+    """Return the smallest and largest mass that fit the dimensions, kg, and how they were found."""
+    density, length = values.get("water_density", 1025.0), values["length"]
+    if not {"beam", "draught"} <= values.keys():
+        cube = density * length**3
+        return 2e-4 * cube, 0.2 * cube, "0.0002 to 0.2 times water_density * length^3"
+    box = density * length * values["beam"] * values["draught"]
+    if "block_coefficient" not in values:
+        return 0.2 * box, box, "a block coefficient of 0.2 to 1"
+    full = box * values["block_coefficient"]
+    return 0.5 * full, 2.0 * full, "half to twice what block_coefficient gives"

@@ -1,0 +1,94 @@
+"""The steering gear: how the rudder follows its order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, TypedDict
+
+from shipgym._checks import check_keys, check_number, check_table
+
+
+class _Bounds(TypedDict, total=False):
+    above: float
+    at_least: float
+    at_most: float
+
+
+_BOUNDS: dict[str, _Bounds] = {
+    "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
+    "rudder_rate_deg_s": {"above": 0.0},
+    "time_constant": {"at_least": 0.0},
+}
+
+
+@dataclass(frozen=True)
+class SteeringGear:
+    """Limits and lag of the steering gear.
+
+    With a time constant of zero the rudder moves towards its order at the full rate (a ramp); otherwise
+
+        d(delta)/dt = clip((clip(order, -limit, limit) - delta) / time_constant, -rate, rate).
+
+    Parameters
+    ----------
+    rudder_limit_deg : float
+        Largest rudder order, degrees, above 0 and at most 90. 35 is usual.
+    rudder_rate_deg_s : float
+        Largest rudder rate, degrees per second, above 0. SOLAS II-1 asks for 65 degrees in 28 s.
+    time_constant : float
+        Lag, s; 0 for a gear of constant rate.
+
+    Raises
+    ------
+    InputError
+        For a value out of these bounds.
+    """
+
+    rudder_limit_deg: float = 35.0
+    rudder_rate_deg_s: float = 2.5
+    time_constant: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name, bounds in _BOUNDS.items():
+            object.__setattr__(
+                self, name, check_number(getattr(self, name), f"steering gear {name}", **bounds)
+            )
+
+    @classmethod
+    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> SteeringGear:
+        """Make a steering gear from the keys of the ship file's ``[steering]``.
+
+        Parameters
+        ----------
+        mapping : mapping of str to float
+            Any of ``rudder_limit_deg``, ``rudder_rate_deg_s``, ``time_constant``.
+        where : str, optional
+            Start of each message, such as ``"ship.toml: [steering]"``.
+
+        Raises
+        ------
+        InputError
+            For an unknown key or a value out of bounds.
+        """
+        table = check_table(mapping, where)
+        check_keys(table, [field.name for field in fields(cls)], where)
+        for name, bounds in _BOUNDS.items():
+            if name in table:
+                check_number(table[name], f"{where} {name}", **bounds)
+        return cls(**table)
+
+    def to_dict(self) -> dict[str, float]:
+        """Return the three values by name, as :meth:`from_mapping` takes them."""
+        return asdict(self)
+
+    @property
+    def limit(self) -> float:
+        """Largest rudder order, rad."""
+        return math.radians(self.rudder_limit_deg)
+
+    @property
+    def rate(self) -> float:
+        """Largest rudder rate, rad/s."""
+        return math.radians(self.rudder_rate_deg_s)

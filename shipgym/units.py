@@ -1,0 +1,86 @@
+"""Channels of a trial and the units in which a file may hold them."""
+
+from __future__ import annotations
+
+import math
+
+from shipgym._checks import did_you_mean, quoted
+from shipgym.errors import InputError
+
+_DEGREE = math.pi / 180.0
+
+#: Factor from each unit to SI, by the quantity measured. The first unit of each is the SI one.
+UNITS: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+    "length": {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nm": 1852.0},
+    "angle": {"rad": 1.0, "deg": _DEGREE},
+    "angular rate": {"rad/s": 1.0, "deg/s": _DEGREE, "deg/min": _DEGREE / 60.0},
+    "speed": {"m/s": 1.0, "knots": 1852.0 / 3600.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6},
+    "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
+}
+
+#: The quantity that each channel measures.
+QUANTITIES: dict[str, str] = {
+    "t": "time",
+    "x": "length",
+    "y": "length",
+    "psi": "angle",
+    "u": "speed",
+    "v": "speed",
+    "r": "angular rate",
+    "p": "angular rate",
+    "phi": "angle",
+    "delta": "angle",
+    "n": "shaft speed",
+    "delta_command": "angle",
+    "n_command": "shaft speed",
+}
+
+#: Names of the channels, without time.
+CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name != "t")
+
+
+def check_channel(name: str, where: str, *, time: bool = True) -> str:
+    """Return `name`, which must be that of a channel (or ``t``, unless `time` is false).
+
+    Raises
+    ------
+    InputError
+        Naming the nearest channel and all there are.
+    """
+    known = tuple(QUANTITIES) if time else CHANNELS
+    if name not in known:
+        hint = did_you_mean(str(name), known)
+        raise InputError(f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}")
+    return name
+
+
+def si_unit(channel: str) -> str:
+    """Return the SI unit of a channel, such as ``"rad/s"`` for ``r``."""
+    return next(iter(UNITS[QUANTITIES[channel]]))
+
+
+def si_factor(channel: str, unit: str, where: str = "unit") -> float:
+    """Return the factor that takes values in `unit` to SI.
+
+    Parameters
+    ----------
+    channel : str
+        Name of the channel (``t`` included).
+    unit : str
+        One of the units of the channel's quantity in :data:`UNITS`.
+    where : str, optional
+        Start of the message.
+
+    Raises
+    ------
+    InputError
+        For an unknown unit, or one that measures another quantity.
+    """
+    quantity = QUANTITIES[channel]
+    fitting = UNITS[quantity]
+    if isinstance(unit, str) and unit in fitting:
+        return fitting[unit]
+    others = [other for other, units in UNITS.items() if isinstance(unit, str) and unit in units]
+    hint = f" '{unit}' is a unit of {others[0]}" if others else did_you_mean(str(unit), fitting)
+    raise InputError(f"{where}: unit {unit!r} found, expected a unit of {quantity}: {quoted(fitting)}.{hint}")

@@ -1,0 +1,337 @@
+"""One TOML file says what ship it is, how to read its data and what each trial is for."""
+
+import tomllib
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shipgym.errors import InputError
+from shipgym.ship_file import ShipFile
+from shipgym.steering import SteeringGear
+from shipgym.trial import Trial
+
+SHIPS = Path(__file__).parents[1] / "ships"
+DATA = Path(__file__).parents[2].parent / "shared" / "data"
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the measured trials lie beside the checkout and are absent here"
+)
+
+T = np.arange(0.0, 30.0, 0.25)
+
+SHIP = """
+[ship]
+name = "Model"
+length = 7.0
+beam = 1.2688
+draught = 0.455
+mass = 3272.0
+xg = 0.25
+propeller_diameter = 0.204
+
+[ship.added_mass]
+Y_vdot = -0.0145
+
+[steering]
+rudder_limit_deg = 35.0
+rudder_rate_deg_s = 15.8
+
+[columns]
+t = "time"
+psi = { column = "yaw", unit = "deg" }
+u = "u"
+v = "v"
+r = { column = "yaw rate", unit = "deg/s" }
+delta = { column = "rudder", unit = "deg" }
+n = { column = "shaft", unit = "rpm" }
+
+[conventions]
+rudder_positive = "port"
+
+[identify]
+structure = "abkowitz"
+method = "tls-svm"
+
+[[trials]]
+file = "a.csv"
+kind = "zigzag"
+
+[[trials]]
+file = "runs/b.csv"
+use = "validate"
+rudder_positive = "starboard"
+origin = "cg"
+columns = { psi = { column = "yaw", unit = "rad" }, n = "shaft" }
+
+[[trials]]
+file = "c.csv"
+use = "skip"
+"""
+
+
+def columns(psi_factor=1.0, sign=1.0, shaft=600.0):
+    psi = 20.0 * np.sin(0.2 * T)
+    return {
+        "time": T,
+        "yaw": psi * psi_factor,
+        "u": 1.1 + 0.0 * T,
+        "v": 0.1 * np.sin(0.2 * T),
+        "yaw rate": 4.0 * np.cos(0.2 * T),
+        "rudder": sign * 10.0 * np.cos(0.2 * T),
+        "shaft": shaft + 0.0 * T,
+    }
+
+
+def write_csv(path, table):
+    rows = zip(*(values.tolist() for values in table.values()), strict=True)
+    path.write_text("\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "runs").mkdir()
+    write_csv(tmp_path / "a.csv", columns(sign=-1.0))
+    write_csv(tmp_path / "runs" / "b.csv", columns(psi_factor=np.pi / 180.0, shaft=10.0))
+    (tmp_path / "ship.toml").write_text(SHIP)
+    return tmp_path
+
+
+def refusal(folder, old="", new="", read=False, text=None):
+    """The message for the ship file with one change."""
+    assert old in SHIP
+    (folder / "ship.toml").write_text(SHIP.replace(old, new, 1) if text is None else text)
+    answer = (
+        ShipFile.load(folder / "ship.toml").trials if read else partial(ShipFile.load, folder / "ship.toml")
+    )
+    with pytest.raises(InputError) as caught:
+        answer()
+    message = str(caught.value)
+    assert message.startswith(str(folder / "ship.toml"))
+    assert "\n" not in message
+    return message.removeprefix(str(folder / "ship.toml"))
+
+
+def test_a_ship_file_gives_particulars_steering_gear_and_defaults(folder):
+    ship = ShipFile.load(str(folder / "ship.toml"))
+    assert ship.path == folder / "ship.toml"
+    assert (ship.particulars.name, ship.particulars.length, ship.particulars.Y_vdot) == (
+        "Model",
+        7.0,
+        -0.0145,
+    )
+    assert ship.particulars.estimated == frozenset()
+    assert ship.steering == SteeringGear(35.0, 15.8)
+    assert ship.completed_particulars() == ship.particulars.completed()
+    assert ship.identify == {"structure": "abkowitz", "method": "tls-svm"}
+
+
+def test_trials_are_read_with_the_file_s_conventions_or_their_own(folder):
+    a, b = ShipFile.load(folder / "ship.toml").trials()
+    assert (a.name, a.kind, a.use) == ("a.csv", "zigzag", "fit")
+    assert (a.length, b.length) == (7.0, 7.0)
+    assert (b.name, b.kind, b.use) == ("runs/b.csv", None, "validate")
+    for channel in ("psi", "u", "r", "delta", "n"):
+        np.testing.assert_allclose(b[channel], a[channel], rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(b["v"], a["v"] - 0.25 * a["r"], rtol=1e-12)
+    assert a["delta"][0] == pytest.approx(np.radians(10.0))
+    assert a["n"][0] == pytest.approx(10.0)
+
+
+def test_trials_can_be_asked_for_by_use(folder):
+    ship = ShipFile.load(folder / "ship.toml")
+    assert [trial.name for trial in ship.trials("fit")] == ["a.csv"]
+    assert [trial.name for trial in ship.trials(use="validate")] == ["runs/b.csv"]
+    with pytest.raises(InputError, match=r"'fitting' found.*Did you mean 'fit'"):
+        ship.trials("fitting")
+
+
+def test_length_and_one_trial_are_enough(tmp_path):
+    write_csv(tmp_path / "run.csv", {"t": T, "r": 0.01 * np.cos(0.1 * T), "delta": 0.1 * np.cos(0.1 * T)})
+    (tmp_path / "ship.toml").write_text('[ship]\nlength = 7\n[[trials]]\nfile = "run.csv"\n')
+    ship = ShipFile.load(tmp_path / "ship.toml")
+    (trial,) = ship.trials()
+    assert ship.steering is None
+    assert ship.identify == {}
+    assert trial.use == "fit"
+    assert trial.derived == {"psi"}
+    with pytest.raises(
+        InputError, match=r"ship\.toml: particulars of ship: mass is not given and cannot be estimated"
+    ):
+        ship.completed_particulars()
+
+
+def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
+    table = columns(sign=-1.0)
+    table["u"][5] = np.nan
+    write_csv(folder / "a.csv", table)
+    assert "line 7 (data row 6), column 'u': no value" in refusal(folder, read=True)
+    for old in ("[conventions]", 'file = "a.csv"'):
+        (folder / "ship.toml").write_text(SHIP.replace(old, f'{old}\nrepair = "interpolate"'))
+        np.testing.assert_allclose(ShipFile.load(folder / "ship.toml").trials("fit")[0]["u"], 1.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("length = 7.0", "length = -7.0", ": [ship] length: -7 found, expected a number > 0"),
+        ("length = 7.0", 'length = "7.0"', ": [ship] length: '7.0' (a text"),
+        ("length = 7.0", "length = nan", ": [ship] length: nan found"),
+        ("length = 7.0", "length = true", ": [ship] length: True found"),
+        ("length = 7.0", "", ": [ship] length: missing"),
+        ("length = 7.0", f"length = 1{'0' * 400}", ": [ship] length: inf found"),
+        ("beam =", "beem =", ": [ship]: unknown key 'beem'. Did you mean 'beam'?"),
+        ("Y_vdot", "Y_wdot", ": [ship] added_mass: unknown key 'Y_wdot'. Did you mean 'Y_vdot'?"),
+        ("[steering]", "[stearing]", ": unknown key 'stearing'. Did you mean 'steering'?"),
+        ("rudder_limit_deg = 35.0", "rudder_limit_deg = -3.0", ": [steering] rudder_limit_deg: -3 found"),
+        ('unit = "deg/s"', 'unit = "degs"', ": [columns] r: unit 'degs' found"),
+        ('unit = "deg/s"', 'unit = "knots"', "'knots' is a unit of speed"),
+        ('v = "v"', 'sway = "v"', ": [columns]: unknown channel 'sway'"),
+        (
+            'rudder_positive = "port"',
+            'rudder_positive = "left"',
+            ": [conventions] rudder_positive: 'left' found",
+        ),
+        ('rudder_positive = "port"', "rudder_positive = 1", ": [conventions] rudder_positive: 1 found"),
+        (
+            'rudder_positive = "port"',
+            'rudder = "port"',
+            "unknown key 'rudder'. Did you mean 'rudder_positive'?",
+        ),
+        (
+            'rudder_positive = "starboard"',
+            'rudder_positive = "right"',
+            ": [[trials]] 2 rudder_positive: 'right'",
+        ),
+        ('structure = "abkowitz"', "structure = 3", ": [identify] structure: 3 found"),
+        ("structure =", "structur =", ": [identify]: unknown key 'structur'"),
+        ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: 'zig zag' found"),
+        ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: 'valid' found"),
+        ('use = "validate"', 'used = "validate"', ": [[trials]] 2: unknown key 'used'. Did you mean 'use'?"),
+        ('file = "a.csv"', "", ": [[trials]] 1: no file found"),
+        ('file = "a.csv"', "file = 3", ": [[trials]] 1 file: 3 found"),
+        ('file = "runs/b.csv"', 'file = "./a.csv"', ": [[trials]] 2 file: './a.csv' is listed twice"),
+        ("xg = 0.25", "", ": [[trials]] 2 origin: 'cg' found without xg"),
+        ("[ship]", "[ship", ": not valid TOML"),
+        ("[ship]", "[ship]\nestimated = []", "unknown key 'estimated'"),
+    ],
+)
+def test_what_is_wrong_in_a_ship_file_is_named_by_field(folder, old, new, message):
+    assert message in refusal(folder, old, new)
+
+
+def test_broken_toml_is_named_with_its_line(folder):
+    assert "not valid TOML" in refusal(folder, "length = 7.0", "length = 7.0.0")
+    assert "(at line 4, column 13)" in refusal(folder, "length = 7.0", "length = 7.0.0")
+    assert "(at line 2, column 6)" in refusal(folder, text="[ship]\n[ship\n")
+
+
+def test_a_ship_file_without_ship_or_trials_is_refused(folder):
+    assert "no table [ship] found" in refusal(folder, text="")
+    assert "no trials found, expected at least one [[trials]]" in refusal(
+        folder, text="[ship]\nlength = 7.0\n"
+    )
+    assert "[[trials]]" in refusal(folder, text='[ship]\nlength = 7.0\n[trials]\nfile = "a.csv"\n')
+    skipped = '[ship]\nlength = 7.0\n[[trials]]\nfile = "a.csv"\nuse = "skip"\n'
+    assert 'all trials have use = "skip"' in refusal(folder, text=skipped)
+
+
+def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no such file, expected a ship file"):
+        ShipFile.load(tmp_path / "ship.toml")
+    with pytest.raises(InputError, match="this is a folder"):
+        ShipFile.load(tmp_path)
+    (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
+    with pytest.raises(InputError, match="line 2 holds byte 0xff, expected TOML"):
+        ShipFile.load(tmp_path / "ship.toml")
+
+
+@pytest.mark.parametrize("file", ["b.csv", "x" * 300, "\\u0000", "runs"])
+def test_a_missing_trial_is_refused_on_loading(folder, file):
+    assert refusal(folder, '"a.csv"', f'"{file}"').startswith(": [[trials]] 1 file: ")
+    (folder / "a.csv").rename(folder / "a_.csv")
+    assert "a.csv: no such file, expected a CSV file. Did you mean 'a_.csv'?" in refusal(folder)
+
+
+def test_what_is_wrong_in_a_trial_names_ship_file_and_csv_file(folder):
+    message = refusal(folder, 'u = "u"', 'u = "U"', read=True)
+    assert message.startswith(": [[trials]] 1: ")
+    assert "a.csv: column 'U' not found. Did you mean 'u'? Columns present: 'time', 'yaw'" in message
+
+
+def test_a_ship_of_known_length_cannot_spin_faster_than_any_ship(folder):
+    slow = 'r = { column = "yaw rate", unit = "deg/s" }'
+    table = columns(sign=-1.0)
+    table["u"] /= 100.0  # 0.011 m/s and 4 deg/s with 7 m
+    write_csv(folder / "a.csv", table)
+    message = refusal(folder, slow, slow, read=True)
+    assert "yaw rate up to 4 deg/s" in message
+    assert "for a length of 7 m" in message
+
+
+def test_rpm_read_as_rps_are_noticed_where_the_propeller_is_known(folder):
+    message = refusal(folder, 'unit = "rpm"', 'unit = "rps"', read=True)
+    assert 'unit = "rpm"' in message
+    write_csv(folder / "runs" / "b.csv", columns(psi_factor=np.pi / 180.0, shaft=190.0))
+    message = refusal(folder, read=True)
+    assert "shaft speed up to 190 rps found, expected at most 156 rps for a propeller of 0.204 m" in message
+
+
+@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(line=st.integers(0, SHIP.count("\n") - 1), new=st.text('[]{}=".#abfx0127-\n', max_size=12))
+def test_whatever_stands_in_a_ship_file_the_answer_is_a_ship_or_one_message(folder, line, new):
+    lines = SHIP.split("\n")
+    lines[line] = new
+    (folder / "ship.toml").write_text("\n".join(lines))
+    try:
+        ship: ShipFile | InputError = ShipFile.load(folder / "ship.toml")
+    except InputError as error:
+        ship = error
+    assert str(folder) in str(ship) if isinstance(ship, InputError) else ship.particulars.length > 0.0
+
+
+# --- real input
+
+
+@pytest.mark.parametrize("path", sorted(SHIPS.glob("*.toml")), ids=lambda path: path.stem)
+@needs_data
+def test_every_measured_trial_is_imported(path):
+    ship = ShipFile.load(path)
+    trials = ship.trials()
+    assert [trial.name for trial in trials] == [t["file"] for t in tomllib.loads(path.read_text())["trials"]]
+    for trial in trials:
+        speed = np.quantile(trial["u"], 0.95)
+        assert trial.duration > 60.0
+        assert {"psi", "u", "v", "r", "delta", "n"} <= set(trial.channels)
+        assert 0.3 < speed / ship.particulars.speed < 1.2
+        assert trial.derived == frozenset()
+        # the rudder turns the ship to the side it is laid to: regress the yaw acceleration of a turning ship
+        steps = np.arange(0, len(trial), max(1, len(trial) // 200))
+        yaw_rate, rudder = trial["r"][steps], trial["delta"][steps]
+        change, level = np.diff(yaw_rate), np.column_stack([yaw_rate[:-1], rudder[:-1]])
+        assert np.linalg.lstsq(level, change, rcond=None)[0][1] > 0.0
+
+
+@needs_data
+def test_the_tank_s_ship_file_fits_three_zigzags_and_predicts_the_others():
+    ship = ShipFile.load(SHIPS / "kvlcc2_hsva.toml")
+    fit = [Path(trial.name).name for trial in ship.trials("fit")]
+    assert fit == ["Z_10_05.csv", "Z_20_05.csv", "Z_30_05.csv"]
+    assert len(ship.trials("validate")) == 6
+    assert {trial.kind for trial in ship.trials()} == {"zigzag"}
+
+
+@needs_data
+@pytest.mark.parametrize(
+    "run", ["kvlcc2_hsva/Z_05_01.csv", "kvlcc2_hsva/Z_20_05.csv", "kvlcc2_marin/zz_10_m.csv"]
+)
+def test_earth_fixed_velocities_that_are_not_declared_are_noticed(run):
+    columns = {"x": "x0", "y": "y0", "psi": "psi", "u": "dx0", "v": "dy0"}
+    with pytest.raises(InputError, match='declare velocity_frame = "earth"'):
+        Trial.from_csv(DATA / run, columns)
+    earth = Trial.from_csv(DATA / run, columns, velocity_frame="earth")
+    body = Trial.from_csv(DATA / run, columns | {"u": "u", "v": "v"})
+    np.testing.assert_allclose(earth["u"], body["u"], atol=0.01)
+    np.testing.assert_allclose(earth["v"], body["v"], atol=0.01)

@@ -1,0 +1,613 @@
+"""A recorded manoeuvre comes in by CSV with its units, signs and frame, and goes out again without loss."""
+
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from shipgym.errors import InputError
+from shipgym.trial import Trial
+from shipgym.trial_import import rotate_to_body
+from shipgym.units import QUANTITIES, UNITS, si_factor
+
+T = np.linspace(0.0, 60.0, 301)
+
+
+def manoeuvre(t=T):
+    """A smooth zigzag-like motion of a 7 m model whose channels agree with each other."""
+    psi = 0.4 * np.sin(0.2 * t)
+    r = 0.08 * np.cos(0.2 * t)
+    u = 1.1 + 0.05 * np.cos(0.4 * t)
+    v = -0.08 * np.cos(0.2 * t + 0.3)
+    north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
+    fine = np.linspace(t[0], t[-1], 20 * t.size)
+    f_psi = 0.4 * np.sin(0.2 * fine)
+    f_u, f_v = 1.1 + 0.05 * np.cos(0.4 * fine), -0.08 * np.cos(0.2 * fine + 0.3)
+    paths = []
+    for speed in (f_u * np.cos(f_psi) - f_v * np.sin(f_psi), f_u * np.sin(f_psi) + f_v * np.cos(f_psi)):
+        steps = 0.5 * np.diff(fine) * (speed[1:] + speed[:-1])
+        paths.append(np.interp(t, fine, np.concatenate([[0.0], np.cumsum(steps)])))
+    channels = {
+        "x": paths[0],
+        "y": paths[1],
+        "psi": psi,
+        "u": u,
+        "v": v,
+        "r": r,
+        "delta": 0.3 * np.sin(0.2 * t + 1.0),
+    }
+    return channels, {"north": north, "east": east}
+
+
+def write(path, columns):
+    """Write columns to a CSV file, numbers to the last digit."""
+    rows = zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True)
+    path.write_text("\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    return path
+
+
+def edited(tmp_path, line, old_new=None, text=None):
+    """A sound file with one line changed; lines are counted from 1, the header."""
+    channels, _ = manoeuvre()
+    path = write(tmp_path / "run.csv", {"t": T, **channels})
+    lines = path.read_text().splitlines()
+    lines[line - 1] = (
+        text
+        if text is not None
+        else ",".join(old_new.get(k, cell) for k, cell in enumerate(lines[line - 1].split(",")))
+    )
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def refusal(path, *args, **kwargs):
+    with pytest.raises(InputError) as caught:
+        Trial.from_csv(path, *args, **kwargs)
+    message = str(caught.value)
+    assert str(path) in message
+    assert "\n" not in message
+    return message
+
+
+# --- the trial itself
+
+
+def test_a_trial_gives_its_channels_read_only():
+    trial = Trial(
+        [0.0, 0.1, 0.3], {"r": [1, 2, 3], "psi": [0, 0, 0]}, name="run", kind="zigzag", use="validate"
+    )
+    assert (trial.name, trial.kind, trial.use, len(trial), trial.duration) == (
+        "run",
+        "zigzag",
+        "validate",
+        3,
+        0.3,
+    )
+    assert trial["r"].dtype == np.float64
+    assert trial["t"] is trial.t
+    assert "r" in trial
+    assert "v" not in trial
+    assert list(trial.channels) == ["r", "psi"]
+    with pytest.raises(ValueError, match="read-only"):
+        trial["r"][0] = 5.0
+    with pytest.raises(TypeError):
+        trial.channels["r"] = np.zeros(3)
+
+
+def test_a_missing_channel_is_named_with_those_present():
+    trial = Trial([0.0, 1.0, 2.0], {"delta": np.zeros(3)})
+    with pytest.raises(
+        InputError, match=r"no channel 'delt'\. Did you mean 'delta'\? Channels present: 'delta'"
+    ):
+        trial["delt"]
+
+
+@pytest.mark.parametrize(
+    ("t", "channels", "message"),
+    [
+        ([0.0, 1.0], {"r": [0, 0]}, "2 samples found, expected at least 3"),
+        ([0.0, 1.0, 1.0], {"r": [0, 0, 0]}, "goes from 1 to 1 s at sample 2"),
+        ([0.0, 2.0, 1.0], {"r": [0, 0, 0]}, "goes from 2 to 1 s at sample 2"),
+        ([0.0, 1.0, 2.0], {"r": [0, 0]}, "r has 2 samples, expected 3"),
+        ([0.0, 1.0, 2.0], {"r": [0, math.nan, 0]}, "nan found at sample 1"),
+        ([0.0, 1.0, 2.0], {"r": [[0], [1], [2]]}, r"array of shape \(3, 1\) found"),
+        ([0.0, 1.0, 2.0], {"r": ["a", "b", "c"]}, "expected an array of numbers"),
+        ([0.0, 1.0, 2.0], {"rudder": [0, 0, 0]}, "unknown channel 'rudder'"),
+        ([0.0, 1.0, 2.0], {}, "no channel found"),
+    ],
+)
+def test_unsound_arrays_are_refused(t, channels, message):
+    with pytest.raises(InputError, match=message):
+        Trial(t, channels)
+
+
+def test_words_that_are_not_known_are_refused():
+    with pytest.raises(InputError, match=r"kind: 'zig-zag' found.*Did you mean 'zigzag'"):
+        Trial([0, 1, 2], {"r": [0, 0, 0]}, kind="zig-zag")
+    with pytest.raises(InputError, match="use: 'test' found"):
+        Trial([0, 1, 2], {"r": [0, 0, 0]}, use="test")
+    with pytest.raises(InputError, match="derived: 'psi' found"):
+        Trial([0, 1, 2], {"r": [0, 0, 0]}, derived=["psi"])
+
+
+def test_a_copy_may_change_name_kind_and_use_but_not_the_data():
+    trial = Trial([0, 1, 2], {"r": [0, 1, 0]}, derived=["r"])
+    other = trial.with_(use="skip", name="other", kind="random")
+    assert (other.use, other.name, other.kind, other.derived) == ("skip", "other", "random", frozenset({"r"}))
+    assert other.sha256 == trial.sha256
+    with pytest.raises(InputError, match="cannot change 't'"):
+        trial.with_(t=[0, 1, 2])
+
+
+def test_the_hash_follows_the_contents_only():
+    a = Trial([0, 1, 2], {"r": [0, 1, 0], "u": [1, 1, 1]})
+    assert a.sha256 == Trial([0, 1, 2], {"u": [1, 1, 1], "r": [0, 1, 0]}, name="b").sha256
+    assert a.sha256 != Trial([0, 1, 2], {"r": [0, 1, 1e-17], "u": [1, 1, 1]}).sha256
+    assert a.sha256 != Trial([0, 1, 2], {"v": [0, 1, 0], "u": [1, 1, 1]}).sha256
+
+
+def test_a_trial_survives_a_pickle_immutable():
+    trial = Trial([0, 1, 2], {"r": [0, 1, 0]}, name="run", use="skip", derived=["r"])
+    copy = pickle.loads(pickle.dumps(trial))
+    assert (copy.sha256, copy.name, copy.use, copy.derived) == (trial.sha256, "run", "skip", trial.derived)
+    assert not copy["r"].flags.writeable
+
+
+# --- CSV: what comes in
+
+
+def test_a_file_with_the_project_s_names_needs_no_further_words(tmp_path):
+    channels, _ = manoeuvre()
+    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, **channels, "thrust": T}))
+    assert trial.name == "run.csv"
+    assert trial.derived == frozenset()
+    assert set(trial.channels) == set(channels)
+    for name, values in channels.items():
+        np.testing.assert_array_equal(trial[name], values)
+
+
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data(), n=st.integers(3, 20))
+def test_csv_out_and_in_again_loses_nothing(tmp_path, data, n):
+    def numbers(bound):
+        return data.draw(st.lists(st.floats(-bound, bound), min_size=n, max_size=n))
+
+    steps = data.draw(st.lists(st.floats(1e-3, 10.0), min_size=n, max_size=n))
+    bounds = {"x": 1e5, "u": 40.0, "delta": 1.5, "phi": 1.0, "n": 150.0}
+    trial = Trial(np.cumsum(steps), {name: numbers(bound) for name, bound in bounds.items()})
+    trial.to_csv(tmp_path / "out.csv")
+    again = Trial.from_csv(tmp_path / "out.csv")
+    for name in ("t", *trial.channels):
+        np.testing.assert_array_equal(again[name], trial[name])
+    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_writing_replaces_the_file_as_a_whole_or_says_why_not(tmp_path):
+    trial = Trial([0, 1, 2], {"u": [1, 1, 1]})
+    (tmp_path / "out.csv").write_text("old")
+    trial.to_csv(tmp_path / "out.csv")
+    assert (tmp_path / "out.csv").read_text() == "t,u\n0.0,1.0\n1.0,1.0\n2.0,1.0\n"
+    with pytest.raises(InputError, match="cannot be written"):
+        trial.to_csv(tmp_path / "nowhere" / "out.csv")
+    with pytest.raises(InputError, match="cannot be written"):
+        trial.to_csv(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_semicolons_tabs_quotes_blank_lines_and_byte_order_marks_are_read(tmp_path, delimiter):
+    lines = ['"t","u"', "0,1.5", "", "1,2.5", '"2",3.5', " , "]
+    text = "\ufeff" + "\r\n".join(line.replace(",", delimiter) for line in lines)
+    (tmp_path / "run.csv").write_text(text, encoding="utf-8", newline="")
+    np.testing.assert_array_equal(Trial.from_csv(tmp_path / "run.csv")["u"], [1.5, 2.5, 3.5])
+
+
+def test_decimal_commas_are_read_where_the_delimiter_leaves_no_doubt(tmp_path):
+    (tmp_path / "run.csv").write_text("t;u\n0;1,5\n0,5;2,5\n1;3,5\n")
+    trial = Trial.from_csv(tmp_path / "run.csv")
+    np.testing.assert_array_equal(trial["u"], [1.5, 2.5, 3.5])
+    np.testing.assert_array_equal(trial.t, [0.0, 0.5, 1.0])
+
+
+def test_text_in_a_column_that_is_not_asked_for_does_no_harm(tmp_path):
+    (tmp_path / "run.csv").write_text('t,remark,u\n0,start,1\n1,,1\n2,"end, at last",1\n')
+    np.testing.assert_array_equal(Trial.from_csv(tmp_path / "run.csv")["u"], [1, 1, 1])
+
+
+def test_units_are_converted(tmp_path):
+    channels, _ = manoeuvre()
+    path = write(
+        tmp_path / "run.csv",
+        {
+            "minutes": T / 60.0,
+            "yaw": np.degrees(channels["psi"]),
+            "rate": np.degrees(channels["r"]),
+            "speed": channels["u"] * 3600.0 / 1852.0,
+            "shaft": np.full(T.size, 90.0),
+        },
+    )
+    trial = Trial.from_csv(
+        path,
+        {
+            "t": {"column": "minutes", "unit": "min"},
+            "psi": {"column": "yaw", "unit": "deg"},
+            "r": {"column": "rate", "unit": "deg/s"},
+            "u": {"column": "speed", "unit": "knots"},
+            "n": {"column": "shaft", "unit": "rpm"},
+        },
+    )
+    np.testing.assert_allclose(trial.t, T, atol=1e-12)
+    np.testing.assert_allclose(trial["psi"], channels["psi"], atol=1e-15)
+    np.testing.assert_allclose(trial["r"], channels["r"], atol=1e-15)
+    np.testing.assert_allclose(trial["u"], channels["u"], rtol=1e-14)
+    np.testing.assert_allclose(trial["n"], 1.5)
+
+
+def test_every_quantity_has_its_si_unit_first():
+    assert {
+        quantity: si_factor(channel, next(iter(UNITS[quantity]))) for channel, quantity in QUANTITIES.items()
+    } == dict.fromkeys(UNITS, 1.0)
+    assert si_factor("r", "deg/min") * 60.0 * 180.0 == pytest.approx(math.pi)
+    assert si_factor("u", "km/h") * 3.6 == pytest.approx(1.0)
+
+
+def test_a_port_positive_rudder_is_turned_round(tmp_path):
+    channels, _ = manoeuvre()
+    port = {"t": T, "r": channels["r"], "delta": -channels["delta"], "delta_command": -channels["delta"]}
+    trial = Trial.from_csv(write(tmp_path / "run.csv", port), rudder_positive="port")
+    np.testing.assert_array_equal(trial["delta"], channels["delta"])
+    np.testing.assert_array_equal(trial["delta_command"], channels["delta"])
+    np.testing.assert_array_equal(trial["r"], channels["r"])
+
+
+def test_earth_fixed_velocities_are_rotated_to_the_body(tmp_path):
+    channels, earth = manoeuvre()
+    path = write(
+        tmp_path / "run.csv", {"t": T, "psi": channels["psi"], "u": earth["north"], "v": earth["east"]}
+    )
+    trial = Trial.from_csv(path, velocity_frame="earth")
+    np.testing.assert_allclose(trial["u"], channels["u"], atol=1e-14)
+    np.testing.assert_allclose(trial["v"], channels["v"], atol=1e-14)
+
+
+@given(u=st.floats(-20, 20), v=st.floats(-20, 20), psi=st.floats(-50, 50))
+def test_rotating_to_the_earth_and_back_changes_nothing(u, v, psi):
+    north, east = u * math.cos(psi) - v * math.sin(psi), u * math.sin(psi) + v * math.cos(psi)
+    back = rotate_to_body(np.array([north]), np.array([east]), np.array([psi]))
+    np.testing.assert_allclose(np.ravel(back), [u, v], atol=1e-12)
+
+
+def test_velocity_and_position_of_the_centre_of_gravity_are_moved_to_midship(tmp_path):
+    channels, _ = manoeuvre()
+    xg = 0.25
+    at_cg = channels | {
+        "x": channels["x"] + xg * np.cos(channels["psi"]),
+        "y": channels["y"] + xg * np.sin(channels["psi"]),
+        "v": channels["v"] + xg * channels["r"],
+    }
+    path = write(tmp_path / "run.csv", {"t": T, **at_cg})
+    trial = Trial.from_csv(path, origin="cg", xg=xg)
+    for name in ("x", "y", "u", "v"):
+        np.testing.assert_allclose(trial[name], channels[name], atol=1e-14)
+    assert "origin: 'cg' found without xg" in refusal(path, origin="cg")
+
+
+def test_a_heading_that_jumps_at_north_becomes_continuous(tmp_path):
+    psi = 6.0 + 0.01 * T
+    for wrapped in (psi % (2 * np.pi), (psi + np.pi) % (2 * np.pi) - np.pi):
+        trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": wrapped}))
+        np.testing.assert_allclose(np.diff(trial["psi"]), np.diff(psi), atol=1e-12)
+
+
+# --- channels that are derived
+
+
+@pytest.mark.parametrize(
+    "t", [T, np.sort(np.random.default_rng(1).uniform(0.0, 60.0, 400))], ids=["even", "uneven"]
+)
+def test_yaw_rate_surge_and_sway_follow_from_position_and_heading(tmp_path, t):
+    channels, _ = manoeuvre(t)
+    path = write(
+        tmp_path / "run.csv", {"t": t, **{name: channels[name] for name in ("x", "y", "psi", "delta")}}
+    )
+    trial = Trial.from_csv(path)
+    assert trial.derived == {"r", "u", "v"}
+    assert np.abs(trial["r"] - channels["r"]).max() < 1e-5
+    assert np.abs(trial["u"] - channels["u"]).max() < 1e-3
+    assert np.abs(trial["v"] - channels["v"]).max() < 1e-3
+
+
+def test_a_noisy_heading_gives_a_yaw_rate_that_is_better_than_differences(tmp_path):
+    channels, _ = manoeuvre()
+    noisy = channels["psi"] + np.random.default_rng(2).normal(0.0, 1e-3, T.size)
+    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": noisy}))
+    error = np.sqrt(np.mean((trial["r"] - channels["r"]) ** 2))
+    differences = np.sqrt(np.mean((np.gradient(noisy, T) - channels["r"]) ** 2))
+    assert error < 0.2 * differences
+
+
+def test_heading_from_the_start_follows_from_the_yaw_rate_where_no_position_is_known(tmp_path):
+    channels, _ = manoeuvre()
+    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "r": channels["r"]}))
+    assert trial.derived == {"psi"}
+    np.testing.assert_allclose(trial["psi"], channels["psi"], atol=1e-7)
+
+
+def test_channels_of_the_centre_of_gravity_are_derived_at_midship(tmp_path):
+    channels, _ = manoeuvre()
+    path = write(
+        tmp_path / "run.csv",
+        {
+            "t": T,
+            "psi": channels["psi"],
+            "x": channels["x"] + 0.5 * np.cos(channels["psi"]),
+            "y": channels["y"] + 0.5 * np.sin(channels["psi"]),
+        },
+    )
+    trial = Trial.from_csv(path, origin="cg", xg=0.5)
+    assert np.abs(trial["v"] - channels["v"]).max() < 1e-3
+
+
+# --- missing values
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "NaN", "NA", " ", "inf"])
+def test_a_missing_value_is_refused_with_its_line_and_the_option_that_repairs(tmp_path, cell):
+    message = refusal(edited(tmp_path, 12, {6: cell}))
+    assert "line 12 (data row 11), column 'r'" in message
+    assert 'repair = "interpolate"' in message
+    assert "1 of 301 rows" in message
+
+
+def test_missing_values_are_interpolated_on_demand(tmp_path):
+    channels, _ = manoeuvre()
+    broken = {name: values.copy() for name, values in channels.items()}
+    broken["psi"] = (broken["psi"] + 0.3) % (2 * np.pi)
+    broken["r"][[10, 11, 12]] = np.nan
+    broken["psi"][50] = np.nan
+    path = write(tmp_path / "run.csv", {"t": T, **broken})
+    trial = Trial.from_csv(path, repair="interpolate")
+    assert len(trial) == T.size
+    np.testing.assert_allclose(trial["r"], channels["r"], atol=1e-4)
+    np.testing.assert_allclose(
+        trial["psi"] - trial["psi"][0], channels["psi"] - channels["psi"][0], atol=1e-4
+    )
+
+
+def test_rows_that_lack_a_value_at_either_end_are_left_out_not_invented(tmp_path):
+    channels, _ = manoeuvre()
+    r = channels["r"].copy()
+    r[[0, 1, -1]] = np.nan
+    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "r": r}), repair="interpolate")
+    np.testing.assert_array_equal(trial.t, T[2:-1])
+
+
+def test_time_cannot_be_repaired_nor_a_column_that_is_mostly_empty(tmp_path):
+    assert "time cannot be interpolated" in refusal(edited(tmp_path, 5, {0: ""}), repair="interpolate")
+    r = np.where(np.arange(T.size) % 3 == 0, 0.01, np.nan)
+    path = write(tmp_path / "run.csv", {"t": T, "r": r})
+    assert "only 101 of 301 rows" in refusal(path, repair="interpolate")
+    assert "repair: 'drop' found, expected one of 'interpolate'" in refusal(path, repair="drop")
+
+
+# --- files that are refused
+
+
+def test_text_in_a_number_is_named_with_line_column_and_value(tmp_path):
+    message = refusal(edited(tmp_path, 7, {4: "1,1".replace(",", ".1.")}))
+    assert "line 7 (data row 6), column 'u': '1.1.1' found, expected a number" in message
+
+
+def test_a_ragged_row_is_named_with_its_number_of_cells(tmp_path):
+    assert "line 9 (data row 8) has 3 cells, expected 8" in refusal(edited(tmp_path, 9, text="1,2,3"))
+    assert "line 9 (data row 8) has 9 cells, expected 8" in refusal(
+        edited(tmp_path, 9, text="1,2,3,4,5,6,7,8,9")
+    )
+
+
+def test_time_that_goes_back_or_stands_still_is_named_with_both_values(tmp_path):
+    message = refusal(edited(tmp_path, 20, {0: "1.5"}))
+    assert "line 20 (data row 19), column 't': time goes back from 3.4 to 1.5 s" in message
+    assert "line 20 (data row 19), column 't': time stands still at 3.4 s" in refusal(
+        edited(tmp_path, 20, {0: repr(float(T[17]))})
+    )
+
+
+def test_blank_lines_do_not_shift_the_line_numbers(tmp_path):
+    (tmp_path / "run.csv").write_text("\n\nt,u\n\n0,1\n1,1\n\n2,x\n")
+    assert "line 8 (data row 3), column 'u': 'x' found" in refusal(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2])
+def test_fewer_than_three_samples_are_refused(tmp_path, rows):
+    (tmp_path / "run.csv").write_text("t,u\n" + "".join(f"{k},1\n" for k in range(rows)))
+    assert f"{rows} samples found, expected at least 3" in refusal(tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "the file is empty"),
+        (b"\n \n", "the file is empty"),
+        (b"PK\x03\x04\x14\x00\x06\x00", "binary content (a zero byte at byte 5)"),
+        (b"\x89PNG\r\n\x1a\n", "byte 0x89, which is not UTF-8"),
+        (b"t,u\n0,1\n1,\xff\n", "line 3 holds byte 0xff"),
+        ("t,u\n0,1\n".encode("utf-16"), "the file is in UTF-16"),
+        (b"\x01\x02\x03\n", "expected column names"),
+        (b"t,u,u\n0,1,1\n", "column 'u' stands twice"),
+        (b"0,1,2\n1,1,1\n", "only numbers, expected a header"),
+        (b"time,speed\n0,1\n", "no column is named like a channel"),
+        (b"t,speed\n0,1\n", "no column is named like a channel"),
+        (b"u,v\n0,1\n", "column 't' not found"),
+        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "not CSV text"),
+    ],
+)
+def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
+    (tmp_path / "run.csv").write_bytes(content)
+    assert message in refusal(tmp_path / "run.csv")
+
+
+def test_a_missing_file_and_a_folder_are_refused(tmp_path):
+    (tmp_path / "run_1.csv").write_text("t,u\n")
+    assert "no such file, expected a CSV file. Did you mean 'run_1.csv'?" in refusal(tmp_path / "run1.csv")
+    assert "no such file" in refusal(tmp_path / "nowhere" / "run.csv")
+    assert "this is a folder" in refusal(tmp_path)
+
+
+def test_a_missing_column_is_named_with_those_present(tmp_path):
+    (tmp_path / "run.csv").write_text("t,yaw_rate,speed\n0,0,1\n1,0,1\n2,0,1\n")
+    message = refusal(tmp_path / "run.csv", {"r": "yawrate"})
+    assert (
+        "column 'yawrate' not found. Did you mean 'yaw_rate'? Columns present: 't', 'yaw_rate', 'speed'"
+        in message
+    )
+
+
+@pytest.mark.parametrize(
+    ("columns", "message"),
+    [
+        ({"rudder": "u"}, "unknown channel 'rudder'"),
+        ({"Delta": "u"}, "Did you mean 'delta'?"),
+        ({"r": {"column": "u", "unit": "knots"}}, "unit 'knots' found, expected a unit of angular rate"),
+        ({"r": {"column": "u", "unit": "knots"}}, "'knots' is a unit of speed"),
+        ({"u": {"column": "u", "unit": "knot"}}, "Did you mean 'knots'?"),
+        ({"u": {"column": "u", "unit": 3}}, "unit 3 found"),
+        ({"u": {"column": "u", "units": "m/s"}}, "unknown key 'units'. Did you mean 'unit'?"),
+        ({"u": {"unit": "m/s"}}, "expected the name of a column"),
+        ({"u": 3}, "3 found, expected the name of a column"),
+        ({"u": " "}, "expected a text that is not empty"),
+        ({"t": "t"}, "no channel named besides time"),
+    ],
+)
+def test_columns_that_make_no_sense_are_refused(tmp_path, columns, message):
+    (tmp_path / "run.csv").write_text("t,u\n0,1\n1,1\n2,1\n")
+    assert message in refusal(tmp_path / "run.csv", columns)
+
+
+@pytest.mark.parametrize(
+    ("argument", "message"),
+    [
+        ({"rudder_positive": "left"}, "rudder_positive: 'left' found, expected one of 'starboard', 'port'"),
+        ({"rudder_positive": "starbord"}, "Did you mean 'starboard'?"),
+        ({"velocity_frame": "ground"}, "velocity_frame: 'ground' found"),
+        ({"origin": "bow"}, "origin: 'bow' found"),
+        ({"xg": "0.1"}, "xg: '0.1' (a text; write the number without quotes) found"),
+    ],
+)
+def test_conventions_that_are_not_known_are_refused(tmp_path, argument, message):
+    (tmp_path / "run.csv").write_text("t,u\n0,1\n1,1\n2,1\n")
+    assert message in refusal(tmp_path / "run.csv", **argument)
+
+
+def test_earth_fixed_velocities_need_a_recorded_heading(tmp_path):
+    (tmp_path / "run.csv").write_text("t,u,v\n0,1,0\n1,1,0\n2,1,0\n")
+    assert "without a recorded psi" in refusal(tmp_path / "run.csv", velocity_frame="earth")
+    (tmp_path / "run.csv").write_text("t,u,psi\n0,1,0\n1,1,0\n2,1,0\n")
+    assert "without a recorded v" in refusal(tmp_path / "run.csv", velocity_frame="earth")
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.one_of(st.binary(max_size=60), st.text('t,u0123.eE-+;"\n\r\t nax', max_size=60).map(str.encode)))
+def test_whatever_a_file_holds_the_answer_is_a_trial_or_one_message(tmp_path, content):
+    (tmp_path / "run.csv").write_bytes(b"t,u\n" * (len(content) % 2) + content)
+    try:
+        answer: Trial | InputError = Trial.from_csv(tmp_path / "run.csv")
+    except InputError as error:
+        answer = error
+    if isinstance(answer, InputError):
+        assert str(tmp_path / "run.csv") in str(answer)
+    else:
+        assert np.isfinite(answer["u"]).all()
+
+
+# --- values that no ship can have
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "expected"),
+    [
+        ("r", 180 / np.pi, 'likely a wrong unit: declare r = { column = "r", unit = "deg/s" }'),
+        ("delta", 180 / np.pi, 'declare delta = { column = "delta", unit = "deg" }'),
+        ("u", 100.0, "expected at most 50 m/s"),
+    ],
+)
+def test_values_beyond_any_ship_are_refused_with_the_likely_unit(tmp_path, channel, factor, expected):
+    channels, _ = manoeuvre()
+    path = write(tmp_path / "run.csv", {"t": T, channel: channels[channel] * factor})
+    message = refusal(path)
+    assert expected in message
+    assert f"column '{channel}'" in message
+
+
+def test_a_ship_turning_400_deg_s_is_refused(tmp_path):
+    message = refusal(edited(tmp_path, 30, {6: repr(math.radians(400.0))}))
+    assert "line 30 (data row 29), column 'r': r = 6.98132 rad/s (400 deg/s) found" in message
+    assert "expected at most 1.0472 rad/s (60 deg/s)" in message
+
+
+def test_degrees_read_as_radians_are_noticed_in_the_heading(tmp_path):
+    channels, _ = manoeuvre()
+    psi = np.degrees(channels["psi"])
+    assert 'declare psi = { column = "psi", unit = "deg" }' in refusal(
+        write(tmp_path / "a.csv", {"t": T, "psi": psi})
+    )
+    slow = (350.0 + 0.1 * T) % 360.0
+    assert 'unit = "deg"' in refusal(write(tmp_path / "b.csv", {"t": T, "psi": slow}))
+
+
+def test_one_wrong_heading_is_refused_by_its_line(tmp_path):
+    message = refusal(edited(tmp_path, 100, {3: "2.5"}))
+    assert "line 100 (data row 99), column 'psi'" in message
+    assert 'repair = "interpolate"' in message
+
+
+def test_heading_and_yaw_rate_that_disagree_are_refused(tmp_path):
+    t = np.linspace(0.0, 600.0, 1200)  # a slow ship: no value alone is suspicious
+    psi, r = 0.4 * np.sin(0.02 * t), 0.008 * np.cos(0.02 * t)
+    path = write(tmp_path / "run.csv", {"t": t, "psi": psi, "r": np.degrees(r)})
+    message = refusal(path)
+    assert "0.0175 times as fast as the yaw rate says" in message
+    assert 'r = { column = "r", unit = "deg/s" }' in message
+    assert Trial.from_csv(path, {"psi": "psi", "r": {"column": "r", "unit": "deg/s"}}).duration == 600.0
+    assert "opposite signs" in refusal(write(tmp_path / "run.csv", {"t": t, "psi": psi, "r": -r}))
+
+
+def test_a_biased_rate_sensor_on_a_straight_run_is_no_contradiction(tmp_path):
+    rng = np.random.default_rng(3)
+    psi = rng.normal(0.0, 1e-3, T.size) + 1e-4 * T
+    r = rng.normal(0.0, 1e-3, T.size) - 5e-3
+    assert len(Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": psi, "r": r}))) == T.size
+
+
+def test_velocities_in_the_wrong_frame_or_unit_are_refused(tmp_path):
+    channels, earth = manoeuvre()
+    path = write(tmp_path / "run.csv", {"t": T, **channels, "u": earth["north"], "v": earth["east"]})
+    assert 'declare velocity_frame = "earth"' in refusal(path)
+    path = write(tmp_path / "run.csv", {"t": T, **channels})
+    assert 'declare velocity_frame = "body"' in refusal(path, velocity_frame="earth")
+    knots = {"u": channels["u"] / 0.5144, "v": channels["v"] / 0.5144}
+    message = refusal(write(tmp_path / "run.csv", {"t": T, **channels, **knots}))
+    assert "the position changes 0.514 times as fast as the velocities say" in message
+
+
+# --- real input
+
+DATA = Path(__file__).parents[2].parent / "shared" / "data"
+needs_data = pytest.mark.skipif(
+    not DATA.is_dir(), reason="the measured trials lie beside the checkout and are absent here"
+)
+
+
+@needs_data
+def test_channels_derived_from_the_tank_s_positions_agree_with_its_own(tmp_path):
+    columns = {"x": "x0", "y": "y0", "psi": "psi", "delta": "delta"}
+    path = DATA / "kvlcc2_hsva" / "Z_20_05.csv"
+    derived = Trial.from_csv(path, columns, rudder_positive="port")
+    measured = Trial.from_csv(path, columns | {"u": "u", "v": "v", "r": "r"}, rudder_positive="port")
+    assert derived.derived == {"u", "v", "r"}
+    for name, tolerance in {"u": 1e-3, "v": 1e-3, "r": 4e-4}.items():  # 0.1 % of u, 1 % of v and r
+        assert np.sqrt(np.mean((derived[name] - measured[name]) ** 2)) < tolerance
