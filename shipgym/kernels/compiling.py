@@ -1,0 +1,32 @@
+"""How kernels are compiled: inlined mathematics, IEEE semantics, cached on disk."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TypeVar
+
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+# error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken,
+# because the others would optimise NaN checks away and make results depend on the batch size.
+_SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+
+
+def inlined(function: _Function) -> _Function:
+    """Compile a scalar function into each loop that calls it."""
+    compiled: _Function = njit(forceinline=True, **_SEMANTICS)(function)
+    return compiled
+
+
+def rare(function: _Function) -> _Function:
+    """Compile a function for one lane that is seldom called, and leave it out of the loops."""
+    compiled: _Function = njit(**_SEMANTICS)(function)
+    return compiled
+
+
+def kernel(signature: str) -> Callable[[_Function], _Function]:
+    """Compile a loop for one signature when its file is imported, or read it from the on-disk cache."""
+    compiled: Callable[[_Function], _Function] = njit(signature, cache=True, nogil=True, **_SEMANTICS)
+    return compiled

@@ -1,0 +1,41 @@
+"""Where things stand in the arrays that the kernels share.
+
+State and ship come in tiles of 64 lanes, one lane a ship, row after row: a tile is a contiguous
+one-dimensional array and the constants below are the offsets of its rows, so that `state[PSI + lane]`
+is a lane's heading. Offsets known at compile time are what lets the compiler vectorise a loop over
+lanes.
+"""
+
+from __future__ import annotations
+
+LANES = 64
+
+
+def offsets(first: int, count: int) -> range:
+    """Offsets of `count` rows from the row at offset `first` on."""
+    return range(first, first + count * LANES, LANES)
+
+
+def row(offset: int) -> int:
+    """Number of the row at an offset."""
+    return offset // LANES
+
+
+# state of a ship
+X, Y, PSI, U, V, R, DELTA = offsets(0, 7)
+STATE_END = 7 * LANES
+N_STATE = 7
+
+# a ship: its constants, its operating envelope, then the coefficients of its accelerations
+LENGTH, SERVICE_SPEED = offsets(0, 2)  # m; m/s
+RUDDER_LIMIT, RUDDER_RATE = offsets(2 * LANES, 2)  # rad; rad/s
+GEAR_FREQUENCY = 4 * LANES  # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
+ENVELOPE_LOW = 5 * LANES  # 4 rows: least u, v, r, delta of the training data
+ENVELOPE_HIGH = 9 * LANES  # 4 rows: largest
+ENVELOPE_CENTRE = 13 * LANES  # 4 rows: centre of the ellipsoid around the training data
+ENVELOPE_SHAPE = 17 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
+COEFFICIENTS = 27 * LANES
+
+# a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
+RUNAWAY_SPEED = 3.0
+RUNAWAY_YAW_RATE = 6.0

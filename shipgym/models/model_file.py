@@ -1,0 +1,206 @@
+"""The model file: JSON, versioned, written whole or not at all, validated field by field on reading.
+
+Format 1:
+
+    format         1
+    name           text
+    structure      {"name", "source", "equations": {"u" | "v" | "r": [{"name", "powers"}, ...]}}
+    normalisation  "prime": coefficients by the SNAME prime system with the instantaneous speed
+    coefficients   {name: value}
+    covariance     null or a list of rows, in the order of the coefficients
+    particulars    SI units, added masses in the prime system, "estimated": names
+    steering       {"rudder_limit_deg", "rudder_rate_deg_s", "time_constant"}
+    envelope       null or {"channels", "low", "high", "centre", "shape"} of u, v, r, delta
+    provenance     null or an object
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipgym._checks import check_keys, check_number, check_table, check_text, quoted
+from shipgym.errors import InputError
+from shipgym.models.envelope import CHANNELS, Envelope
+from shipgym.models.ship_model import ShipModel
+from shipgym.models.structures import FORCE_OF_EQUATION, SYMBOLS, Structure
+from shipgym.particulars import Particulars
+from shipgym.steering import SteeringGear
+
+FORMAT = 1
+FIELDS = (
+    "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
+    "steering", "envelope", "provenance",
+)  # fmt: skip
+REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
+
+
+def save(model: ShipModel, path: Path) -> None:
+    """Write a model file: to a temporary name, then renamed."""
+    fields = {
+        "format": FORMAT,
+        "name": model.name,
+        "structure": model.table.to_dict(),
+        "normalisation": "prime",
+        "coefficients": model.coefficients,
+        "covariance": None if model.covariance is None else model.covariance.tolist(),
+        "particulars": model.particulars.to_dict(),
+        "steering": model.steering.to_dict(),
+        "envelope": None if model.envelope is None else model.envelope.to_dict(),
+        "provenance": model.provenance,
+    }
+    write_json(fields, path)
+
+
+def write_json(fields: Mapping[str, Any], path: Path) -> None:
+    """Write JSON whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist or cannot be written.
+    """
+    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    try:
+        draft.write_text(json.dumps(fields, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        draft.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def load(path: Path) -> ShipModel:
+    """Read and validate a model file."""
+    fields = _read(path)
+    try:
+        return _model(fields, str(path))
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+
+
+def _read(path: Path) -> Mapping[str, Any]:
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such model file") from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: binary content found, expected a model file (JSON)") from None
+    try:
+        fields = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(
+            f"{path}: broken JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
+            f"the file may be cut short: identify the model again or take another copy"
+        ) from None
+    return check_table(fields, f"{path}:")
+
+
+def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
+    if "format" in fields and fields["format"] != FORMAT:
+        raise InputError(
+            f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
+        )
+    check_keys(fields, FIELDS, where)
+    for name in REQUIRED:
+        if name not in fields:
+            raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
+    if fields.get("normalisation", "prime") != "prime":
+        raise InputError(f"{where}: normalisation {fields['normalisation']!r} found, expected 'prime'")
+    table = _structure(fields["structure"], f"{where}: structure")
+    coefficients = _coefficients(fields["coefficients"], table, f"{where}: coefficients")
+    covariance = fields.get("covariance")
+    provenance = fields.get("provenance")
+    return ShipModel(
+        name=check_text(fields["name"], f"{where}: name"),
+        structure=table.name,
+        particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
+        steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
+        coefficients=coefficients,
+        covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
+        envelope=_envelope(fields.get("envelope"), f"{where}: envelope"),
+        provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
+        own_table=table,
+    )
+
+
+def _structure(value: Any, where: str) -> Structure:
+    table = check_table(value, where)
+    check_keys(table, ("name", "source", "equations"), where)
+    equations = check_table(table.get("equations"), f"{where}.equations")
+    if tuple(equations) != tuple(FORCE_OF_EQUATION):
+        raise InputError(f"{where}.equations: {quoted(equations)} found, expected 'u', 'v', 'r'")
+    for equation, terms in equations.items():
+        if not isinstance(terms, list) or not terms:
+            raise InputError(f"{where}.equations.{equation}: expected a list of terms")
+        for i, entry in enumerate(terms):
+            place = f"{where}.equations.{equation}[{i}]"
+            term = check_table(entry, place)
+            check_keys(term, ("name", "powers"), place)
+            check_text(term.get("name"), f"{place}.name")
+            powers = check_table(term.get("powers"), f"{place}.powers")
+            check_keys(powers, SYMBOLS, f"{place}.powers")
+            for symbol, power in powers.items():
+                if not isinstance(power, int) or isinstance(power, bool) or not 1 <= power <= 9:
+                    raise InputError(f"{place}.powers.{symbol}: {power!r} found, expected 1 to 9")
+    check_text(table.get("source"), f"{where}.source")
+    check_text(table.get("name"), f"{where}.name")
+    structure = Structure.from_dict(table)
+    names = structure.coefficient_names
+    if len(set(names)) != len(names):
+        raise InputError(f"{where}.equations: a term stands twice in one equation")
+    if [term.powers for term in structure.terms("v")] != [term.powers for term in structure.terms("r")]:
+        raise InputError(f"{where}.equations: 'v' and 'r' differ, expected the same terms in the same order")
+    return structure
+
+
+def _coefficients(value: Any, structure: Structure, where: str) -> dict[str, float]:
+    table = check_table(value, where)
+    names = structure.coefficient_names
+    if len(table) != len(names):
+        raise InputError(
+            f"{where}: {len(table)} found, expected {len(names)} for structure '{structure.name}'; "
+            f"missing: {quoted(name for name in names if name not in table)}"
+        )
+    check_keys(table, names, where)
+    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+
+
+def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    matrix = _numbers(value, (n, n), f"{where}: covariance")
+    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
+        raise InputError(f"{where}: covariance: not symmetric")
+    if np.any(np.diag(matrix) < 0.0):
+        raise InputError(f"{where}: covariance: a variance on the diagonal is negative")
+    return matrix
+
+
+def _envelope(value: Any, where: str) -> Envelope | None:
+    if value is None:
+        return None
+    table = check_table(value, where)
+    check_keys(table, ("channels", "low", "high", "centre", "shape"), where)
+    if table.get("channels") != list(CHANNELS):
+        raise InputError(f"{where}.channels: {table.get('channels')!r} found, expected {list(CHANNELS)}")
+    for name, shape in (("low", (4,)), ("high", (4,)), ("centre", (4,)), ("shape", (4, 4))):
+        _numbers(table.get(name), shape, f"{where}.{name}")
+    return Envelope.from_dict(table)
+
+
+def _numbers(value: Any, shape: tuple[int, ...], where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """An array of finite numbers of the given shape."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: expected numbers of shape {shape}, all rows of one length") from None
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        raise InputError(f"{where}: shape {array.shape} found, expected {shape} finite numbers")
+    return array

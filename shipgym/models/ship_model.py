@@ -1,0 +1,285 @@
+"""A ship as a manoeuvring model: structure, coefficients, how certain they are, and where they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError
+from shipgym.kernels import layout
+from shipgym.models.envelope import Envelope
+from shipgym.models.structures import Structure, get_structure
+from shipgym.particulars import Particulars
+from shipgym.steering import SteeringGear
+
+if TYPE_CHECKING:
+    from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ShipModel:
+    """A manoeuvring model of one ship.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ship or of the model file.
+    structure : str
+        Name of its structure.
+    particulars : Particulars
+        Length, mass, added mass, service speed, ...; what was estimated is marked.
+    steering : SteeringGear
+        Rudder limit, rate and lag.
+    coefficients : dict of str to float
+        By name, prime system, rudder positive to starboard.
+    covariance : array of shape (n_coefficients, n_coefficients) or None
+        Of the coefficients in their order; None where not identified.
+    envelope : Envelope or None
+        Of the data it was identified from.
+    provenance : dict or None
+        Method, settings, software version and trials it came from, or the source of a reference ship.
+    own_table : Structure or None
+        The table of terms a model file came with; by default the one known by the structure's name.
+    """
+
+    name: str
+    structure: str
+    particulars: Particulars
+    steering: SteeringGear
+    coefficients: dict[str, float]
+    covariance: Floats | None = None
+    envelope: Envelope | None = None
+    provenance: dict[str, Any] | None = None
+    own_table: Structure | None = None
+
+    def __post_init__(self) -> None:
+        names = self.table.coefficient_names
+        missing = [name for name in names if name not in self.coefficients]
+        unknown = [name for name in self.coefficients if name not in names]
+        if missing or unknown:
+            raise InputError(
+                f"coefficients of {self.name!r}: structure {self.structure!r} has {len(names)}; "
+                f"missing: {', '.join(missing) or 'none'}; unknown: {', '.join(unknown) or 'none'}"
+            )
+        ordered = {name: float(self.coefficients[name]) for name in names}
+        wrong = [name for name, value in ordered.items() if not np.isfinite(value)]
+        if wrong:
+            raise InputError(
+                f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
+            )
+        object.__setattr__(self, "coefficients", ordered)
+        if self.covariance is not None and self.covariance.shape != (len(names), len(names)):
+            raise InputError(
+                f"covariance of {self.name!r}: shape {self.covariance.shape}, "
+                f"expected ({len(names)}, {len(names)}), one row and column a coefficient"
+            )
+
+    @property
+    def table(self) -> Structure:
+        """The table of terms of its structure."""
+        return get_structure(self.structure) if self.own_table is None else self.own_table
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the state, in the order of `derivatives`."""
+        return ("x", "y", "psi", "u", "v", "r", "delta")
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Names of the commands."""
+        return ("delta", "n") if "n" in self.table.required_channels else ("delta",)
+
+    @cached_property
+    def service_state(self) -> Floats:
+        """Straight ahead north at service speed with the rudder amidships, shape (n_state,)."""
+        state = np.zeros(len(self.state_names))
+        state[self.state_names.index("u")] = self.particulars["speed"]
+        return state
+
+    def derivatives(self, state: ArrayLike, command: ArrayLike, water_depth: float = np.inf) -> Floats:
+        """Time derivative of the state, steering gear included.
+
+        Parameters
+        ----------
+        state : array-like of shape (..., n_state)
+            In the order of `state_names`, SI units.
+        command : array-like of shape (..., n_command)
+            In the order of `command_names`: rudder angle in rad, positive to starboard.
+        water_depth : float
+            In m; only deep water is known to identified structures.
+
+        Returns
+        -------
+        array of shape (..., n_state)
+
+        Raises
+        ------
+        InputError
+            For another number of states or commands, or shallow water.
+        """
+        if not np.all(np.isinf(water_depth)):
+            raise InputError(
+                f"water_depth: {water_depth} m found, but {self.name!r} is a deep-water model; leave it out"
+            )
+        states = np.asarray(state, dtype=float)
+        _expect_last_axis("state", states, self.state_names)
+        commands = np.asarray(command, dtype=float)
+        _expect_last_axis("command", commands, self.command_names)
+        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1])
+        flat_states = np.array(np.broadcast_to(states, (*shape, layout.N_STATE))).reshape(-1, layout.N_STATE)
+        flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1]))
+        out = np.empty_like(flat_states)
+        self.kernel("trajectories").derivatives(
+            flat_states, two_commands(flat_commands.reshape(len(out), -1)), self.ship_tile(), out
+        )
+        return out.reshape(*shape, layout.N_STATE)
+
+    def simulate(self, commands: ArrayLike, dt: float, state: ArrayLike | None = None) -> Trial:
+        """Simulate with commands held over each step (classical Runge-Kutta).
+
+        Parameters
+        ----------
+        commands : array-like of shape (n_steps, n_command)
+            Rudder angle in rad, positive to starboard.
+        dt : float
+            Step, s.
+        state : array-like of shape (n_state,), optional
+            Where to start; by default straight ahead at service speed.
+
+        Returns
+        -------
+        Trial
+            n_steps + 1 samples with the state and the commands (`delta_command`).
+
+        Raises
+        ------
+        UnstableModelError
+            Where the ship leaves every physical range; carries the time and the last physical state.
+        """
+        from shipgym.simulation.simulate import simulate
+
+        return simulate(self, commands, dt, state)
+
+    def sample(self, n: int, seed: int | np.random.Generator) -> list[ShipModel]:
+        """Models whose coefficients are drawn from the identified covariance.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+        seed : int or Generator
+            Of the draw.
+
+        Returns
+        -------
+        list of ShipModel
+
+        Raises
+        ------
+        InputError
+            If the model has no covariance.
+        """
+        if self.covariance is None:
+            raise InputError(
+                f"model {self.name!r} has no covariance: only identified models can be sampled from"
+            )
+        mean = np.array(list(self.coefficients.values()))
+        values, vectors = np.linalg.eigh(_scaled(self.covariance))
+        root = _scale(self.covariance)[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
+        draws = mean + np.random.default_rng(seed).standard_normal((n, len(mean))) @ root.T
+        return [
+            replace(
+                self,
+                name=f"{self.name}-draw-{i}",
+                coefficients=dict(zip(self.coefficients, draw.tolist(), strict=True)),
+                covariance=None,
+            )
+            for i, draw in enumerate(draws)
+        ]
+
+    def save(self, path: str | Path) -> None:
+        """Write the model as a JSON file (format in `shipgym.models.model_file`)."""
+        from shipgym.models.model_file import save
+
+        save(self, Path(path))
+
+    @classmethod
+    def load(cls, path: str | Path) -> ShipModel:
+        """Read a model file.
+
+        Raises
+        ------
+        InputError
+            Naming the file and the field at fault.
+        """
+        from shipgym.models.model_file import load
+
+        return load(Path(path))
+
+    def kernel(self, name: str) -> ModuleType:
+        """One file of kernels, compiled together with this ship."""
+        from shipgym.simulation.compiled import kernel
+        from shipgym.simulation.generator import accelerations_source
+
+        return kernel(accelerations_source(self.table), name)
+
+    def ship_column(self) -> Floats:
+        """Constants and coefficients in the order of the kernels' rows, shape (n_rows,)."""
+        p, gear = self.particulars, self.steering
+        coefficients = self.table.acceleration_matrix(p) @ np.array(list(self.coefficients.values()))
+        column = np.zeros(layout.row(layout.COEFFICIENTS) + len(coefficients))
+        column[layout.row(layout.LENGTH)] = p["length"]
+        column[layout.row(layout.SERVICE_SPEED)] = p["speed"]
+        column[layout.row(layout.RUDDER_LIMIT)] = gear.limit
+        column[layout.row(layout.RUDDER_RATE)] = gear.rate
+        column[layout.row(layout.GEAR_FREQUENCY)] = 1.0 / gear.time_constant if gear.time_constant else 0.0
+        low, high, centre, shape, end = map(layout.row, (
+            layout.ENVELOPE_LOW, layout.ENVELOPE_HIGH, layout.ENVELOPE_CENTRE, layout.ENVELOPE_SHAPE,
+            layout.COEFFICIENTS,
+        ))  # fmt: skip
+        column[low:high], column[high:centre] = -np.inf, np.inf
+        if self.envelope is not None:
+            column[low:high], column[high:centre] = self.envelope.low, self.envelope.high
+            column[centre:shape] = self.envelope.centre
+            column[shape:end] = self.envelope.shape[np.triu_indices(4)]
+        column[end:] = coefficients
+        return column
+
+    def ship_tile(self) -> Floats:
+        """A tile with the ship in each lane, as the kernels read it, shape (n_rows * 64,), a new array."""
+        return np.repeat(self.ship_column(), layout.LANES)
+
+
+def _expect_last_axis(argument: str, array: Floats, names: tuple[str, ...]) -> None:
+    if array.ndim == 0 or array.shape[-1] != len(names):
+        raise InputError(
+            f"{argument}: shape {array.shape} found, expected (..., {len(names)}) for {', '.join(names)}"
+        )
+
+
+def two_commands(commands: Floats) -> Floats:
+    """Rudder and shaft speed for the kernels, shape (n, 2); a ship without shaft has speed 0."""
+    two = np.zeros((len(commands), 2))
+    two[:, : commands.shape[1]] = commands
+    return two
+
+
+def _scale(covariance: Floats) -> Floats:
+    """Standard deviations, 1 where zero."""
+    deviation = np.sqrt(np.diag(covariance))
+    return np.where(deviation > 0.0, deviation, 1.0)
+
+
+def _scaled(covariance: Floats) -> Floats:
+    """Correlation matrix: coefficients of 1e-5 and of 1 have to be drawn equally well."""
+    scale = _scale(covariance)
+    scaled: Floats = covariance / np.outer(scale, scale)
+    return scaled

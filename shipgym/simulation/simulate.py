@@ -1,0 +1,116 @@
+"""Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.kernels import layout
+from shipgym.models.ship_model import ShipModel, two_commands
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+LONGEST_STEP = 0.025  # of the time to travel one ship length
+
+
+def simulate(model: ShipModel, commands: ArrayLike, dt: float, state: ArrayLike | None = None) -> Trial:
+    """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
+    held = np.asarray(commands, dtype=float)
+    if held.ndim != 2 or held.shape[1] != len(model.command_names) or len(held) < 2:
+        raise InputError(
+            f"commands: shape {held.shape} found, expected (n_steps, {len(model.command_names)}) for "
+            f"{', '.join(model.command_names)}, with at least 2 steps"
+        )
+    if not np.all(np.isfinite(held)):
+        raise InputError(f"commands: row {int(np.argwhere(~np.isfinite(held))[0, 0])} is not finite")
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise InputError(f"dt: {dt} found, expected a step in s above 0")
+    states = np.empty((len(held) + 1, layout.N_STATE))
+    states[0] = initial_state(model, state)
+    reached = model.kernel("trajectories").simulate(states, two_commands(held), dt, model.ship_tile())
+    times = dt * np.arange(len(states), dtype=float)
+    if reached < len(held):
+        raise unstable(model, times[reached], states[reached])
+    return as_trial(model, times, states, np.vstack([held, held[-1:]]))
+
+
+def open_loop(model: ShipModel, trial: Trial) -> Trial:
+    """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
+
+    The rudder is taken straight between the samples, as measured: no steering gear stands between.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    trial : Trial
+        With the channels u, v, r, psi, delta (x and y where recorded; n where the model has a shaft).
+
+    Returns
+    -------
+    Trial
+        The simulated state at the times of the trial.
+
+    Raises
+    ------
+    InputError
+        If a channel is missing.
+    UnstableModelError
+        Where the simulated ship leaves every physical range.
+    """
+    needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
+    missing = [name for name in needed if name not in trial.channels]
+    if missing:
+        raise InputError(
+            f"trial {trial.name!r}: channel {missing[0]!r} is missing, it is needed to predict the trial"
+        )
+    t = np.array(trial.t)
+    states = np.empty((len(t), layout.N_STATE))
+    states[0] = [
+        trial[name][0] if name in trial.channels else 0.0
+        for name in ("x", "y", "psi", "u", "v", "r", "delta")
+    ]
+    n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
+    reached = model.kernel("trajectories").open_loop(
+        states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
+    )
+    if reached < len(t) - 1:
+        raise unstable(model, t[reached], states[reached])
+    channels = dict(zip(model.state_names, states.T, strict=True))
+    return Trial(
+        t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=model.particulars["length"]
+    )
+
+
+def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
+    """A given state, checked, or straight ahead at service speed."""
+    if state is None:
+        return model.service_state
+    start = np.asarray(state, dtype=float)
+    if start.shape != (len(model.state_names),) or not np.all(np.isfinite(start)):
+        raise InputError(
+            f"state: shape {start.shape} found, expected {len(model.state_names)} finite numbers for "
+            f"{', '.join(model.state_names)}"
+        )
+    return start
+
+
+def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
+    """States and the commands held from each sample on as a Trial."""
+    channels = dict(zip(model.state_names, states.T, strict=True))
+    for name, command in zip(model.command_names, commands.T, strict=True):
+        channels[f"{name}_command"] = command
+    return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
+
+
+def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
+    """The error for a ship that ran away after a given time and physical state."""
+    last = dict(zip(model.state_names, state.tolist(), strict=True))
+    return UnstableModelError(
+        f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
+        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s): it is unstable there",
+        time_s,
+        last,
+    )

@@ -1,0 +1,186 @@
+"""ShipModel: simulation, sampling, and its file."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import shipgym
+from shipgym import InputError, ShipModel, UnstableModelError
+from shipgym.models import Envelope
+from shipgym.simulation import open_loop
+
+
+@pytest.fixture(scope="module")
+def mariner() -> ShipModel:
+    return shipgym.load_model("mariner")
+
+
+@pytest.fixture
+def identified(mariner) -> ShipModel:
+    """A model with everything that an identified one has."""
+    values = np.array(list(mariner.coefficients.values()))
+    random = np.random.default_rng(1)
+    root = np.diag(np.abs(values)) @ (np.eye(40) + 0.1 * random.standard_normal((40, 40))) * 0.05
+    samples = random.standard_normal((4, 500)) * [[0.5], [0.3], [0.005], [0.1]] + [[7], [0], [0], [0]]
+    return replace(
+        mariner,
+        covariance=root @ root.T,
+        envelope=Envelope.from_samples(*samples),
+        provenance={"method": "x"},
+    )
+
+
+def test_a_body_heading_and_place_do_not_matter(mariner):
+    turned = mariner.service_state.copy()
+    turned[:3] = 500.0, -800.0, 2.0
+    commands = np.full((600, 1), 0.2)
+    here, there = mariner.simulate(commands, 1.0), mariner.simulate(commands, 1.0, turned)
+    for name in ("u", "v", "r"):
+        np.testing.assert_allclose(here[name], there[name], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(
+        np.hypot(here["x"], here["y"]), np.hypot(there["x"] - 500.0, there["y"] + 800.0), atol=1e-6
+    )
+
+
+def test_the_integrator_is_of_fourth_order(mariner):
+    """Halving the step divides the error by 16, with a rudder that stays off its rate limit."""
+
+    def end(dt: float) -> np.ndarray:
+        trial = mariner.simulate(np.full((round(40.0 / dt), 1), 0.05), dt)
+        return np.array([trial[name][-1] for name in ("psi", "u", "v", "r")])
+
+    exact = end(0.0625)
+    ratio = np.linalg.norm(end(1.0) - exact) / np.linalg.norm(end(0.5) - exact)
+    assert 12.0 < ratio < 24.0
+
+
+def test_a_measured_rudder_reproduces_the_simulation(mariner):
+    commands = np.repeat([[0.3], [-0.3], [0.1]], 400, axis=0)
+    trial = mariner.simulate(commands, 0.1)
+    again = open_loop(mariner, trial)
+    for name in ("psi", "u", "v", "r"):
+        np.testing.assert_allclose(again[name], trial[name], rtol=0.0, atol=2e-3 * np.ptp(trial[name]))
+
+
+def test_open_loop_names_the_missing_channel(mariner):
+    trial = shipgym.Trial([0.0, 1.0, 2.0], {"u": [7.0] * 3, "v": [0.0] * 3, "r": [0.0] * 3, "psi": [0.0] * 3})
+    with pytest.raises(InputError, match="'delta' is missing"):
+        open_loop(mariner, trial)
+
+
+def test_a_runaway_model_is_an_error_with_time_and_state(mariner):
+    wild = replace(mariner, coefficients={**mariner.coefficients, "N_r": 0.01, "N_vvr": 5.0})
+    with pytest.raises(UnstableModelError, match="runs away after") as caught:
+        wild.simulate(np.full((5000, 1), 0.5), 0.1)
+    assert 0.0 < caught.value.time_s < 500.0
+    assert np.all(np.isfinite(list(caught.value.state.values())))
+
+
+def test_draws_have_the_covariance(identified):
+    draws = np.array([list(model.coefficients.values()) for model in identified.sample(4000, seed=0)])
+    scale = np.sqrt(np.diag(identified.covariance))
+    mean = np.array(list(identified.coefficients.values()))
+    np.testing.assert_allclose((draws.mean(axis=0) - mean) / scale, 0.0, atol=0.08)
+    difference = np.cov(draws.T) / np.outer(scale, scale) - identified.covariance / np.outer(scale, scale)
+    assert np.abs(difference).max() < 0.1
+    again = identified.sample(2, seed=0)[1].coefficients
+    np.testing.assert_allclose(list(again.values()), draws[1], rtol=1e-12)
+
+
+def test_a_reference_ship_cannot_be_sampled(mariner):
+    with pytest.raises(InputError, match="no covariance"):
+        mariner.sample(3, seed=0)
+
+
+def test_the_file_gives_the_model_back(identified, tmp_path):
+    identified.save(tmp_path / "model.json")
+    again = ShipModel.load(tmp_path / "model.json")
+    assert again.coefficients == identified.coefficients
+    assert dict(again.particulars) == dict(identified.particulars)
+    assert again.steering == identified.steering
+    assert again.provenance == identified.provenance
+    np.testing.assert_array_equal(again.covariance, identified.covariance)
+    np.testing.assert_array_equal(again.ship_tile(), identified.ship_tile())
+    assert list(tmp_path.iterdir()) == [tmp_path / "model.json"]
+
+
+def broken(change):
+    """A model file with one field changed."""
+
+    def apply(fields):
+        change(fields)
+        return json.dumps(fields)
+
+    return apply
+
+
+CASES = [
+    (lambda fields: json.dumps(fields)[:5000], "broken JSON at line"),
+    (broken(lambda f: f["coefficients"].pop("Y_v")), r"39 found, expected 40.*missing: 'Y_v'"),
+    (broken(lambda f: f["coefficients"].update(Y_w=f["coefficients"].pop("Y_v"))), "unknown key 'Y_w'"),
+    (broken(lambda f: f["coefficients"].update(Y_v="much")), r"coefficients\.Y_v: 'much'"),
+    (broken(lambda f: f.update(format=7)), "format 7 found"),
+    (broken(lambda f: f.pop("steering")), "field 'steering' is missing"),
+    (broken(lambda f: f["steering"].update(rudder_limit_deg=-5)), "rudder_limit_deg: -5 found"),
+    (broken(lambda f: f["covariance"].pop()), r"covariance: shape \(39, 40\) found"),
+    (broken(lambda f: f["covariance"][3].pop()), "covariance"),
+    (broken(lambda f: f["structure"]["equations"]["u"][0]["powers"].update(w=1)), "unknown key 'w'"),
+    (broken(lambda f: f.update(pickle="gASV")), "unknown key 'pickle'"),
+    (broken(lambda f: f["particulars"].update(length=-3)), "length"),
+    (broken(lambda f: f["envelope"].update(low=[0, 1])), r"envelope\.low"),
+    (lambda _: "[1, 2]", "expected a table"),
+]
+
+
+@pytest.mark.parametrize(("content", "message"), CASES, ids=[message for _, message in CASES])
+def test_a_wrong_file_is_refused_by_field(identified, tmp_path, content, message):
+    path = tmp_path / "model.json"
+    identified.save(path)
+    path.write_text(content(json.loads(path.read_text())))
+    with pytest.raises(InputError, match=message) as caught:
+        ShipModel.load(path)
+    assert str(path) in str(caught.value)
+
+
+def test_binary_and_missing_files_are_refused(tmp_path):
+    (tmp_path / "model.json").write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="binary content"):
+        ShipModel.load(tmp_path / "model.json")
+    with pytest.raises(InputError, match="no such model file"):
+        shipgym.load_model(tmp_path / "other.json")
+
+
+def test_a_name_that_is_nearly_right(tmp_path):
+    with pytest.raises(InputError, match="Did you mean 'mariner'"):
+        shipgym.load_model("marinner")
+
+
+def test_arguments_are_checked(mariner):
+    with pytest.raises(InputError, match=r"state: shape \(3,\)"):
+        mariner.derivatives([0.0, 1.0, 2.0], [0.0])
+    with pytest.raises(InputError, match=r"commands: shape \(5, 2\)"):
+        mariner.simulate(np.zeros((5, 2)), 0.1)
+    with pytest.raises(InputError, match="row 1 is not finite"):
+        mariner.simulate([[0.0], [np.nan]], 0.1)
+    with pytest.raises(InputError, match="dt: 0"):
+        mariner.simulate(np.zeros((5, 1)), 0)
+    with pytest.raises(InputError, match="deep-water"):
+        mariner.derivatives(mariner.service_state, [0.0], water_depth=20.0)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.0, 2 * np.pi), st.floats(0.2, 3.0), st.floats(0.01, 1.0))
+def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):
+    random = np.random.default_rng(3)
+    points = random.standard_normal((200, 4)) * [1.0, stretch, spread, 0.1]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    points[:, 1:3] = points[:, 1:3] @ turn
+    envelope = Envelope.from_samples(*points.T)
+    distances = envelope.distance(*points.T)
+    assert distances.max() == pytest.approx(1.0)
+    away = envelope.centre + 3.0 * (points[distances.argmax()] - envelope.centre)
+    assert envelope.distance(*away) == pytest.approx(3.0)
