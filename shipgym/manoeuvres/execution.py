@@ -1,0 +1,79 @@
+"""When a manoeuvre was executed: found from the rudder, ordered or measured."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+ARRIVED = 0.9  # a rudder beyond this part of its usual angle has arrived there
+
+
+def rudder(trial: Trial) -> Floats:
+    """The ordered rudder where it was recorded, else the rudder itself, rad."""
+    for name in ("delta_command", "delta"):
+        if name in trial.channels:
+            return trial[name]
+    raise InputError(f"trial {trial.name!r}: channel 'delta' is missing, it shows when the rudder moved")
+
+
+def execute_time(trial: Trial) -> float:
+    """Time at which the first rudder order of a manoeuvre was given, s."""
+    delta = rudder(trial)
+    if "delta_command" in trial.channels:
+        return float(trial.t[np.argmax(delta != 0.0)])
+    return departure(trial.t, delta)
+
+
+def reversals(trial: Trial) -> tuple[float, list[float]]:
+    """Times of the first order and of each reversal of the rudder in a zigzag, s.
+
+    An ordered rudder reverses at the first sample that has the new order; a measured one when it left
+    its angle (`departure`).
+    """
+    delta, t = rudder(trial), trial.t
+    start = execute_time(trial)
+    usual = ARRIVED * np.percentile(np.abs(delta), 75)
+    side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
+    arrived = np.flatnonzero((side != 0) & (t >= start))
+    turns = []
+    for before, after in zip(arrived[:-1], arrived[1:], strict=True):
+        if side[before] != side[after]:
+            moving = slice(before, after + 1)
+            ordered = "delta_command" in trial.channels
+            turns.append(float(t[after]) if ordered else departure(t[moving], delta[moving]))
+    return start, turns
+
+
+def departure(t: Floats, delta: Floats) -> float:
+    """Time at which a measured rudder left its first angle, s.
+
+    Its move is traced back along the slope between a tenth and half of the way to where it mostly is.
+    """
+    move = np.abs(delta - delta[0])
+    reach = np.percentile(move, 75) if len(move) > 8 else move.max()
+    if reach == 0.0:
+        return float(t[0])
+    upper = int(np.argmax(move >= 0.5 * reach))
+    lower = int(np.flatnonzero(move[: upper + 1] <= 0.1 * reach)[-1])
+    slope = (move[upper] - move[lower]) / (t[upper] - t[lower])
+    return float(max(t[lower] - move[lower] / slope, t[0]))
+
+
+def distance_sailed(trial: Trial) -> Floats:
+    """Distance from the start, m, from the speed by the trapezoid rule, shape (n_samples,)."""
+    speed = np.hypot(trial["u"], trial["v"])
+    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(trial.t)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def ship_length(trial: Trial, length: float | None) -> float:
+    """The given length, or the trial's own, m."""
+    known = trial.length if length is None else length
+    if known is None:
+        raise InputError(f"trial {trial.name!r}: the ship's length is not known; give length in m")
+    return float(known)

@@ -1,0 +1,151 @@
+"""The turning circle and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym._checks import check_number
+from shipgym.errors import InputError
+from shipgym.manoeuvres.execution import execute_time, ship_length
+from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.models.ship_model import ShipModel, two_commands
+from shipgym.simulation.simulate import as_trial, unstable
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TurningIndices:
+    """What a turning circle tells of a ship; None where the ship did not turn so far.
+
+    Lengths are measured from the position and along the heading at which the rudder was ordered.
+
+    Attributes
+    ----------
+    advance_lengths, transfer_lengths : float or None
+        Distance ahead and to the side when the heading has changed by 90 degrees, ship lengths.
+    tactical_diameter_lengths : float or None
+        Distance to the side when the heading has changed by 180 degrees, ship lengths.
+    steady_diameter_lengths : float or None
+        Diameter of the steady turn, 2 U / r over the last quarter turn before the end, ship lengths.
+    steady_speed_ratio : float or None
+        Speed in the steady turn over that at the order.
+    steady_drift_deg : float or None
+        Drift angle at midship in the steady turn, degrees, positive when the bow points into the turn.
+    """
+
+    advance_lengths: float | None
+    transfer_lengths: float | None
+    tactical_diameter_lengths: float | None
+    steady_diameter_lengths: float | None
+    steady_speed_ratio: float | None
+    steady_drift_deg: float | None
+
+
+def turning_circle(
+    model: ShipModel, rudder_deg: float = 35.0, duration: float = 900.0, dt: float = 0.1
+) -> Trial:
+    """Simulate a turning circle from straight ahead at service speed, without an approach run.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    rudder_deg : float
+        Rudder ordered at the start, degrees; negative turns to port.
+    duration, dt : float
+        s. The samples are dt apart.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For a rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    check_number(rudder_deg, "rudder_deg", at_least=-90.0, at_most=90.0)
+    if rudder_deg == 0.0:
+        raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
+    n_steps = number_of_steps(duration, dt)
+    commands = np.full((n_steps, 1), np.radians(rudder_deg))
+    states = np.empty((n_steps + 1, len(model.service_state)))
+    states[0] = model.service_state
+    reached = model.kernel("trajectories").simulate(states, two_commands(commands), dt, model.ship_tile())
+    times = dt * np.arange(n_steps + 1, dtype=float)
+    if reached < n_steps:
+        raise unstable(model, times[reached], states[reached])
+    return as_trial(model, times, states, np.vstack([commands, commands[-1:]]), kind="turning-circle")
+
+
+def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
+    """Advance, transfer, diameters and the steady turn of a measured or simulated turning circle.
+
+    Parameters
+    ----------
+    trial : Trial
+        With x, y, psi, u, v, r and delta (or delta_command).
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+
+    Returns
+    -------
+    TurningIndices
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing.
+    """
+    for name in ("x", "y", "psi"):
+        if name not in trial.channels:
+            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, a turning circle needs it")
+    lpp = ship_length(trial, length)
+    start = execute_time(trial)
+    x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
+    after = trial.t >= start
+    x, y = trial["x"][after] - x0, trial["y"][after] - y0
+    turned = trial["psi"][after] - psi0
+    side = 1.0 if turned[-1] >= 0.0 else -1.0
+    turned = side * turned
+    ahead = (x * np.cos(psi0) + y * np.sin(psi0)) / lpp
+    aside = side * (y * np.cos(psi0) - x * np.sin(psi0)) / lpp
+    steady = turned >= turned[-1] - np.pi / 2
+    ratio, drift, diameter = (
+        _steady(trial, after, steady, side, lpp) if turned[-1] > 1.5 * np.pi else (None,) * 3
+    )
+    return TurningIndices(
+        advance_lengths=_when_turned(turned, np.pi / 2, ahead),
+        transfer_lengths=_when_turned(turned, np.pi / 2, aside),
+        tactical_diameter_lengths=_when_turned(turned, np.pi, aside),
+        steady_diameter_lengths=diameter,
+        steady_speed_ratio=ratio,
+        steady_drift_deg=drift,
+    )
+
+
+def _when_turned(turned: Floats, angle: float, distance: Floats) -> float | None:
+    """Distance at which the heading has changed by an angle, between samples by straight lines."""
+    past = np.flatnonzero(turned >= angle)
+    if len(past) == 0:
+        return None
+    k = max(int(past[0]), 1)
+    return float(np.interp(angle, turned[k - 1 : k + 1], distance[k - 1 : k + 1]))
+
+
+def _steady(
+    trial: Trial, after: NDArray[np.bool_], steady: NDArray[np.bool_], side: float, lpp: float
+) -> tuple[float, float, float]:
+    """Speed ratio, drift angle in degrees and diameter in ship lengths of the steady turn."""
+    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
+    speed = np.hypot(u, v)
+    drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
+    diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
+    return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)

@@ -1,0 +1,189 @@
+"""The zigzag manoeuvre (Kempf 1932) and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym._checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.kernels import layout
+from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
+from shipgym.models.ship_model import ShipModel
+from shipgym.simulation.simulate import as_trial, unstable
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ZigzagIndices:
+    """What a zigzag tells of a ship; None where the manoeuvre did not get so far.
+
+    Attributes
+    ----------
+    overshoot_1_deg, overshoot_2_deg : float or None
+        Heading beyond that at which the rudder was reversed for the first and the second time, degrees.
+    initial_turning_lengths : float or None
+        Distance sailed from the first order to the first reversal, ship lengths.
+    period_s : float or None
+        Time from the first to the third reversal, s.
+    """
+
+    overshoot_1_deg: float | None
+    overshoot_2_deg: float | None
+    initial_turning_lengths: float | None
+    period_s: float | None
+
+
+def zigzag(
+    model: ShipModel,
+    rudder_deg: float = 20.0,
+    heading_deg: float = 20.0,
+    port_first: bool = False,
+    duration: float = 600.0,
+    dt: float = 0.1,
+    switch: Literal["inside", "step"] = "inside",
+) -> Trial:
+    """Simulate a zigzag from straight ahead at service speed, without an approach run.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    rudder_deg, heading_deg : float
+        Rudder angle ordered and heading change at which it is reversed, degrees.
+    port_first : bool
+        Whether the first order is to port.
+    duration, dt : float
+        s. The samples are dt apart.
+    switch : {"inside", "step"}
+        Reverse the rudder at the instant at which the heading is reached, inside a step, or at the
+        first sample at which it has been reached.
+
+    Returns
+    -------
+    Trial
+        With the rudder ordered from each sample on in `delta_command`.
+
+    Raises
+    ------
+    InputError
+        For an angle, a duration or a step that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    angle = np.radians(check_number(rudder_deg, "rudder_deg", above=0.0, at_most=90.0))
+    threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
+    n_steps = number_of_steps(duration, dt)
+    check_choice(switch, ("inside", "step"), "switch")
+    states = np.empty((n_steps + 1, layout.N_STATE))
+    states[0] = model.service_state
+    commands = np.empty(n_steps + 1)
+    first = -angle if port_first else angle
+    reached, _ = model.kernel("trajectories").zigzag(
+        states, commands, first, threshold, 0.0, dt, switch == "inside", model.ship_tile()
+    )
+    times = dt * np.arange(n_steps + 1, dtype=float)
+    if reached < n_steps:
+        raise unstable(model, times[reached], states[reached])
+    return as_trial(model, times, states, commands[:, None], kind="zigzag")
+
+
+def number_of_steps(duration: float, dt: float) -> int:
+    """Steps of dt in a duration, both s, checked."""
+    check_number(dt, "dt", above=0.0)
+    check_number(duration, "duration", above=0.0)
+    steps = round(duration / dt)
+    if steps < 2:
+        raise InputError(f"duration: {duration:g} s found, expected at least two steps of dt = {dt:g} s")
+    return steps
+
+
+def zigzag_indices(
+    trial: Trial, length: float | None = None, heading_deg: float | None = None
+) -> ZigzagIndices:
+    """Overshoots, initial turning and period of a measured or simulated zigzag.
+
+    Parameters
+    ----------
+    trial : Trial
+        With psi and delta (or delta_command), and u and v for the distance.
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+    heading_deg : float, optional
+        Heading change at which the rudder had to be reversed, degrees; by default `switch_heading_deg`.
+
+    Returns
+    -------
+    ZigzagIndices
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing.
+    """
+    start, turns = reversals(trial)
+    if not turns:
+        return ZigzagIndices(None, None, None, None)
+    threshold = switch_heading_deg(trial) if heading_deg is None else heading_deg
+    ends = [*turns[1:3], trial.t[-1]]
+    overshoots = [_overshoot_deg(trial, start, turn, end, threshold) for turn, end in zip(turns[:2], ends)]
+    sailed = np.interp([start, turns[0]], trial.t, distance_sailed(trial))
+    return ZigzagIndices(
+        overshoot_1_deg=overshoots[0],
+        overshoot_2_deg=overshoots[1] if len(turns) > 1 else None,
+        initial_turning_lengths=float(sailed[1] - sailed[0]) / ship_length(trial, length),
+        period_s=float(turns[2] - turns[0]) if len(turns) > 2 else None,
+    )
+
+
+def switch_heading_deg(trial: Trial) -> float | None:
+    """Heading change at which the rudder of a zigzag was to be reversed, degrees; None without reversal.
+
+    Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and carried out
+    after a delay in which the heading moves on. So it is the largest such angle that had been reached,
+    to 5 per cent, at the first reversal; where that lies more than 3 degrees back, the heading of the reversal itself.
+    """
+    start, turns = reversals(trial)
+    if not turns:
+        return None
+    before, at = np.degrees(_heading_change(trial, start, [turns[0] - _last_step(trial, turns[0]), turns[0]]))
+    before, at = sorted((abs(before), abs(at)))
+    if "delta_command" in trial.channels:
+        whole = np.floor(at + 1e-6)
+        return float(whole) if whole >= before - 1e-6 else float(0.5 * (before + at))
+    usual = np.array([1.0, *np.arange(5.0, 95.0, 5.0)])
+    reached = usual[0.95 * usual <= at]
+    return float(reached[-1]) if len(reached) and at - reached[-1] < 3.0 else float(at)
+
+
+def _last_step(trial: Trial, time: float) -> float:
+    """Length of the sampling step that ends at or spans a time, s."""
+    row = int(np.clip(np.searchsorted(trial.t, time), 1, len(trial) - 1))
+    return float(trial.t[row] - trial.t[row - 1])
+
+
+def _heading_change(trial: Trial, start: float, times: Sequence[float] | Floats) -> Floats:
+    """Heading at some times less the mean heading up to the start, rad."""
+    approach = trial["psi"][trial.t <= start].mean()
+    change: Floats = np.interp(times, trial.t, trial["psi"]) - approach
+    return change
+
+
+def _overshoot_deg(
+    trial: Trial, start: float, turn: float, end: float, threshold: float | None
+) -> float | None:
+    """Heading beyond the threshold after the reversal at time `turn`; None if still growing at `end`."""
+    window = (trial.t >= turn) & (trial.t <= end)
+    if threshold is None or window.sum() < 3:
+        return None
+    change = _heading_change(trial, start, trial.t[window])
+    beyond = np.degrees(change * np.sign(change[0])) - threshold
+    if np.argmax(beyond) == len(beyond) - 1:
+        return None
+    return float(beyond.max())

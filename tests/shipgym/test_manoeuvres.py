@@ -1,0 +1,137 @@
+"""Manoeuvres and their indices."""
+
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import InputError, Trial, manoeuvres
+from shipgym.manoeuvres.imo import overshoot_limits_deg
+
+
+@pytest.fixture(scope="module")
+def mariner():
+    return shipgym.load_model("mariner")
+
+
+def test_the_rudder_reverses_at_the_very_heading(mariner):
+    """With the switch inside a step the result does not depend on where the steps lie."""
+    coarse = manoeuvres.zigzag(mariner, 20, 20, dt=0.5)
+    fine = manoeuvres.zigzag(mariner, 20, 20, dt=0.05)
+    np.testing.assert_allclose(coarse["psi"], fine["psi"][::10], atol=2e-4)
+    on_steps = manoeuvres.zigzag(mariner, 20, 20, dt=0.5, switch="step")
+    assert np.abs(on_steps["psi"] - fine["psi"][::10]).max() > 1e-3
+
+
+def test_port_first_starts_to_port(mariner):
+    trial = manoeuvres.zigzag(mariner, 10, 15, port_first=True)
+    assert trial["delta_command"][0] == pytest.approx(-np.radians(10))
+    assert trial["psi"][100] < 0
+    assert manoeuvres.switch_heading_deg(trial) == 15.0
+
+
+@pytest.fixture(scope="module")
+def triangle() -> Trial:
+    """A zigzag drawn by hand: 1 deg/s, rudder at once, reversals at 10 and -10, turning back at 16 and -18."""
+    corners = np.array([(0, 0), (5, 0), (21, 16), (55, -18), (100, 27)], dtype=float)
+    t = np.arange(0.0, 100.5, 0.5)
+    psi = np.interp(t, *corners.T)
+    rudder = np.where(t < 5, 0.0, np.where(t < 15, 10.0, np.where(t < 47, -10.0, 10.0)))
+    channels = {
+        "psi": np.radians(psi),
+        "delta": np.radians(rudder),
+        "u": np.full(201, 4.0),
+        "v": np.zeros(201),
+    }
+    return Trial(t, channels, length=20.0)
+
+
+def test_indices_of_a_zigzag_drawn_by_hand(triangle):
+    indices = manoeuvres.zigzag_indices(triangle)
+    assert manoeuvres.switch_heading_deg(triangle) == 10.0
+    assert indices.overshoot_1_deg == pytest.approx(6.0)
+    assert indices.overshoot_2_deg == pytest.approx(8.0)
+    assert indices.initial_turning_lengths == pytest.approx(10.0 * 4.0 / 20.0, rel=0.06)
+    assert indices.period_s is None
+
+
+def test_a_zigzag_cut_short_has_no_second_overshoot(triangle):
+    short = triangle.t <= 40.0
+    cut = Trial(
+        triangle.t[short], {name: values[short] for name, values in triangle.channels.items()}, length=20
+    )
+    indices = manoeuvres.zigzag_indices(cut)
+    assert indices.overshoot_1_deg == pytest.approx(6.0)
+    assert indices.overshoot_2_deg is None
+
+
+def test_measured_rudder_and_ordered_rudder_tell_the_same(mariner):
+    trial = manoeuvres.zigzag(mariner, 20, 20, dt=0.5)
+    measured = Trial(trial.t, {n: trial[n] for n in ("psi", "u", "v", "delta")}, length=trial.length)
+    ordered, seen = manoeuvres.zigzag_indices(trial), manoeuvres.zigzag_indices(measured)
+    assert seen.overshoot_1_deg == pytest.approx(ordered.overshoot_1_deg, abs=1e-6)
+    assert seen.overshoot_2_deg == pytest.approx(ordered.overshoot_2_deg, abs=1e-6)
+    assert seen.initial_turning_lengths == pytest.approx(ordered.initial_turning_lengths, abs=0.05)
+
+
+def test_a_perfect_circle():
+    """R = 300 m at 6 m/s from the start: advance R, transfer R, tactical and steady diameter 2 R."""
+    t = np.arange(0.0, 700.0, 0.5)
+    psi = t * 6.0 / 300.0
+    for side in (1, -1):
+        channels = {
+            "x": 300.0 * np.sin(psi), "y": side * 300.0 * (1.0 - np.cos(psi)), "psi": side * psi,
+            "u": np.full(t.size, 6.0), "v": np.zeros(t.size), "r": np.full(t.size, side * 0.02),
+            "delta_command": np.full(t.size, side * 0.6),
+        }  # fmt: skip
+        indices = manoeuvres.turning_indices(Trial(t, channels), length=100.0)
+        assert indices.advance_lengths == pytest.approx(3.0, abs=1e-3)
+        assert indices.transfer_lengths == pytest.approx(3.0, abs=1e-3)
+        assert indices.tactical_diameter_lengths == pytest.approx(6.0, abs=1e-3)
+        assert indices.steady_diameter_lengths == pytest.approx(6.0)
+        assert indices.steady_speed_ratio == pytest.approx(1.0)
+
+
+def test_a_turn_that_ends_early_has_no_tactical_diameter(mariner):
+    indices = manoeuvres.turning_indices(manoeuvres.turning_circle(mariner, 35, duration=150))
+    assert indices.advance_lengths is not None
+    assert indices.tactical_diameter_lengths is None
+
+
+def test_imo_limits_between_10_and_30_seconds_per_length():
+    """MSC.137(76) 5.3.3: 10 and 25 deg below 10 s, 20 and 40 above 30 s, linear between."""
+    assert overshoot_limits_deg(5.0) == (10.0, 25.0)
+    assert overshoot_limits_deg(20.0) == (15.0, 32.5)
+    assert overshoot_limits_deg(35.0) == (20.0, 40.0)
+
+
+def test_imo_assessment_of_mariner(mariner):
+    """The toolbox's Mariner turns too wide at 35 deg (6.65 L to port) and is steady otherwise."""
+    criteria = manoeuvres.imo_assessment(mariner)
+    assert [name for name, criterion in criteria.items() if not criterion.passed] == ["tactical_diameter"]
+    assert criteria["tactical_diameter"].value == pytest.approx(6.65, abs=0.01)
+    assert criteria["advance"].value == pytest.approx(3.71, abs=0.01)
+    assert all("MSC.137(76)" in criterion.source for criterion in criteria.values())
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: manoeuvres.zigzag(m, -20), "rudder_deg: -20 found"),
+        (lambda m: manoeuvres.zigzag(m, 20, 20, duration=0), "duration: 0 found"),
+        (lambda m: manoeuvres.zigzag(m, 20, 20, dt=float("nan")), "dt: nan found"),
+        (lambda m: manoeuvres.zigzag(m, 20, 20, switch="later"), "switch: 'later' found"),
+        (lambda m: manoeuvres.turning_circle(m, 0.0), "expected an angle that turns the ship"),
+        (lambda m: manoeuvres.turning_circle(m, 120.0), "rudder_deg: 120 found"),
+    ],
+)
+def test_wrong_arguments(mariner, call, message):
+    with pytest.raises(InputError, match=message):
+        call(mariner)
+
+
+def test_what_a_trial_lacks_is_named():
+    trial = Trial([0, 1, 2], {"psi": [0, 0, 0.0]})
+    with pytest.raises(InputError, match="'delta' is missing"):
+        manoeuvres.zigzag_indices(trial)
+    with pytest.raises(InputError, match="'x' is missing"):
+        manoeuvres.turning_indices(trial)
