@@ -1,0 +1,417 @@
+"""Course keeping: hold and change the heading of a ship with its rudder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym._checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.kernels import course_keeping_rows as rows
+from shipgym.kernels import layout
+from shipgym.models import ShipModel, load_model
+
+Floats = NDArray[np.float64]
+Observation = NDArray[np.float32]
+
+OBSERVATION_NAMES = (
+    "heading_error_sin",
+    "heading_error_cos",
+    "yaw_rate",
+    "sway",
+    "surge",
+    "rudder",
+    "last_command",
+    "heading_error_integral",
+)
+OBSERVATION_LOW = np.array([-1, -1, -5, -2, -2, -1, -1, -1], dtype=np.float32)
+OBSERVATION_HIGH = np.array([1, 1, 5, 2, 3, 1, 1, 1], dtype=np.float32)
+REWARD_PARTS = ("reward_heading", "reward_rudder", "reward_rudder_rate", "reward_end")
+SEAS = ("calm",)
+
+HEADING_SCALE = np.radians(30.0)  # heading error and rudder angle that cost 1 and RUDDER_WEIGHT a step
+RUDDER_WEIGHT = 0.1  # Norrbin 1972
+RATE_WEIGHT = 0.01  # on the rudder rate in HEADING_SCALE per ship length sailed
+INTEGRAL_ZONE = np.radians(10.0)  # the error is integrated only within this
+INTEGRAL_LENGTHS = 10.0  # the integral's scale: INTEGRAL_ZONE for so many ship lengths
+STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
+
+
+@dataclass(frozen=True)
+class CourseKeepingTask:
+    """What is asked of the autopilot.
+
+    Attributes
+    ----------
+    sea : {"calm"}
+        Sea state.
+    dt : float or None
+        Control interval, s; by default about a twentieth of the time to travel one ship length,
+        rounded to 1, 2 or 5 times a power of ten.
+    episode_steps : int
+        Control intervals after which an episode is truncated.
+    course_change_deg : float
+        Largest change of the set-point, degrees; 0 keeps the first course.
+    change_interval_steps : int
+        Mean number of control intervals between changes of the set-point.
+    max_heading_error_deg : float
+        Heading error beyond which control is lost, degrees, at most 180.
+    max_envelope_distance : float
+        How many times further out than the training data the model may be taken before the episode
+        ends (see `Envelope.distance`).
+    """
+
+    sea: str = "calm"
+    dt: float | None = None
+    episode_steps: int = 600
+    course_change_deg: float = 30.0
+    change_interval_steps: int = 200
+    max_heading_error_deg: float = 90.0
+    max_envelope_distance: float = 5.0
+
+    def __post_init__(self) -> None:
+        check_choice(self.sea, SEAS, "sea")
+        if self.dt is not None:
+            check_number(self.dt, "dt", above=0.0)
+        check_number(self.episode_steps, "episode_steps", at_least=1)
+        check_number(self.course_change_deg, "course_change_deg", at_least=0.0, at_most=90.0)
+        check_number(self.change_interval_steps, "change_interval_steps", at_least=1)
+        check_number(self.max_heading_error_deg, "max_heading_error_deg", above=0.0, at_most=180.0)
+        check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
+
+    def interval(self, model: ShipModel) -> float:
+        """Control interval for a ship, s."""
+        return control_interval(model) if self.dt is None else float(self.dt)
+
+    def settings(self, model: ShipModel) -> Floats:
+        """The task as the kernel reads it."""
+        settings = np.zeros(rows.N_SETTINGS)
+        settings[rows.DT] = self.interval(model)
+        settings[rows.SUBSTEPS] = np.ceil(settings[rows.DT] / (1.5 * control_interval(model)))
+        settings[rows.TIME_LIMIT] = self.episode_steps
+        settings[rows.LARGEST_CHANGE] = np.radians(self.course_change_deg)
+        settings[rows.CHANGE_INTERVAL] = self.change_interval_steps
+        settings[rows.LARGEST_ERROR] = np.radians(self.max_heading_error_deg)
+        settings[rows.LARGEST_DISTANCE] = self.max_envelope_distance
+        settings[rows.HEADING_SCALE] = HEADING_SCALE
+        settings[rows.RUDDER_WEIGHT] = RUDDER_WEIGHT
+        settings[rows.RATE_WEIGHT] = RATE_WEIGHT
+        settings[rows.INTEGRAL_ZONE] = INTEGRAL_ZONE
+        settings[rows.INTEGRAL_SCALE] = observation_scales(model)[-1]
+        return settings
+
+
+def control_interval(model: ShipModel) -> float:
+    """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
+    wanted = model.particulars["length"] / model.particulars["speed"] / STEPS_PER_LENGTH
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted))) * power)
+
+
+def observation_scales(model: ShipModel) -> Floats:
+    """Physical value of an observation of 1, in the order of `OBSERVATION_NAMES`, SI units."""
+    length, speed, limit = model.particulars["length"], model.particulars["speed"], model.steering.limit
+    integral = INTEGRAL_ZONE * INTEGRAL_LENGTHS * length / speed
+    return np.array([1.0, 1.0, speed / length, speed, speed, limit, limit, integral])
+
+
+class CourseKeepingEngine:
+    """The course-keeping task for many ships at once, without Gymnasium's clothes.
+
+    Parameters
+    ----------
+    models : ShipModel or sequence of ShipModel
+        One ship for all, or one for each lane; all of one structure.
+    num_envs : int
+        Number of lanes.
+    task : CourseKeepingTask
+        What is asked.
+
+    Raises
+    ------
+    InputError
+        If `num_envs` is not positive, or the number of models or their structures do not fit.
+    """
+
+    def __init__(
+        self,
+        models: ShipModel | Sequence[ShipModel],
+        num_envs: int,
+        task: CourseKeepingTask | None = None,
+    ) -> None:
+        if num_envs < 1:
+            raise InputError(f"num_envs: {num_envs} found, expected at least 1")
+        fleet = [models] if isinstance(models, ShipModel) else list(models)
+        if len(fleet) not in (1, num_envs):
+            raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
+        self.model = fleet[0]
+        if any(model.table != self.model.table for model in fleet):
+            raise InputError("models: of several structures, expected one structure in one engine")
+        self.num_envs = num_envs
+        self.task = task or CourseKeepingTask()
+        self.dt = self.task.interval(self.model)
+        tiles = -(-num_envs // layout.LANES)
+        self._kernel = self.model.kernel("course_keeping")
+        self._settings = self.task.settings(self.model)
+        self._ships = _ship_tiles(fleet, tiles)
+        self._states = np.zeros((tiles, rows.END))
+        self._keys = np.zeros((tiles, 2, layout.LANES), dtype=np.uint64)
+        self._actions = np.zeros((tiles, layout.LANES), dtype=np.float32)
+        self._observations = np.zeros((tiles, layout.LANES, rows.N_OBSERVATIONS), dtype=np.float32)
+        self.reset(np.arange(num_envs))
+
+    def reset(self, seeds: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
+        """Begin an episode in each lane.
+
+        Parameters
+        ----------
+        seeds : array-like of int, shape (num_envs,)
+            Seed of each lane; an episode is a function of its seed and number alone.
+        episodes : array-like of int, shape (num_envs,)
+            Number of the episode under that seed.
+        mask : array-like of bool, shape (num_envs,)
+            Lanes to begin anew; the others go on.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, n_observations)
+        """
+        which = np.zeros((len(self._states), layout.LANES), dtype=np.bool_)
+        which.reshape(-1)[: self.num_envs] = mask
+        flat = np.broadcast_to(np.asarray(seeds).astype(np.uint64), (self.num_envs,))
+        numbers = np.broadcast_to(np.asarray(episodes).astype(np.uint64), (self.num_envs,))
+        for row, words in enumerate((flat, numbers)):
+            lanes = np.zeros(which.size, dtype=np.uint64)
+            lanes[: self.num_envs] = words
+            self._keys[:, row] = np.where(which, lanes.reshape(which.shape), self._keys[:, row])
+        self._kernel.reset(self._states, self._keys, self._settings, self._ships, self._observations, which)
+        return self.observations
+
+    def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """One control interval; a lane whose episode is over stays as it is and earns 0.
+
+        Parameters
+        ----------
+        actions : array-like of shape (num_envs, 1)
+            Commanded rudder, parts of the rudder limit, clipped to [-1, 1].
+
+        Returns
+        -------
+        observations : float32 array of shape (num_envs, n_observations)
+        rewards : array of shape (num_envs,)
+        terminated, truncated : bool arrays of shape (num_envs,)
+
+        Raises
+        ------
+        InputError
+            If an action is not a number or their shape is another.
+        """
+        array = np.asarray(actions, dtype=np.float32)
+        if array.shape != (self.num_envs, 1):
+            raise InputError(f"actions: shape {array.shape} found, expected ({self.num_envs}, 1)")
+        if not np.all(np.isfinite(array)):
+            lane = int(np.argmin(np.isfinite(array[:, 0])))
+            raise InputError(f"actions: {array[lane, 0]} found in lane {lane}, expected numbers in [-1, 1]")
+        self._actions.reshape(-1)[: self.num_envs] = array[:, 0]
+        self._advance()
+        return (
+            self.observations,
+            self.outcome(rows.REWARD),
+            self.outcome(rows.TERMINATED) > 0.0,
+            self.outcome(rows.TRUNCATED) > 0.0,
+        )
+
+    def _advance(self) -> None:
+        self._kernel.step(
+            self._states, self._keys, self._settings, self._ships, self._actions, self._observations,
+            self.num_envs,
+        )  # fmt: skip
+
+    @property
+    def observations(self) -> Observation:
+        """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
+        return self._observations.reshape(-1, rows.N_OBSERVATIONS)[: self.num_envs].copy()
+
+    def outcome(self, row: int) -> Floats:
+        """One row of the kernel's state for each lane, shape (num_envs,), a copy."""
+        return self._states[:, row : row + layout.LANES].reshape(-1)[: self.num_envs].copy()
+
+    @property
+    def reward_parts(self) -> Floats:
+        """Parts of the last rewards in the order of `REWARD_PARTS`, shape (num_envs, n_parts)."""
+        parts = layout.offsets(rows.HEADING_REWARD, len(REWARD_PARTS))
+        return np.stack([self.outcome(row) for row in parts], axis=-1)
+
+    def physical_state(self) -> dict[str, Floats]:
+        """State and set-point in SI units by name, each of shape (num_envs,)."""
+        names = (*self.model.state_names, "set_point")
+        return {
+            name: self.outcome(row) for row, name in zip(layout.offsets(0, len(names)), names, strict=True)
+        }
+
+
+def _ship_tiles(fleet: list[ShipModel], tiles: int) -> Floats:
+    """Ships as the kernels read them: one tile for all, or a column for each lane."""
+    if len(fleet) == 1:
+        return fleet[0].ship_tile()[None]
+    columns = [model.ship_column() for model in fleet]
+    columns += [columns[0]] * (tiles * layout.LANES - len(fleet))
+    return np.stack(columns).reshape(tiles, layout.LANES, -1).transpose(0, 2, 1).reshape(tiles, -1)
+
+
+class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
+    """Keep and change the heading of a ship with its rudder.
+
+    The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The observation
+    holds the quantities of `observation_names`, each divided by its entry of `observation_scales`:
+    sine and cosine of the heading error (set-point less heading, positive when the ship has to turn to
+    starboard), yaw rate, sway and surge speed, rudder, last command, and the integral of the heading
+    error, gathered only while the error is within 10 degrees.
+
+    The reward is the classical steering cost with the sign turned (Norrbin 1972; van Amerongen 1982):
+    minus the squares of heading error, rudder angle (weight 0.1) and rudder rate (weight 0.01), all in
+    units of 30 degrees, the rate per ship length sailed. `info` has its parts. Losing control costs as
+    much as the rest of the episode at the largest heading error, so that it never pays to end early.
+
+    Parameters
+    ----------
+    model : str, Path or ShipModel
+        A shipped model's name, the path of a model file, or a model.
+    sea, dt, episode_steps, course_change_deg, change_interval_steps
+        See `CourseKeepingTask`.
+    max_heading_error_deg, max_envelope_distance : float
+        See `CourseKeepingTask`.
+    render_mode : None
+        Reserved by Gymnasium; there is nothing to render yet.
+
+    Raises
+    ------
+    InputError
+        For an unknown model or an argument out of its range.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium declares it so
+
+    def __init__(
+        self,
+        model: str | Path | ShipModel = "mariner-tls-svm",
+        sea: str = "calm",
+        dt: float | None = None,
+        episode_steps: int = 600,
+        course_change_deg: float = 30.0,
+        change_interval_steps: int = 200,
+        max_heading_error_deg: float = 90.0,
+        max_envelope_distance: float = 5.0,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode is not None:
+            raise InputError(f"render_mode: {render_mode!r} found, expected None: nothing is rendered")
+        self.model = model if isinstance(model, ShipModel) else load_model(model)
+        self.task = CourseKeepingTask(
+            sea, dt, episode_steps, course_change_deg, change_interval_steps, max_heading_error_deg,
+            max_envelope_distance,
+        )  # fmt: skip
+        self.observation_space = gymnasium.spaces.Box(OBSERVATION_LOW, OBSERVATION_HIGH, dtype=np.float32)
+        self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
+        self.observation_names = OBSERVATION_NAMES
+        self.observation_scales = observation_scales(self.model)
+        self.render_mode = None
+        self._engine = CourseKeepingEngine(self.model, 1, self.task)
+        self._key = 0
+        self._episode = -1
+
+    @property
+    def dt(self) -> float:
+        """Control interval, s."""
+        return self._engine.dt
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode: straight ahead at service speed on a random heading, with a new set-point.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Fixes this episode and all that follow it.
+        options : dict, optional
+            None are known.
+
+        Raises
+        ------
+        InputError
+            If there are options.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise InputError(f"options: {options!r} found, expected none")
+        if seed is not None or self._episode < 0:
+            self._key = int(self.np_random.integers(2**63))
+            self._episode = -1
+        self._episode += 1
+        observations = self._engine.reset([self._key], [self._episode])
+        error = float(np.arctan2(observations[0, 0], observations[0, 1]))
+        return observations[0], {"heading_error": error, "extrapolating": False}
+
+    def step(
+        self, action: NDArray[np.float32]
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Hold a rudder command over one control interval.
+
+        Parameters
+        ----------
+        action : array of shape (1,)
+            Commanded rudder, part of the rudder limit, clipped to [-1, 1].
+
+        Returns
+        -------
+        observation : float32 array of shape (8,)
+        reward : float
+        terminated, truncated : bool
+        info : dict
+            The parts of the reward, `heading_error` in rad, `envelope_distance` and `extrapolating`.
+
+        Raises
+        ------
+        InputError
+            If the action is not one finite number.
+        """
+        engine = self._engine
+        command = _one_number(action)
+        engine._actions[0, 0] = command
+        engine._advance()
+        reward, heading, rudder, rate, end, terminated, truncated, extrapolating, distance, error = (
+            engine._states[0, rows.OUTCOME :: layout.LANES].tolist()
+        )
+        info = {
+            "reward_heading": heading,
+            "reward_rudder": rudder,
+            "reward_rudder_rate": rate,
+            "reward_end": end,
+            "heading_error": error,
+            "envelope_distance": distance,
+            "extrapolating": extrapolating > 0.0,
+        }
+        observation = engine._observations[0, 0].copy()
+        return observation, reward, terminated > 0.0, truncated > 0.0, info
+
+    def physical_state(self) -> dict[str, float]:
+        """State and set-point by name, SI units."""
+        return {name: float(value[0]) for name, value in self._engine.physical_state().items()}
+
+
+def _one_number(action: Any) -> float:
+    """The number in an action of shape (1,)."""
+    array = action if isinstance(action, np.ndarray) else np.asarray(action, dtype=np.float32)
+    if array.shape != (1,):
+        raise InputError(f"action: shape {array.shape} found, expected (1,): the commanded rudder")
+    number = float(array[0])
+    if not -np.inf < number < np.inf:
+        raise InputError(f"action: {number} found, expected a number in [-1, 1]: the commanded rudder")
+    return number

@@ -1,0 +1,218 @@
+"""The course-keeping environment: one control interval of 64 ships at once.
+
+Loops over lanes that every step needs are vectorised: they touch few arrays, hold no loop of their own
+and call only inlined functions. Set-point changes and the end of an episode come seldom and are done
+lane by lane afterwards. Rows of the arrays: `course_keeping_rows`.
+"""
+
+from __future__ import annotations
+
+from math import fabs, floor, pi
+from typing import Any
+
+import numpy as np
+
+from .compiling import inlined, kernel, rare
+from .course_keeping_rows import (
+    CHANGE_INTERVAL,
+    DISTANCE,
+    DRAWS,
+    DT,
+    END,
+    END_REWARD,
+    ENDED,
+    EXTRAPOLATING,
+    HEADING_ERROR,
+    HEADING_REWARD,
+    HEADING_SCALE,
+    INTEGRAL,
+    INTEGRAL_SCALE,
+    INTEGRAL_ZONE,
+    LARGEST_CHANGE,
+    LARGEST_DISTANCE,
+    LARGEST_ERROR,
+    LAST_COMMAND,
+    LAST_RUDDER,
+    NEXT_CHANGE,
+    RATE_REWARD,
+    RATE_WEIGHT,
+    REWARD,
+    RUDDER_REWARD,
+    RUDDER_WEIGHT,
+    SET_POINT,
+    STEPS,
+    SUBSTEPS,
+    TERMINATED,
+    TIME_LIMIT,
+    TRUNCATED,
+)
+from .envelope import envelope_distance, outside_range
+from .layout import DELTA, LANES, LENGTH, PSI, RUDDER_LIMIT, SERVICE_SPEED, R, U, V, X, Y
+from .motion import clip, runge_kutta, runs_away
+from .random import uniform
+from .trigonometry import sin_cos, wrap
+
+
+@inlined
+def observe(observations: Any, tile: int, lane: int, state: Any, settings: Any, ship: Any) -> None:
+    """Write what the autopilot sees of one ship, within the bounds of the observation space."""
+    speed = ship[SERVICE_SPEED + lane]
+    limit = ship[RUDDER_LIMIT + lane]
+    sine, cosine = sin_cos(state[SET_POINT + lane] - state[PSI + lane])
+    seen = observations[tile, lane]
+    seen[0] = clip(sine, -1.0, 1.0)
+    seen[1] = clip(cosine, -1.0, 1.0)
+    seen[2] = clip(state[R + lane] * ship[LENGTH + lane] / speed, -5.0, 5.0)
+    seen[3] = clip(state[V + lane] / speed, -2.0, 2.0)
+    seen[4] = clip(state[U + lane] / speed, -2.0, 3.0)
+    seen[5] = clip(state[DELTA + lane] / limit, -1.0, 1.0)
+    seen[6] = state[LAST_COMMAND + lane]
+    seen[7] = clip(state[INTEGRAL + lane] / settings[INTEGRAL_SCALE], -1.0, 1.0)
+
+
+@inlined
+def draw(state: Any, lane: int, keys: Any, tile: int, low: float, high: float) -> float:
+    """Next random number of a lane's episode, in [low, high)."""
+    count = state[DRAWS + lane]
+    state[DRAWS + lane] = count + 1.0
+    return uniform(keys[tile, 0, lane], keys[tile, 1, lane], np.uint64(count), low, high)
+
+
+@rare
+def change_set_point(state: Any, lane: int, keys: Any, tile: int, settings: Any) -> None:
+    """Draw the next heading to keep and the step at which it changes again."""
+    largest = settings[LARGEST_CHANGE]
+    state[SET_POINT + lane] += draw(state, lane, keys, tile, -largest, largest)
+    wait = settings[CHANGE_INTERVAL] * draw(state, lane, keys, tile, 0.5, 1.5)
+    state[NEXT_CHANGE + lane] = state[STEPS + lane] + max(floor(wait), 1.0)
+
+
+@rare
+def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: Any) -> None:
+    """Put a ship straight ahead at service speed on a random heading, with a first set-point."""
+    for row in range(0, END, LANES):
+        state[row + lane] = 0.0
+    state[U + lane] = ship[SERVICE_SPEED + lane]
+    state[PSI + lane] = draw(state, lane, keys, tile, -pi, pi)
+    state[SET_POINT + lane] = state[PSI + lane]
+    change_set_point(state, lane, keys, tile, settings)
+
+
+@kernel(
+    "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float32[:, :, ::1],"
+    " boolean[:, ::1])"
+)
+def reset(states: Any, keys: Any, settings: Any, ships: Any, observations: Any, which: Any) -> None:
+    """Begin an episode in the lanes of `which`; `keys` holds each lane's seed and episode number."""
+    for tile in range(states.shape[0]):
+        ship = ships[tile % ships.shape[0]]
+        for lane in range(LANES):
+            if which[tile, lane]:
+                begin(states[tile], lane, keys, tile, settings, ship)
+                observe(observations, tile, lane, states[tile], settings, ship)
+
+
+@inlined
+def pick(condition: bool, yes: float, no: float) -> float:
+    """One of two numbers, without a branch."""
+    return yes if condition else no
+
+
+@inlined
+def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
+    """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
+    for lane in range(lanes):
+        x0, y0, psi0 = state[X + lane], state[Y + lane], state[PSI + lane]
+        u0, v0, r0, delta0 = state[U + lane], state[V + lane], state[R + lane], state[DELTA + lane]
+        order = state[LAST_COMMAND + lane] * ship[RUDDER_LIMIT + lane]
+        x, y, psi, u, v, r, delta = runge_kutta(x0, y0, psi0, u0, v0, r0, delta0, order, 0.0, h, ship, lane)
+        away = runs_away(u, v, r, ship, lane)
+        stays = away | (state[ENDED + lane] != 0.0)
+        state[X + lane] = pick(stays, x0, x)
+        state[Y + lane] = pick(stays, y0, y)
+        state[PSI + lane] = pick(stays, psi0, psi)
+        state[U + lane] = pick(stays, u0, u)
+        state[V + lane] = pick(stays, v0, v)
+        state[R + lane] = pick(stays, r0, r)
+        state[DELTA + lane] = pick(stays, delta0, delta)
+        state[TERMINATED + lane] = pick(away, 1.0, state[TERMINATED + lane])
+
+
+@inlined
+def order_rudder(state: Any, action: Any, lanes: int) -> None:
+    """Take the commands of ships whose episode is not over."""
+    for lane in range(lanes):
+        ended = state[ENDED + lane] != 0.0
+        command = clip(float(action[lane]), -1.0, 1.0)
+        state[LAST_COMMAND + lane] = pick(ended, state[LAST_COMMAND + lane], command)
+        state[LAST_RUDDER + lane] = state[DELTA + lane]
+        state[STEPS + lane] += 1.0 - state[ENDED + lane]
+        state[TERMINATED + lane] = 0.0
+
+
+@inlined
+def judge(state: Any, settings: Any, ship: Any, lanes: int) -> None:
+    """Steering cost of the interval, integral of the error, and whether the episode is over."""
+    dt, zone, reach = settings[DT], settings[INTEGRAL_ZONE], settings[INTEGRAL_SCALE]
+    per_scale = 1.0 / settings[HEADING_SCALE]
+    rudder_weight, rate_weight = settings[RUDDER_WEIGHT], settings[RATE_WEIGHT]
+    largest_error, largest_distance = settings[LARGEST_ERROR], settings[LARGEST_DISTANCE]
+    time_limit = settings[TIME_LIMIT]
+    worst = (largest_error * per_scale) ** 2
+    for lane in range(lanes):
+        u, v, r, delta = state[U + lane], state[V + lane], state[R + lane], state[DELTA + lane]
+        going = 1.0 - state[ENDED + lane]
+        error = wrap(state[SET_POINT + lane] - state[PSI + lane])
+        gathered = pick(fabs(error) > zone, 0.0, going * error * dt)
+        state[INTEGRAL + lane] = clip(state[INTEGRAL + lane] + gathered, -reach, reach)
+
+        rate = (delta - state[LAST_RUDDER + lane]) / dt * ship[LENGTH + lane] / ship[SERVICE_SPEED + lane]
+        heading_cost = going * (error * per_scale) ** 2
+        rudder_cost = going * rudder_weight * (delta * per_scale) ** 2
+        rate_cost = going * rate_weight * (rate * per_scale) ** 2
+
+        distance = envelope_distance(u, v, r, delta, ship, lane)
+        beyond = outside_range(u, v, r, delta, ship, lane) | (distance > 1.0)
+        lost = (fabs(error) > largest_error) | (distance > largest_distance)
+        terminated = going * pick(lost, 1.0, state[TERMINATED + lane])
+        late = pick(state[STEPS + lane] >= time_limit, going, 0.0)
+        # losing control costs the rest of the episode at the largest error: ending early never pays
+        end_cost = terminated * worst * (time_limit - state[STEPS + lane])
+
+        state[HEADING_REWARD + lane] = -heading_cost
+        state[RUDDER_REWARD + lane] = -rudder_cost
+        state[RATE_REWARD + lane] = -rate_cost
+        state[END_REWARD + lane] = -end_cost
+        state[REWARD + lane] = -(heading_cost + rudder_cost + rate_cost + end_cost)
+        state[HEADING_ERROR + lane] = error
+        state[DISTANCE + lane] = distance
+        state[EXTRAPOLATING + lane] = pick(beyond, 1.0, 0.0)
+        state[TERMINATED + lane] = terminated
+        state[TRUNCATED + lane] = late * (1.0 - terminated)
+        state[ENDED + lane] = max(state[ENDED + lane], max(terminated, late))
+
+
+@kernel(
+    "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float32[:, ::1],"
+    " float32[:, :, ::1], int64)"
+)
+def step(
+    states: Any, keys: Any, settings: Any, ships: Any, actions: Any, observations: Any, n_lanes: int
+) -> None:
+    """One control interval of the first `n_lanes` ships: sail, judge, change course, observe.
+
+    A lane whose episode is over stays as it is and earns nothing.
+    """
+    substeps = int(settings[SUBSTEPS])
+    for tile in range(states.shape[0]):
+        lanes = min(n_lanes - tile * LANES, LANES)
+        state, ship = states[tile], ships[tile % ships.shape[0]]
+        order_rudder(state, actions[tile], lanes)
+        for _ in range(substeps):
+            sail(state, settings[DT] / substeps, ship, lanes)
+        judge(state, settings, ship, lanes)
+        for lane in range(lanes):
+            if state[STEPS + lane] >= state[NEXT_CHANGE + lane] and state[ENDED + lane] == 0.0:
+                change_set_point(state, lane, keys, tile, settings)
+        for lane in range(lanes):
+            observe(observations, tile, lane, state, settings, ship)

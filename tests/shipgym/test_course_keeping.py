@@ -1,0 +1,286 @@
+"""The course-keeping environment."""
+
+import warnings
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env as gymnasium_check_env
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from stable_baselines3.common.env_checker import check_env as sb3_check_env
+
+import shipgym
+from shipgym import InputError
+from shipgym.envs.course_keeping import (
+    OBSERVATION_NAMES,
+    CourseKeepingEngine,
+    CourseKeepingTask,
+    control_interval,
+    observation_scales,
+)
+from shipgym.models import Envelope
+
+ID = "shipgym/CourseKeeping-v0"
+
+
+@pytest.fixture(scope="module")
+def mariner():
+    return shipgym.load_model("mariner")
+
+
+def make(**options):
+    return gymnasium.make(ID, **{"model": "mariner", **options})
+
+
+def steer(env, policy, seed=0):
+    """One episode: rewards, infos and how it ended."""
+    observation, _ = env.reset(seed=seed)
+    rewards, infos, over = [], [], False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(policy(observation))
+        rewards.append(reward)
+        infos.append(info)
+        over = terminated or truncated
+    return np.array(rewards), infos, terminated, truncated
+
+
+def pd(observation):
+    """A plain proportional and differential autopilot."""
+    error = np.arctan2(observation[0], observation[1])
+    return np.array([np.clip(1.5 * error - 0.7 * observation[2], -1.0, 1.0)], dtype=np.float32)
+
+
+@pytest.mark.parametrize("check", [gymnasium_check_env, sb3_check_env])
+def test_conformance_without_a_warning(check):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = make().unwrapped
+        check(env)
+    assert env.spec.id == ID
+
+
+def test_registered_by_import_for_worker_processes():
+    assert gymnasium.make(f"shipgym:{ID}", model="mariner").spec.id == ID
+
+
+def test_observation_is_the_scaled_physical_state():
+    env = make().unwrapped
+    observation, _ = env.reset(seed=4)
+    for _ in range(40):
+        observation, *_ = env.step(pd(observation))
+    state, scales = env.physical_state(), env.observation_scales
+    error = (state["set_point"] - state["psi"] + np.pi) % (2 * np.pi) - np.pi
+    seen = dict(zip(env.observation_names, observation * scales, strict=True))
+    assert env.observation_names == OBSERVATION_NAMES
+    assert seen["heading_error_sin"] == pytest.approx(np.sin(error), abs=1e-6)
+    assert seen["heading_error_cos"] == pytest.approx(np.cos(error), abs=1e-6)
+    for name, value in (("yaw_rate", "r"), ("sway", "v"), ("surge", "u"), ("rudder", "delta")):
+        assert seen[name] == pytest.approx(state[value], rel=1e-5, abs=1e-9)
+
+
+def test_the_ship_is_the_one_that_the_model_simulates(mariner):
+    env = make(course_change_deg=0.0).unwrapped
+    env.reset(seed=1)
+    start = [env.physical_state()[name] for name in mariner.state_names]
+    commands = np.sin(np.arange(100.0))[:, None] * 0.5
+    for command in commands:
+        env.step(command.astype(np.float32))
+    trial = mariner.simulate(commands.astype(np.float32) * mariner.steering.limit, env.dt, start)
+    for name in mariner.state_names:
+        assert env.physical_state()[name] == pytest.approx(trial[name][-1], rel=1e-5, abs=1e-7)
+
+
+def test_one_step_a_control_interval_is_accurate_enough(mariner):
+    """Against 20 steps an interval the heading stays within 0.1 deg over 100 s of wild steering."""
+    commands = np.repeat(np.random.default_rng(0).uniform(-0.5, 0.5, 100), 1)[:, None]
+    dt = control_interval(mariner)
+    coarse, fine = mariner.simulate(commands, dt), mariner.simulate(np.repeat(commands, 20, axis=0), dt / 20)
+    assert np.degrees(np.abs(coarse["psi"] - fine["psi"][::20])).max() < 0.1
+
+
+def test_the_reward_is_the_classical_cost_and_the_sum_of_its_parts(mariner):
+    env = make().unwrapped
+    observation, _ = env.reset(seed=2)
+    for _ in range(30):
+        before = env.physical_state()
+        observation, reward, *_, info = env.step(pd(observation))
+        after = env.physical_state()
+        error = before["set_point"] - after["psi"]
+        rate = (after["delta"] - before["delta"]) / env.dt * 160.93 / 7.7175
+        unit = np.radians(30.0)
+        cost = (error / unit) ** 2 + 0.1 * (after["delta"] / unit) ** 2 + 0.01 * (rate / unit) ** 2
+        assert reward == pytest.approx(-cost, rel=1e-9)
+        assert reward == pytest.approx(sum(info[name] for name in info if name.startswith("reward_")))
+
+
+def test_set_points_change_during_an_episode_and_are_kept_with_zero_change():
+    env = make().unwrapped
+    headings = set()
+    observation, _ = env.reset(seed=3)
+    for _ in range(600):
+        observation, *_ = env.step(pd(observation))
+        headings.add(env.physical_state()["set_point"])
+    assert 2 <= len(headings) <= 7
+    fixed = make(course_change_deg=0.0).unwrapped
+    fixed.reset(seed=3)
+    state = fixed.physical_state()
+    assert state["set_point"] == state["psi"]
+
+
+def test_an_episode_is_a_function_of_its_seed():
+    first, second, other = (steer(make(), pd, seed=seed)[0] for seed in (5, 5, 6))
+    np.testing.assert_array_equal(first, second)
+    assert not np.array_equal(first, other)
+
+
+def test_later_episodes_follow_from_the_first_seed_and_differ():
+    def headings(seed):
+        env = make()
+        env.reset(seed=seed)
+        return [env.reset()[1]["heading_error"] for _ in range(3)]
+
+    assert headings(1) == headings(1)
+    assert len(set(headings(1))) == 3
+
+
+def test_the_time_limit_truncates():
+    rewards, _, terminated, truncated = steer(make(episode_steps=50), pd)
+    assert (len(rewards), terminated, truncated) == (50, False, True)
+
+
+def test_losing_control_ends_the_episode_and_never_pays():
+    hard_over = lambda _: np.ones(1, dtype=np.float32)  # noqa: E731
+    lost, infos, terminated, truncated = steer(make(), hard_over)
+    assert terminated
+    assert not truncated
+    assert abs(infos[-1]["heading_error"]) > np.radians(90)
+    assert infos[-1]["reward_end"] < 0.0
+    idle = steer(make(max_heading_error_deg=180.0), lambda _: np.zeros(1, dtype=np.float32))[0]
+    kept = steer(make(), pd)[0]
+    assert lost.sum() < idle.sum() < kept.sum()
+
+
+def test_leaving_the_training_envelope_is_reported(mariner):
+    calm = Envelope.from_samples(*(np.random.default_rng(0).normal(m, s, 500) for m, s in
+                                   ((7.7, 0.05), (0.0, 0.02), (0.0, 2e-4), (0.0, 0.01))))  # fmt: skip
+    env = make(model=replace(mariner, envelope=calm), max_envelope_distance=1e6)
+    _, infos, *_ = steer(env, pd)
+    assert infos[-1]["extrapolating"] == (infos[-1]["envelope_distance"] > 1.0)
+    assert any(info["extrapolating"] for info in infos)
+    _, infos, terminated, _ = steer(make(model=replace(mariner, envelope=calm)), pd)
+    assert terminated
+    assert infos[-1]["envelope_distance"] > 5.0
+    assert not any(info["extrapolating"] for info in steer(make(), pd)[1])  # no envelope is known
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 2**31 - 1), st.lists(st.floats(-1.0, 1.0, width=32), min_size=1, max_size=40))
+def test_observations_stay_in_their_space_and_are_never_nan(seed, actions):
+    env = make(max_heading_error_deg=180.0).unwrapped
+    env.reset(seed=seed)
+    for action in actions * 10:
+        observation, reward, *_ = env.step(np.array([action], dtype=np.float32))
+        assert observation in env.observation_space
+        assert np.isfinite(reward)
+
+
+def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
+    wild = replace(mariner, coefficients={**mariner.coefficients, "N_r": 0.05, "N_vvr": 9.0, "N_v": 0.1})
+    env = make(model=wild).unwrapped
+    rewards, _, terminated, _ = steer(env, lambda _: np.ones(1, dtype=np.float32))
+    assert terminated
+    assert np.all(np.isfinite(rewards))
+    assert np.all(np.isfinite(list(env.physical_state().values())))
+
+
+def test_each_lane_of_a_batch_is_the_single_ship(mariner):
+    engine = CourseKeepingEngine(mariner, 70)
+    keys = [int(np.random.default_rng(0).integers(2**63, endpoint=False)) + k for k in range(70)]
+    observations = engine.reset(keys)
+    alone = CourseKeepingEngine(mariner, 1)
+    lane = 66
+    single = alone.reset([keys[lane]])
+    for _ in range(300):
+        np.testing.assert_array_equal(observations[lane], single[0])
+        actions = np.stack([pd(observation) for observation in observations])
+        observations, rewards, *_ = engine.step(actions)
+        single, reward, *_ = alone.step(actions[lane : lane + 1])
+        assert rewards[lane] == reward[0]
+
+
+def test_a_finished_lane_stays_and_earns_nothing(mariner):
+    engine = CourseKeepingEngine(mariner, 3, CourseKeepingTask(episode_steps=5))
+    for _ in range(5):
+        *_, truncated = engine.step(np.zeros((3, 1)))
+    assert truncated.all()
+    before = engine.physical_state()
+    _, rewards, terminated, truncated = engine.step(np.ones((3, 1)))
+    assert not (rewards.any() or terminated.any() or truncated.any())
+    np.testing.assert_array_equal(engine.physical_state()["psi"], before["psi"])
+
+
+def test_each_lane_may_have_a_ship_of_its_own(mariner):
+    slow = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0007})
+    engine = CourseKeepingEngine([mariner, slow], 2)
+    engine.reset([1, 1])
+    for _ in range(20):
+        engine.step(np.full((2, 1), 0.5))
+    assert 0.0 < engine.physical_state()["r"][1] < 0.8 * engine.physical_state()["r"][0]
+
+
+def test_scales_follow_the_ship(mariner):
+    assert dict(zip(OBSERVATION_NAMES, observation_scales(mariner), strict=True)) == {
+        "heading_error_sin": 1.0,
+        "heading_error_cos": 1.0,
+        "yaw_rate": pytest.approx(7.7175 / 160.93),
+        "sway": 7.7175,
+        "surge": 7.7175,
+        "rudder": pytest.approx(np.radians(40)),
+        "last_command": pytest.approx(np.radians(40)),
+        "heading_error_integral": pytest.approx(np.radians(10) * 10 * 160.93 / 7.7175),
+    }
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"sea": "rugh"}, "sea: 'rugh' found"),
+        ({"model": "no-such-ship"}, "model"),
+        ({"dt": -1.0}, "dt: -1 found"),
+        ({"episode_steps": 0}, "episode_steps: 0 found"),
+        ({"max_heading_error_deg": 400.0}, "max_heading_error_deg: 400 found"),
+    ],
+)
+def test_wrong_arguments(options, message):
+    with pytest.raises(InputError, match=message):
+        make(**options)
+
+
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        (np.array([np.nan], dtype=np.float32), "action: nan found"),
+        (np.array([np.inf], dtype=np.float32), "action: inf found"),
+        (np.zeros(2, dtype=np.float32), r"shape \(2,\) found"),
+        (0.5, r"shape \(\) found"),
+    ],
+)
+def test_wrong_actions(action, message):
+    env = make().unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=message):
+        env.step(action)
+
+
+def test_wrong_batches(mariner):
+    engine = CourseKeepingEngine(mariner, 2)
+    with pytest.raises(InputError, match=r"actions: shape \(3, 1\)"):
+        engine.step(np.zeros((3, 1)))
+    with pytest.raises(InputError, match="nan found in lane 1"):
+        engine.step([[0.0], [np.nan]])
+    with pytest.raises(InputError, match="num_envs: 0"):
+        CourseKeepingEngine(mariner, 0)
+    with pytest.raises(InputError, match="3 found, expected 1 or one for each of 2"):
+        CourseKeepingEngine([mariner] * 3, 2)
