@@ -387,7 +387,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         engine._actions[0, 0] = command
         engine._advance()
         reward, heading, rudder, rate, end, terminated, truncated, extrapolating, distance, error = (
-            engine._states[0, rows.OUTCOME :: layout.LANES].tolist()
+            engine._states[0, rows.OUTCOME : rows.OBSERVED : layout.LANES].tolist()
         )
         info = {
             "reward_heading": heading,

@@ -33,7 +33,9 @@ from .course_keeping_rows import (
     LARGEST_ERROR,
     LAST_COMMAND,
     LAST_RUDDER,
+    N_OBSERVATIONS,
     NEXT_CHANGE,
+    OBSERVED,
     RATE_REWARD,
     RATE_WEIGHT,
     REWARD,
@@ -54,20 +56,32 @@ from .trigonometry import sin_cos, wrap
 
 
 @inlined
-def observe(observations: Any, tile: int, lane: int, state: Any, settings: Any, ship: Any) -> None:
-    """Write what the autopilot sees of one ship, within the bounds of the observation space."""
-    speed = ship[SERVICE_SPEED + lane]
-    limit = ship[RUDDER_LIMIT + lane]
-    sine, cosine = sin_cos(state[SET_POINT + lane] - state[PSI + lane])
-    seen = observations[tile, lane]
-    seen[0] = clip(sine, -1.0, 1.0)
-    seen[1] = clip(cosine, -1.0, 1.0)
-    seen[2] = clip(state[R + lane] * ship[LENGTH + lane] / speed, -5.0, 5.0)
-    seen[3] = clip(state[V + lane] / speed, -2.0, 2.0)
-    seen[4] = clip(state[U + lane] / speed, -2.0, 3.0)
-    seen[5] = clip(state[DELTA + lane] / limit, -1.0, 1.0)
-    seen[6] = state[LAST_COMMAND + lane]
-    seen[7] = clip(state[INTEGRAL + lane] / settings[INTEGRAL_SCALE], -1.0, 1.0)
+def observe(state: Any, settings: Any, ship: Any, lanes: int) -> None:
+    """Work out what the autopilots see, within the bounds of the observation space."""
+    sine, cosine, yaw_rate, sway, surge, rudder, command, integral = (
+        OBSERVED, OBSERVED + LANES, OBSERVED + 2 * LANES, OBSERVED + 3 * LANES,
+        OBSERVED + 4 * LANES, OBSERVED + 5 * LANES, OBSERVED + 6 * LANES, OBSERVED + 7 * LANES,
+    )  # fmt: skip
+    per_reach = 1.0 / settings[INTEGRAL_SCALE]
+    for lane in range(lanes):
+        per_speed = 1.0 / ship[SERVICE_SPEED + lane]
+        sin, cos = sin_cos(state[SET_POINT + lane] - state[PSI + lane])
+        state[sine + lane] = clip(sin, -1.0, 1.0)
+        state[cosine + lane] = clip(cos, -1.0, 1.0)
+        state[yaw_rate + lane] = clip(state[R + lane] * ship[LENGTH + lane] * per_speed, -5.0, 5.0)
+        state[sway + lane] = clip(state[V + lane] * per_speed, -2.0, 2.0)
+        state[surge + lane] = clip(state[U + lane] * per_speed, -2.0, 3.0)
+        state[rudder + lane] = clip(state[DELTA + lane] / ship[RUDDER_LIMIT + lane], -1.0, 1.0)
+        state[command + lane] = state[LAST_COMMAND + lane]
+        state[integral + lane] = clip(state[INTEGRAL + lane] * per_reach, -1.0, 1.0)
+
+
+@inlined
+def show(state: Any, observations: Any, lanes: int) -> None:
+    """Hand the observations over, one row a ship."""
+    for lane in range(lanes):
+        for k in range(N_OBSERVATIONS):
+            observations[lane, k] = state[OBSERVED + k * LANES + lane]
 
 
 @inlined
@@ -109,7 +123,8 @@ def reset(states: Any, keys: Any, settings: Any, ships: Any, observations: Any, 
         for lane in range(LANES):
             if which[tile, lane]:
                 begin(states[tile], lane, keys, tile, settings, ship)
-                observe(observations, tile, lane, states[tile], settings, ship)
+        observe(states[tile], settings, ship, LANES)
+        show(states[tile], observations[tile], LANES)
 
 
 @inlined
@@ -214,5 +229,5 @@ def step(
         for lane in range(lanes):
             if state[STEPS + lane] >= state[NEXT_CHANGE + lane] and state[ENDED + lane] == 0.0:
                 change_set_point(state, lane, keys, tile, settings)
-        for lane in range(lanes):
-            observe(observations, tile, lane, state, settings, ship)
+        observe(state, settings, ship, lanes)
+        show(state, observations[tile], lanes)

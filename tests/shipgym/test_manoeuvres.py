@@ -31,7 +31,7 @@ def test_port_first_starts_to_port(mariner):
 
 @pytest.fixture(scope="module")
 def triangle() -> Trial:
-    """A zigzag drawn by hand: 1 deg/s, rudder at once, reversals at 10 and -10, turning back at 16 and -18."""
+    """A zigzag drawn by hand, 1 deg/s: reversals at 10 and -10 deg, the heading turns back at 16 and -18."""
     corners = np.array([(0, 0), (5, 0), (21, 16), (55, -18), (100, 27)], dtype=float)
     t = np.arange(0.0, 100.5, 0.5)
     psi = np.interp(t, *corners.T)
