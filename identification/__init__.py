@@ -1,0 +1,33 @@
+"""Identification of manoeuvring models from recorded trials."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from identification.lssvm import LSSVM, TruncatedLSSVM
+    from identification.pipeline import IdentificationResult, identify
+    from identification.samples import Samples, build_samples
+
+_HOME = {
+    "LSSVM": "identification.lssvm",
+    "IdentificationResult": "identification.pipeline",
+    "Samples": "identification.samples",
+    "TruncatedLSSVM": "identification.lssvm",
+    "build_samples": "identification.samples",
+    "identify": "identification.pipeline",
+}
+
+__all__ = ["LSSVM", "IdentificationResult", "Samples", "TruncatedLSSVM", "build_samples", "identify"]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used: scikit-learn takes a second."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'identification' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

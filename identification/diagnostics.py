@@ -1,0 +1,213 @@
+"""What the data can tell and what the fit left over: excitation, collinearity, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.samples import Samples
+from identification.uncertainty import residuals
+from shipgym.errors import InputError
+from shipgym.models.structures import FORCE_OF_EQUATION, Structure
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
+COLLINEAR = 0.98  # correlation of two features
+
+
+@dataclass(frozen=True)
+class EquationDiagnostics:
+    """Fit of one equation of motion.
+
+    Attributes
+    ----------
+    samples, terms : int
+        Rows and columns of the regression.
+    rank : int
+        Directions that were kept.
+    condition_number : float
+        Largest by smallest singular value of the features, each scaled to a root mean square of 1.
+    r_squared : float
+        Share of the change of velocity that is explained.
+    residual_rms : float
+        Root mean square of what is left of the change of velocity over a window, SI units.
+    residual_autocorrelation : tuple of float
+        Of the residuals at lags of 1 to 10 windows, without overlap.
+    variance_inflation : dict of str to float
+        By term: how much the others increase its variance.
+    collinear_pairs : tuple of (str, str, float)
+        Pairs of terms with a correlation beyond 0.98, and the correlation.
+    dropped : tuple of tuple of str
+        Terms that make up each dropped direction.
+    """
+
+    samples: int
+    terms: int
+    rank: int
+    condition_number: float
+    r_squared: float
+    residual_rms: float
+    residual_autocorrelation: tuple[float, ...]
+    variance_inflation: dict[str, float]
+    collinear_pairs: tuple[tuple[str, str, float], ...]
+    dropped: tuple[tuple[str, ...], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return asdict(self)
+
+
+def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse trials from which nothing can be identified.
+
+    Raises
+    ------
+    InputError
+        For no trial, a missing channel, or rudders that never move.
+    """
+    if not trials:
+        raise InputError(
+            'trials: none is marked use = "fit", expected at least one; mark the trials to identify from'
+        )
+    for trial in trials:
+        for channel in structure.required_channels:
+            if channel not in trial:
+                raise InputError(
+                    f"trial {trial.name!r}: channel {channel!r} is missing, structure {structure.name!r} "
+                    f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
+                    'out (use = "skip")'
+                )
+    if "delta" not in structure.required_channels:
+        return
+    still = [trial for trial in trials if np.ptp(trial["delta"]) < LEAST_RUDDER]
+    if len(still) == len(trials):
+        angle = np.degrees(np.mean(still[0]["delta"]))
+        raise InputError(
+            f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout, expected it to move: "
+            "nothing is excited and these coefficients cannot be identified; add a trial in which the "
+            "rudder moves, such as a zigzag"
+        )
+
+
+def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse a regression with fewer rows than terms.
+
+    Raises
+    ------
+    InputError
+        Naming the shortest trial.
+    """
+    terms = max(len(structure.terms(q)) for q in structure.equations)
+    if len(samples) <= terms:
+        shortest = min(trials, key=len)
+        raise InputError(
+            f"trial {shortest.name!r}: {len(shortest)} samples found, in all {len(samples)} rows for {terms} "
+            "coefficients in one equation, expected several times as many; add trials, longer or sampled "
+            "more often"
+        )
+
+
+def diagnose(
+    machines: Mapping[str, LSSVM | TruncatedLSSVM], samples: Samples, structure: Structure
+) -> dict[str, EquationDiagnostics]:
+    """Diagnostics of each equation.
+
+    Parameters
+    ----------
+    machines : mapping of str to LSSVM or TruncatedLSSVM
+        Fitted to `samples`, by equation.
+    samples : Samples
+        The regression.
+    structure : Structure
+        Names the terms.
+
+    Returns
+    -------
+    dict of str to EquationDiagnostics
+        By equation: `u`, `v`, `r`.
+    """
+    errors = residuals(machines, samples)
+    apart = _without_overlap(samples)
+    found = {}
+    for q, machine in machines.items():
+        names = [f"{FORCE_OF_EQUATION[q]}_{term.name}" for term in structure.terms(q)]
+        features, target, error = samples.features[q], samples.targets[q], errors[q]
+        size = np.sqrt(np.mean(features**2, axis=0))
+        scaled = features / np.where(size > 0.0, size, 1.0)
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        groups = getattr(machine, "collinear_groups_", ())
+        found[q] = EquationDiagnostics(
+            samples=len(target),
+            terms=len(names),
+            rank=int(getattr(machine, "rank_", len(singular))),
+            condition_number=float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0])),
+            r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
+            residual_rms=float(np.sqrt(np.mean(error**2))),
+            residual_autocorrelation=autocorrelation(error[apart], 10),
+            variance_inflation=dict(zip(names, variance_inflation(scaled).tolist(), strict=True)),
+            collinear_pairs=_collinear_pairs(scaled, names),
+            dropped=tuple(tuple(names[i] for i in group) for group in groups),
+        )
+    return found
+
+
+def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
+    """Autocorrelation at lags of 1, 2, ... samples.
+
+    Parameters
+    ----------
+    values : array of shape (n_samples,)
+        A series.
+    lags : int
+        How many lags at most.
+
+    Returns
+    -------
+    tuple of float
+        Shorter for a short series.
+    """
+    centred = values - values.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return ()
+    return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
+
+
+def variance_inflation(scaled: Floats) -> Floats:
+    """Factor by which the other features increase the variance of each coefficient.
+
+    Parameters
+    ----------
+    scaled : array of shape (n_samples, n_features)
+        Features with a root mean square of 1.
+
+    Returns
+    -------
+    array of shape (n_features,)
+        1 for a feature orthogonal to the others.
+    """
+    moment = scaled.T @ scaled / len(scaled)
+    factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)
+    return factors
+
+
+def _without_overlap(samples: Samples) -> NDArray[np.int64]:
+    """Rows whose windows do not overlap."""
+    step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
+    return np.arange(0, len(samples), step)
+
+
+def _collinear_pairs(scaled: Floats, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
+    moment = scaled.T @ scaled / len(scaled)
+    first, second = np.nonzero(np.triu(np.abs(moment) > COLLINEAR, k=1))
+    return tuple(
+        (names[i], names[j], float(moment[i, j]))
+        for i, j in zip(first.tolist(), second.tolist(), strict=True)
+    )

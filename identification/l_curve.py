@@ -1,0 +1,113 @@
+"""How many singular directions to keep: the L-curve and generalised cross-validation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtri
+
+Floats = NDArray[np.float64]
+
+#: A rank is not taken if its residuals exceed those of full rank by more than chance does at this level.
+SIGNIFICANCE = 0.1
+
+
+@dataclass(frozen=True)
+class LCurve:
+    """Norms of residual and solution of the solutions of rank 1, 2, ...
+
+    Attributes
+    ----------
+    residual_norm : array of shape (n_ranks,)
+        Euclidean norm of the residuals of the fit of rank 1 to n_ranks.
+    solution_norm : array of shape (n_ranks,)
+        Norm of the scaled coefficients.
+    """
+
+    residual_norm: Floats
+    solution_norm: Floats
+
+
+def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outside: float) -> LCurve:
+    """Norms for every rank from one singular value decomposition.
+
+    Parameters
+    ----------
+    singular_values : array of shape (n_ranks,)
+        Of the scaled features, descending.
+    projections : array of shape (n_ranks,)
+        Targets in the left singular vectors, U'y.
+    filters : array of shape (n_ranks,)
+        s / (s^2 + 1/C).
+    outside : float
+        Squared norm of the part of the targets that no direction reaches.
+
+    Returns
+    -------
+    LCurve
+    """
+    missed = projections**2
+    explained_miss = (projections * (1.0 - singular_values * filters)) ** 2
+    total = missed.sum() - np.cumsum(missed) + np.cumsum(explained_miss) + max(outside, 0.0)
+    solution = np.cumsum((filters * projections) ** 2)
+    return LCurve(np.sqrt(np.maximum(total, 0.0)), np.sqrt(solution))
+
+
+def corner_rank(curve: LCurve, n_samples: int) -> int:
+    """Rank at the corner of the L-curve, Xu 2020, section 3.2.
+
+    The corner is the point farthest towards the origin of the doubly logarithmic curve, where a line of
+    slope -1 touches it (Reginska 1996, SIAM J. Sci. Comput. 17(3)). Unlike the point of largest curvature
+    this one is well defined on the few points of a truncated decomposition, and can be an end: data
+    without noise keep every direction. A corner whose residuals are larger than those of full rank by more
+    than chance (F test) is passed over for the first rank where they are not: what the data do
+    determine is not dropped.
+
+    Parameters
+    ----------
+    curve : LCurve
+        Norms by rank.
+    n_samples : int
+        Number of samples behind the residuals.
+
+    Returns
+    -------
+    int
+        1 to n_ranks.
+    """
+    residual, solution = curve.residual_norm, curve.solution_norm
+    full = len(residual)
+    floor = max(np.finfo(float).eps * float(residual[0]), np.finfo(float).tiny)
+    height = np.log(np.maximum(residual, floor)) + np.log(np.maximum(solution, np.finfo(float).tiny))
+    corner = int(np.argmin(height)) + 1
+    freedom = n_samples - full
+    if freedom < 1:
+        return corner
+    dropped = np.arange(full - 1, -1, -1)
+    quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - SIGNIFICANCE)
+    allowed = 1.0 + dropped / freedom * quantile
+    adequate = residual**2 <= allowed * max(residual[-1] ** 2, floor**2)
+    return int(np.flatnonzero(adequate[corner - 1 :])[0]) + corner
+
+
+def gcv_rank(curve: LCurve, n_samples: int) -> int:
+    """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979).
+
+    Parameters
+    ----------
+    curve : LCurve
+        Norms by rank.
+    n_samples : int
+        Number of samples.
+
+    Returns
+    -------
+    int
+        1 to n_ranks, below the number of samples where possible.
+    """
+    freedom = n_samples - np.arange(1, len(curve.residual_norm) + 1)
+    with np.errstate(divide="ignore"):
+        score = np.where(freedom > 0, curve.residual_norm**2 / np.maximum(freedom, 1) ** 2, np.inf)
+    return int(np.argmin(score)) + 1

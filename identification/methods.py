@@ -1,0 +1,105 @@
+"""Methods of identification: which machine is fitted to the regression of each equation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.samples import Samples
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+Machine = LSSVM | TruncatedLSSVM
+
+
+@dataclass(frozen=True)
+class Method:
+    """A way to fit the regressions.
+
+    Attributes
+    ----------
+    name : str
+        As `identify` knows it.
+    machine : callable
+        Makes an unfitted machine from settings.
+    regularised : bool
+        Whether the guard against models that run away may penalise it.
+    """
+
+    name: str
+    machine: Callable[..., Machine]
+    regularised: bool
+
+
+def _least_squares(**settings: Any) -> Machine:
+    return TruncatedLSSVM(selection="full", fit_intercept=False, **settings)
+
+
+def _ls_svm(C: float = 1e6, **settings: Any) -> Machine:
+    return LSSVM(C=C, fit_intercept=False, **settings)
+
+
+def _tls_svm(**settings: Any) -> Machine:
+    return TruncatedLSSVM(fit_intercept=False, **settings)
+
+
+METHODS = {
+    method.name: method
+    for method in (
+        Method("ls", _least_squares, regularised=False),
+        Method("ls-svm", _ls_svm, regularised=True),
+        Method("tls-svm", _tls_svm, regularised=True),
+    )
+}
+
+
+def get_method(name: str) -> Method:
+    """A method by name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    if name not in METHODS:
+        raise InputError(f"method: {name!r} found, expected one of {', '.join(METHODS)}")
+    return METHODS[name]
+
+
+def fit_all(machine: Callable[[], Machine], samples: Samples) -> dict[str, Machine]:
+    """One machine for each equation, fitted."""
+    return {q: machine().fit(samples.features[q], samples.targets[q]) for q in samples.features}
+
+
+def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> dict[str, Machine]:
+    """Machines whose terms are held back by what they do in a hard turn.
+
+    Ridge regression in which each feature is scaled by its size in a hard turn over a window: the
+    penalty falls on what is invisible in the data and large in the turn.
+
+    Parameters
+    ----------
+    samples : Samples
+        The regression.
+    sizes : dict of str to array of shape (n_terms,)
+        Size of each term in a hard turn (`guard.hard_turn_features`).
+    strength : float
+        Of the penalty, relative to the terms' contribution in the hard turn.
+
+    Returns
+    -------
+    dict of str to LSSVM
+    """
+    window = float(np.mean(samples.duration))
+    C = 1.0 / (len(samples) * strength**2)
+    return {
+        q: LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(
+            samples.features[q], samples.targets[q]
+        )
+        for q in samples.features
+    }

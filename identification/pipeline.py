@@ -1,0 +1,247 @@
+"""From trials to a ship model: `identify`."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import shipgym
+from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
+from identification.gear import estimated_gear
+from identification.guarded_fit import guarded_fit
+from identification.methods import get_method
+from identification.prediction import predict, trial_metrics
+from identification.samples import build_samples
+from identification.threads import on_one_thread
+from identification.uncertainty import coefficient_covariance, joint_covariance
+from shipgym.errors import InputError
+from shipgym.models import Envelope, ShipModel, get_structure
+from shipgym.models.model_file import write_json
+from shipgym.particulars import Particulars
+from shipgym.steering import SteeringGear
+from shipgym.trial import Trial
+
+ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
+MEMORY = 1.0  # of residuals, in the time to sail one ship length
+
+
+@dataclass(frozen=True, eq=False)
+class IdentificationResult:
+    """An identified model and how it came about.
+
+    Attributes
+    ----------
+    model : ShipModel
+        With covariance, envelope and provenance.
+    stable : bool
+        Whether the model passed every simulation of the guard; if not, its predictions are not to be used.
+    metrics : dict
+        For each trial by its name the errors of the open-loop prediction and the manoeuvre's indices.
+    diagnostics : dict of str to EquationDiagnostics
+        Of each equation: `u`, `v`, `r`.
+    predictions : dict of str to Trial or None
+        The open-loop predictions by trial; None where the model ran away.
+    """
+
+    model: ShipModel
+    stable: bool
+    metrics: dict[str, Any]
+    diagnostics: dict[str, EquationDiagnostics]
+    predictions: dict[str, Trial | None]
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """Hydrodynamic derivatives by name, prime system, rudder positive to starboard."""
+        return self.model.coefficients
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard error of each coefficient, prime system."""
+        covariance = self.model.covariance
+        if covariance is None:
+            return dict.fromkeys(self.coefficients, float("nan"))
+        return dict(zip(self.coefficients, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+
+    def summary(self) -> str:
+        """Table of all coefficients and of the inertia they are based on.
+
+        Returns
+        -------
+        str
+            Name, value and standard error (prime system, 1e-5) and t; inertia that was not given is
+            marked as estimated.
+        """
+        from identification.summary import summary_table
+
+        return summary_table(self)
+
+    def save(self, folder: str | Path) -> None:
+        """Write `model.json` and `metrics.json`, each whole or not at all.
+
+        Parameters
+        ----------
+        folder : str or Path
+            Created where it does not exist.
+
+        Raises
+        ------
+        InputError
+            Where it cannot be written.
+        """
+        folder = Path(folder)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            with tempfile.TemporaryDirectory(prefix=".identified-", dir=folder) as draft:
+                self.model.save(Path(draft) / "model.json")
+                write_json(self.metrics, Path(draft) / "metrics.json")
+                for name in ("model.json", "metrics.json"):
+                    (Path(draft) / name).replace(folder / name)
+        except OSError as error:
+            raise InputError(
+                f"{folder}: cannot be written ({error.strerror}); choose another folder"
+            ) from error
+
+
+@on_one_thread
+def identify(
+    trials: Sequence[Trial],
+    structure: str = "abkowitz",
+    method: str = "tls-svm",
+    samples: str = "spline",
+    particulars: Particulars | Mapping[str, Any] | None = None,
+    steering: SteeringGear | None = None,
+    *,
+    name: str | None = None,
+    window: int | None = None,
+    smooth: bool = True,
+    guarded: bool = True,
+    **settings: Any,
+) -> IdentificationResult:
+    """Identify a manoeuvring model from recorded trials.
+
+    Trials marked `validate` are predicted, and influence nothing else.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Those with `use` "fit" are fitted; they need the channels u, v, r and delta.
+    structure : str
+        Terms of the model.
+    method : {"tls-svm", "ls-svm", "ls"}
+        Truncated LS-SVM, LS-SVM, or least squares.
+    samples : {"spline", "integral", "euler"}
+        How the samples become a regression.
+    particulars : Particulars or mapping
+        Of the ship; at least the length, and what is needed to estimate mass and added mass.
+        The service speed is estimated from the start of the trials where absent.
+    steering : SteeringGear, optional
+        Estimated from the rudders of the trials where absent.
+    name : str, optional
+        Of the model; by default the ship's.
+    window : int, optional
+        Sampling steps over which the velocities are integrated; see `samples.build_samples`.
+    smooth : bool
+        Whether noisy channels are smoothed first.
+    guarded : bool
+        Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
+        is large in a hard turn and invisible in the data. The provenance tells what was done.
+    **settings
+        Of the machine: `rank`, `selection`, `C`, `scale`.
+
+    Returns
+    -------
+    IdentificationResult
+
+    Raises
+    ------
+    InputError
+        For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
+    """
+    chosen, table = get_method(method), get_structure(structure)
+    used = _used(trials)
+    check_trials(used, table)
+    ship = _ship(particulars, used)
+    regression = build_samples(used, table, ship, samples, window, steering, smooth)
+    check_samples(regression, used, table)
+    blank = ShipModel(
+        name=ship["name"] if name is None else name,
+        structure=structure,
+        particulars=ship,
+        steering=estimated_gear(used) if steering is None else steering,
+        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
+    )
+    fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
+    provenance = {
+        "software": f"shipgym {shipgym.__version__}",
+        "structure": structure,
+        "method": method,
+        "samples": samples,
+        "settings": {"window": window, "smooth": smooth, "guarded": guarded}
+        | {key: _plain(value) for key, value in settings.items()},
+        "steps_per_window": regression.window,
+        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
+        "guard": fit.report,
+        "stable": fit.stable,
+        "steering": "estimated" if steering is None else "given",
+        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in used],
+    }
+    memory = MEMORY * ship["length"] / ship["speed"]
+    covariance = coefficient_covariance(
+        joint_covariance(fit.machines, regression, memory), table.acceleration_matrix(ship)
+    )
+    model = replace(fit.model, covariance=covariance, provenance=provenance)
+    predictable = [trial for trial in trials if trial.use != "skip"]
+    predictions = {trial.name: predict(model, trial) for trial in predictable}
+    return IdentificationResult(
+        model=model,
+        stable=fit.stable,
+        metrics={"trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in predictable}},
+        diagnostics=diagnose(fit.machines, regression, table),
+        predictions=predictions,
+    )
+
+
+def _used(trials: Sequence[Trial]) -> list[Trial]:
+    """Trials to fit, after checking that names tell all trials apart."""
+    names = [trial.name for trial in trials]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"trials: {len(names)} trials found, two of them named {twice[0]!r}, expected different names; "
+            "rename one with trial.with_(name=...)"
+        )
+    return [trial for trial in trials if trial.use == "fit"]
+
+
+def _ship(particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial]) -> Particulars:
+    """Particulars with speed, inertia and added mass estimated where absent."""
+    if particulars is None:
+        raise InputError(
+            "particulars: None found, expected those of the ship, at least its length and its mass and "
+            "added mass or what they are estimated from: beam, draught, block_coefficient; for example "
+            'identify(trials, particulars={"length": 7.0, "beam": 1.27, "draught": 0.455, '
+            '"block_coefficient": 0.81}), or ship.particulars of a ship file'
+        )
+    ship = particulars if isinstance(particulars, Particulars) else Particulars.from_mapping(particulars)
+    if ship.speed is None:
+        speed = float(np.median([np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]))
+        if speed <= 0.0:
+            raise InputError(
+                f"trial {trials[0].name!r}: starts at rest, expected way on the ship; give the service "
+                "speed in the particulars (speed, m/s)"
+            )
+        ship = replace(ship, speed=speed, estimated=ship.estimated | {"speed"})
+    return ship.completed()
+
+
+def _plain(value: Any) -> Any:
+    """A setting as JSON knows it."""
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return np.asarray(value).tolist() if isinstance(value, np.ndarray | list | tuple) else value

@@ -1,0 +1,261 @@
+"""From sampled trials to a regression: the Euler, integral and spline sample structures.
+
+For accelerations that are linear in unknown parameters, xdot = P(x, rudder) theta, each row says
+x(t_k+w) - x(t_k) = (integral of P over the window) theta. Euler takes P at the start of each step (ESSI of
+Cao 2015), the integral structure the trapezoid rule (ISSI of Cao 2015), the spline structure Gauss
+quadrature on splines through the samples, broken where the rudder has corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from identification import preprocess
+from identification.rudder import Rudder, rebuild, straight
+from shipgym.errors import InputError
+from shipgym.models.structures import Structure
+from shipgym.particulars import Particulars
+from shipgym.steering import SteeringGear
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+Channels = Mapping[str, Floats]
+
+SAMPLE_STRUCTURES = ("euler", "integral", "spline")
+DEGREE = 3
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A regression for each equation of motion, all with the same rows.
+
+    Attributes
+    ----------
+    features : dict of str to array of shape (n_rows, n_terms)
+        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`).
+    targets : dict of str to array of shape (n_rows,)
+        Change of the velocity over the window.
+    start : array of shape (n_rows,)
+        Time at which the window begins, s.
+    duration : array of shape (n_rows,)
+        Length of the window, s.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    window : int
+        Steps per window of the longest-windowed trial.
+    """
+
+    features: dict[str, Floats]
+    targets: dict[str, Floats]
+    start: Floats
+    duration: Floats
+    trial: NDArray[np.int64]
+    window: int
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def build_samples(
+    trials: Sequence[Trial],
+    structure: Structure,
+    particulars: Particulars,
+    samples: str = "spline",
+    window: int | None = None,
+    gear: SteeringGear | None = None,
+    smooth: bool = True,
+) -> Samples:
+    """Stack the regressions of all trials.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the channels the structure requires; their time steps may differ.
+    structure : Structure
+        Gives the terms.
+    particulars : Particulars
+        Length and service speed.
+    samples : {"euler", "integral", "spline"}
+        Sample structure.
+    window : int, optional
+        Sampling steps per row; windows overlap by half. By default 1 for data without noise, and as many
+        as the noise asks for otherwise, up to a third of the time to sail one ship length.
+    gear : SteeringGear, optional
+        Helps to rebuild the rudder between samples (spline only).
+    smooth : bool
+        Whether channels with noise are smoothed before the terms are formed.
+
+    Returns
+    -------
+    Samples
+
+    Raises
+    ------
+    InputError
+        For a window or sample structure that does not exist.
+    """
+    if samples not in SAMPLE_STRUCTURES:
+        raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
+    if window is not None and window < 1:
+        raise InputError(f"window: {window} found, expected a number of sampling steps, at least 1")
+    parts = []
+    for index, trial in enumerate(trials):
+        steps = default_window(trial, particulars) if window is None else window
+        if steps >= len(trial):
+            raise InputError(
+                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of {steps} "
+                "steps; give a smaller window"
+            )
+        parts.append(_one_trial(trial, index, structure, particulars, samples, steps, gear, smooth))
+    return Samples(
+        {q: np.concatenate([part.features[q] for part in parts]) for q in structure.equations},
+        {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.equations},
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.duration for part in parts]),
+        np.concatenate([part.trial for part in parts]),
+        max(part.window for part in parts),
+    )
+
+
+def default_window(trial: Trial, particulars: Particulars) -> int:
+    """Sampling steps over which a trial's velocities change by much more than their noise.
+
+    Parameters
+    ----------
+    trial : Trial
+        With u, v, r.
+    particulars : Particulars
+        Length and service speed.
+
+    Returns
+    -------
+    int
+        1 without noise; at most a third of the time to sail one ship length.
+    """
+    step = float(np.median(np.diff(trial.t)))
+    longest = max(int(LONGEST_WINDOW * particulars["length"] / particulars["speed"] / step), 1)
+    longest = min(longest, max(len(trial) // 20, 1))
+    needed = 1
+    for channel in "uvr":
+        ratio = preprocess.noise_ratio(trial.t, trial[channel])
+        while ratio > preprocess.NOISY and needed < longest:
+            needed += 1
+            ratio = preprocess.noise_ratio(trial.t, trial[channel], needed)
+    return needed
+
+
+def _one_trial(
+    trial: Trial,
+    index: int,
+    structure: Structure,
+    particulars: Particulars,
+    samples: str,
+    window: int,
+    gear: SteeringGear | None,
+    smooth: bool,
+) -> Samples:
+    t = trial.t
+    channels = {name: trial[name] for name in structure.required_channels}
+    if smooth:
+        channels = {
+            name: values if name == "delta" else preprocess.smooth(t, values)
+            for name, values in channels.items()
+        }
+
+    def terms(equation: str, values: Channels) -> Floats:
+        return structure.features(equation, values, particulars)
+
+    if samples == "spline":
+        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
+        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)
+        integrals = _spline_integrals(t, channels, structure, terms, rudder)
+    else:
+        integrals = {}
+        for q in structure.equations:
+            values = terms(q, channels)
+            mean = values[:-1] if samples == "euler" else 0.5 * (values[:-1] + values[1:])
+            integrals[q] = mean * np.diff(t)[:, None]
+    first = np.arange(0, len(t) - window, max(window // 2, 1))
+    last = first + window
+    features, targets = {}, {}
+    for q, steps in integrals.items():
+        summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+        features[q] = steps if window == 1 else summed[last] - summed[first]
+        targets[q] = channels[q][last] - channels[q][first]
+    return Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+
+
+def _spline_integrals(
+    t: Floats,
+    channels: Channels,
+    structure: Structure,
+    terms: Callable[[str, Channels], Floats],
+    rudder: Rudder,
+) -> dict[str, Floats]:
+    """Integral of the terms over each sampling step, arrays of shape (n_samples - 1, n_terms)."""
+    edges = np.union1d(t, rudder.corners)
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    times = middle[:, None] + half[:, None] * NODES
+    at_nodes: dict[str, Floats] = {}
+    for name, values in channels.items():
+        between = rudder if name == "delta" else broken_spline(t, values, rudder)
+        at_nodes[name] = between(times.ravel())
+    step = np.searchsorted(t, middle, side="right") - 1
+    starts = np.flatnonzero(np.diff(step, prepend=-1))
+    integrals = {}
+    for q in structure.equations:
+        values = terms(q, at_nodes).reshape(*times.shape, -1)
+        pieces = half[:, None] * np.einsum("ijk,j->ik", values, WEIGHTS)
+        integrals[q] = np.add.reduceat(pieces, starts, axis=0)
+    return integrals
+
+
+def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
+    """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
+
+    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the
+    acceleration of the rudder jumps, the third does.
+
+    Parameters
+    ----------
+    t, values : array of shape (n_samples,)
+        s and the unit of the channel.
+    rudder : Rudder
+        With the corners.
+
+    Returns
+    -------
+    BSpline
+    """
+    if len(t) <= DEGREE:
+        return make_interp_spline(t, values, k=1)
+    interior = list(range(2, len(t) - 2))  # not-a-knot ends
+    broken: list[float] = []
+    for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
+        multiplicity = DEGREE - 1 - int(smoothness)
+        nearest = sorted(interior, key=lambda i: abs(t[i] - corner))[:multiplicity]
+        after = int(np.searchsorted(t, corner))
+        if any(abs(i - after) > 2 for i in nearest) or len(nearest) < multiplicity:
+            continue  # too close to another corner or to an end
+        kept = [i for i in interior if i not in nearest]
+        if _solvable(t, _knots(t, kept, [*broken, *[corner] * multiplicity])):
+            interior, broken = kept, [*broken, *[corner] * multiplicity]
+    return make_interp_spline(t, values, k=DEGREE, t=_knots(t, interior, broken))
+
+
+def _knots(t: Floats, interior: Sequence[int], broken: Sequence[float]) -> Floats:
+    inner = np.sort(np.concatenate([t[list(interior)], np.asarray(broken, dtype=float)]))
+    return np.concatenate([np.repeat(t[0], DEGREE + 1), inner, np.repeat(t[-1], DEGREE + 1)])
+
+
+def _solvable(t: Floats, knots: Floats) -> bool:
+    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
+    inner = slice(1, len(t) - 1)
+    return bool(np.all((knots[: len(t)][inner] < t[inner]) & (t[inner] < knots[DEGREE + 1 :][inner])))

@@ -1,0 +1,84 @@
+"""The table of coefficients that `IdentificationResult.summary` prints."""
+
+from __future__ import annotations
+
+from io import StringIO
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from shipgym.particulars import ADDED_MASSES
+
+if TYPE_CHECKING:
+    from identification.pipeline import IdentificationResult
+
+INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
+PRIME = 1e-5
+WIDTH = 100
+
+
+def summary_table(result: IdentificationResult) -> str:
+    """Coefficients with standard error and t, inertia with what was estimated, and the verdict."""
+    console = Console(file=StringIO(), width=WIDTH, color_system=None)
+    verdict = "stable" if result.stable else "NOT STABLE: its predictions run away and are not to be used"
+    provenance = result.model.provenance or {}
+    console.print(
+        f"{result.model.name}: {provenance.get('structure')} by {provenance.get('method')}, "
+        f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
+    )
+    console.print(_coefficients(result), _inertia(result), _equations(result))
+    file = console.file
+    assert isinstance(file, StringIO)
+    return file.getvalue()
+
+
+def _coefficients(result: IdentificationResult) -> Table:
+    table = Table(title="Hydrodynamic derivatives, prime system, 1e-5", title_justify="left")
+    table.add_column("name")
+    for heading in ("value", "standard error", "t"):
+        table.add_column(heading, justify="right")
+    for name, error in result.standard_errors.items():
+        value = result.coefficients[name]
+        t = f"{value / error:.1f}" if error > 0.0 else "-"
+        table.add_row(name, f"{value / PRIME:.2f}", f"{error / PRIME:.2g}", t)
+    return table
+
+
+def _inertia(result: IdentificationResult) -> Table:
+    ship = result.model.particulars
+    table = Table(title="Inertia and service speed", title_justify="left")
+    for heading in ("name", "value", "unit", "source"):
+        table.add_column(heading, justify="right" if heading == "value" else "left")
+    units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
+    for name in INERTIA + ADDED_MASSES:
+        value = ship[name] / PRIME if name in ADDED_MASSES else ship[name]
+        source = "estimated" if name in ship.estimated else "given"
+        table.add_row(name, f"{value:.6g}", units.get(name, "1e-5"), source)
+    gear = result.model.steering
+    source = (result.model.provenance or {}).get("steering", "given")
+    for name, value, unit in (
+        ("rudder limit", gear.rudder_limit_deg, "deg"),
+        ("rudder rate", gear.rudder_rate_deg_s, "deg/s"),
+        ("rudder lag", gear.time_constant, "s"),
+    ):
+        table.add_row(name, f"{value:.4g}", unit, source)
+    return table
+
+
+def _equations(result: IdentificationResult) -> Table:
+    table = Table(title="Fit of the equations", title_justify="left")
+    table.add_column("equation")
+    for heading in ("rows", "terms", "rank", "condition", "R2", "residual rms"):
+        table.add_column(heading, justify="right")
+    for name, fit in result.diagnostics.items():
+        table.add_row(
+            {"u": "surge", "v": "sway", "r": "yaw"}.get(name, name),
+            str(fit.samples),
+            str(fit.terms),
+            str(fit.rank),
+            f"{fit.condition_number:.0f}",
+            f"{fit.r_squared:.5f}",
+            f"{fit.residual_rms:.2e}",
+        )
+    return table

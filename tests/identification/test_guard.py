@@ -1,0 +1,89 @@
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification import IdentificationResult, guarded_fit, identify
+from identification.guard import hard_turn_features, reasons_unstable
+from shipgym import ShipModel, Trial
+from shipgym.manoeuvres import zigzag
+
+
+def runaway(model: ShipModel) -> ShipModel:
+    """The ship with yaw damping turned into its opposite."""
+    return replace(model, coefficients=model.coefficients | {"N_r": -model.coefficients["N_r"]})
+
+
+def test_the_reference_ship_passes(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    assert reasons_unstable(mariner, [cao_zigzag]) == []
+
+
+def test_a_ship_that_runs_away_is_found_with_the_reason(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    reasons = reasons_unstable(runaway(mariner), [cao_zigzag])
+    assert "trial 'zigzag_15_15', open loop" in reasons[0]
+    assert any("turning circle" in reason for reason in reasons_unstable(runaway(mariner), []))
+
+
+def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
+    p = mariner.particulars
+    sizes = hard_turn_features(mariner.table, p)
+    names = [term.name for term in mariner.table.terms("r")]
+    speed = 0.47 * p["speed"]
+    assert sizes["r"][names.index("d")] == pytest.approx(np.radians(35.0) * speed**2)
+    assert sizes["r"][names.index("r")] == pytest.approx(0.8 * speed**2 / p["length"])
+
+
+@pytest.fixture(scope="module")
+def weak_trials(mariner: ShipModel, record: Any) -> list[Trial]:
+    """Small zigzags with much noise: too little to know what a hard turn does."""
+    return [
+        record(
+            zigzag(mariner, angle, angle, duration=300, dt=0.1),
+            every=20,
+            noise=4.0,
+            seed=seed,
+            name=f"weak{seed}",
+        )
+        for seed, angle in ((1, 5), (2, 7))
+    ]
+
+
+def test_a_fit_that_runs_away_is_held_and_says_so(mariner: ShipModel, weak_trials: list[Trial]) -> None:
+    plain = identify(weak_trials, particulars=mariner.particulars, guarded=False)
+    assert not plain.stable
+    assert plain.model.provenance is not None
+    assert plain.model.provenance["guard"]["decision"] == "runs away, not guarded"
+    assert "NOT STABLE" in plain.summary()
+    held = identify(weak_trials, particulars=mariner.particulars)
+    assert held.stable
+    assert held.model.provenance is not None
+    assert held.model.provenance["guard"]["strength"] > 0.0
+    assert held.model.provenance["guard"]["rejected"]
+    assert reasons_unstable(held.model, weak_trials) == []
+
+
+def test_least_squares_is_never_penalised_but_marked(mariner: ShipModel, weak_trials: list[Trial]) -> None:
+    fit = identify(weak_trials, method="ls", particulars=mariner.particulars)
+    assert not fit.stable
+    assert fit.model.provenance is not None
+    assert fit.model.provenance["stable"] is False
+
+
+def test_a_fit_that_nothing_holds_is_marked(
+    mariner: ShipModel, weak_trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(guarded_fit, "STRENGTHS", (1e-9,))
+    fit = identify(weak_trials, particulars=mariner.particulars)
+    assert not fit.stable
+    assert fit.model.provenance is not None
+    assert fit.model.provenance["guard"]["decision"] == "runs away under every penalty"
+    assert "NOT STABLE" in fit.summary()
+
+
+def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
+    assert cao_fit.stable
+    assert cao_fit.model.provenance is not None
+    assert cao_fit.model.provenance["guard"] == {"decision": "stable as fitted"}

@@ -1,0 +1,230 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shipgym
+from identification import IdentificationResult, identify
+from shipgym import InputError, ShipModel, SteeringGear, Trial
+from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
+from shipgym.simulation import open_loop
+
+
+def errors_percent(result: IdentificationResult, truth: ShipModel) -> dict[str, float]:
+    return {
+        name: 100.0 * abs(value / truth.coefficients[name] - 1.0)
+        for name, value in result.coefficients.items()
+    }
+
+
+def within_one_per_cent(result: IdentificationResult, truth: ShipModel) -> int:
+    return sum(error < 1.0 for error in errors_percent(result, truth).values())
+
+
+def test_all_derivatives_of_cao_2015_come_out_within_one_per_cent(
+    cao_fit: IdentificationResult, mariner: ShipModel
+) -> None:
+    assert within_one_per_cent(cao_fit, mariner) == 40
+    assert max(errors_percent(cao_fit, mariner).values()) < 0.2
+    assert cao_fit.model.provenance is not None
+    assert cao_fit.model.provenance["ranks"] == {"u": 10, "v": 15, "r": 15}
+
+
+def test_euler_samples_fail_as_in_cao_2015(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    fit = identify([cao_zigzag], samples="euler", particulars=mariner.particulars)
+    errors = errors_percent(fit, mariner)
+    assert within_one_per_cent(fit, mariner) == 2
+    assert errors["Y_vdd"] == pytest.approx(21000.0, rel=0.01)
+    assert errors["Y_0uu"] > 1000.0
+
+
+def test_integral_samples_are_in_between(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    fit = identify([cao_zigzag], samples="integral", particulars=mariner.particulars)
+    assert within_one_per_cent(fit, mariner) == 25
+    assert 100.0 < max(errors_percent(fit, mariner).values()) < 1000.0
+
+
+def test_switch_on_the_step_and_rounded_files_are_as_good(mariner: ShipModel, record: Any) -> None:
+    run = record(zigzag(mariner, 15, 15, duration=500, dt=0.1, switch="step"), every=5, name="step")
+    rounded = Trial(
+        run.t, {c: [float(f"{x:.8g}") for x in v] for c, v in run.channels.items()}, kind="zigzag"
+    )
+    assert within_one_per_cent(identify([rounded], particulars=mariner.particulars), mariner) == 40
+
+
+def test_manoeuvres_not_seen_are_predicted_to_a_thousandth(
+    cao_fit: IdentificationResult, mariner: ShipModel
+) -> None:
+    for truth in (zigzag(mariner, 25, 25, duration=600), turning_circle(mariner, 30, duration=900)):
+        predicted = open_loop(cao_fit.model, truth)
+        span = max(np.ptp(truth["x"]), np.ptp(truth["y"]))
+        away = np.hypot(predicted["x"] - truth["x"], predicted["y"] - truth["y"])
+        assert np.sqrt(np.mean(away**2)) < 1e-3 * span
+
+
+def test_noisy_trials_give_a_model_that_manoeuvres_like_the_ship(
+    noisy_fit: IdentificationResult, mariner: ShipModel
+) -> None:
+    assert noisy_fit.stable
+    for side in (35.0, -35.0):
+        expected = turning_indices(turning_circle(mariner, side)).tactical_diameter_lengths
+        found = turning_indices(turning_circle(noisy_fit.model, side)).tactical_diameter_lengths
+        assert found == pytest.approx(expected, rel=0.05)
+    validation = noisy_fit.metrics["trials"]["zigzag_15_15"]
+    assert np.degrees(validation["rmse"]["r"]) < 0.02
+
+
+def test_trials_to_validate_influence_nothing(
+    noisy_trials: list[Trial], noisy_fit: IdentificationResult, mariner: ShipModel
+) -> None:
+    alone = identify(noisy_trials[:3], particulars=mariner.particulars, steering=mariner.steering)
+    assert alone.coefficients == noisy_fit.coefficients
+    np.testing.assert_array_equal(alone.model.covariance, noisy_fit.model.covariance)
+    assert alone.model.provenance == noisy_fit.model.provenance
+    np.testing.assert_array_equal(alone.model.envelope.high, noisy_fit.model.envelope.high)  # type: ignore[union-attr]
+
+
+def test_identification_is_repeatable_to_the_bit(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    first, second = (
+        identify(noisy_trials[:1], particulars=mariner.particulars, samples="integral") for _ in range(2)
+    )
+    assert first.coefficients == second.coefficients
+
+
+def test_provenance_tells_where_the_model_came_from(
+    noisy_fit: IdentificationResult, noisy_trials: list[Trial]
+) -> None:
+    provenance = noisy_fit.model.provenance
+    assert provenance is not None
+    assert provenance["software"] == f"shipgym {shipgym.__version__}"
+    assert (provenance["method"], provenance["samples"]) == ("tls-svm", "spline")
+    assert provenance["trials"] == [{"name": t.name, "sha256": t.sha256} for t in noisy_trials[:3]]
+    assert provenance["steering"] == "given"
+
+
+def test_metrics_have_the_promised_form(noisy_fit: IdentificationResult, mariner: ShipModel) -> None:
+    metrics = noisy_fit.metrics["trials"]["zigzag_15_15"]
+    assert set(metrics) == {
+        "use", "diverged", "rmse", "overshoot_1_deg", "overshoot_2_deg",
+        "advance_lengths", "transfer_lengths", "tactical_diameter_lengths",
+    }  # fmt: skip
+    assert metrics["use"] == "validate"
+    assert metrics["diverged"] is False
+    assert set(metrics["rmse"]) == {"u", "v", "r", "psi"}
+    assert metrics["advance_lengths"] is None
+    overshoot = metrics["overshoot_1_deg"]
+    truth = zigzag_indices(zigzag(mariner, 15, 15, port_first=True, duration=400)).overshoot_1_deg
+    assert overshoot["measured"] == pytest.approx(truth, abs=0.15)
+    assert overshoot["predicted"] == pytest.approx(overshoot["measured"], abs=1.5)
+
+
+def test_turning_circles_have_their_own_indices(mariner: ShipModel, cao_zigzag: Trial, record: Any) -> None:
+    circle = record(turning_circle(mariner, 35, duration=600), every=5, name="circle", use="validate")
+    metrics = identify([cao_zigzag, circle], particulars=mariner.particulars).metrics["trials"]["circle"]
+    assert metrics["overshoot_1_deg"] is None
+    for index in ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths"):
+        assert metrics[index]["predicted"] == pytest.approx(metrics[index]["measured"], rel=1e-3)
+
+
+def test_summary_is_a_table_with_errors_and_marks_estimates(noisy_trials: list[Trial]) -> None:
+    particulars = {"name": "M", "length": 160.93, "beam": 23.17, "draught": 8.23, "block_coefficient": 0.6}
+    result = identify(noisy_trials[:2], particulars=particulars)
+    lines = result.summary().splitlines()
+    row = next(line for line in lines if "N_r " in line)
+    assert row.split("│")[2].strip() == f"{1e5 * result.coefficients['N_r']:.2f}"
+    for name in ("mass", "Y_vdot", "speed", "rudder rate"):
+        assert any(name in line and "estimated" in line for line in lines)
+    assert result.model.particulars.speed == pytest.approx(7.7175, abs=0.05)
+    assert result.model.steering.rudder_rate_deg_s == pytest.approx(5.0, rel=0.2)
+
+
+def test_result_is_saved_whole_and_read_back(noisy_fit: IdentificationResult, tmp_path: Path) -> None:
+    noisy_fit.save(tmp_path / "ship")
+    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == ["metrics.json", "model.json"]
+    loaded = ShipModel.load(tmp_path / "ship" / "model.json")
+    assert loaded.coefficients == noisy_fit.coefficients
+    assert loaded.provenance == noisy_fit.model.provenance
+    assert json.loads((tmp_path / "ship" / "metrics.json").read_text()) == noisy_fit.metrics
+
+
+def test_folder_that_cannot_be_written_is_named(noisy_fit: IdentificationResult, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match="file"):
+        noisy_fit.save(tmp_path / "file")
+
+
+def constant_rudder(angle_deg: float) -> Trial:
+    t = np.arange(0.0, 100.0, 0.5)
+    still = np.zeros_like(t)
+    channels = {
+        "u": still + 7.7,
+        "v": still,
+        "r": still,
+        "psi": still,
+        "delta": still + np.radians(angle_deg),
+    }
+    return Trial(t, channels, name="straight.csv")
+
+
+def test_constant_rudder_is_refused(mariner: ShipModel) -> None:
+    with pytest.raises(InputError, match=r"straight\.csv.*stays at 10\.00 deg.*cannot be identified.*zigzag"):
+        identify([constant_rudder(10.0)], particulars=mariner.particulars)
+
+
+def test_fewer_samples_than_coefficients_are_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    rows = slice(0, 14)
+    short = Trial(cao_zigzag.t[rows], {c: v[rows] for c, v in cao_zigzag.channels.items()}, name="short.csv")
+    with pytest.raises(InputError, match=r"short\.csv.*14 samples.*13 rows for 15.*add trials"):
+        identify([short], particulars=mariner.particulars)
+
+
+def test_missing_channel_is_named_with_the_remedy(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    channels = {c: v for c, v in cao_zigzag.channels.items() if c != "v"}
+    with pytest.raises(InputError, match=r"lacking\.csv.*'v' is missing.*name its column"):
+        identify([Trial(cao_zigzag.t, channels, name="lacking.csv")], particulars=mariner.particulars)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"particulars": None}, "particulars: None found, expected .*length"),
+        ({"structure": "abkowits"}, "abkowitz"),
+        ({"method": "svm"}, "method: 'svm' found, expected one of ls, ls-svm, tls-svm"),
+        ({"samples": "cubic"}, "samples: 'cubic'"),
+        ({"tank": 4}, "tank"),
+    ],
+)
+def test_wrong_arguments_are_named(
+    cao_zigzag: Trial, mariner: ShipModel, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        identify([cao_zigzag], **{"particulars": mariner.particulars, **arguments})
+
+
+def test_no_trial_to_fit_and_two_of_one_name_are_refused(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    with pytest.raises(InputError, match='none is marked use = "fit"'):
+        identify([cao_zigzag.with_(use="validate")], particulars=mariner.particulars)
+    with pytest.raises(InputError, match="two of them named 'zigzag_15_15'"):
+        identify([cao_zigzag, cao_zigzag], particulars=mariner.particulars)
+
+
+def test_steering_gear_of_the_trials_is_found(cao_fit: IdentificationResult) -> None:
+    gear = cao_fit.model.steering
+    assert isinstance(gear, SteeringGear)
+    assert gear.rudder_rate_deg_s == pytest.approx(5.0, rel=1e-6)
+    assert gear.time_constant == pytest.approx(1.0, rel=1e-5)
+    assert cao_fit.model.provenance is not None
+    assert cao_fit.model.provenance["steering"] == "estimated"
+
+
+@pytest.mark.parametrize("method", ["ls", "ls-svm"])
+def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
+    cao_zigzag: Trial, mariner: ShipModel, method: str
+) -> None:
+    settings = {"C": 1e12} if method == "ls-svm" else {}
+    fit = identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
+    assert within_one_per_cent(fit, mariner) == 40

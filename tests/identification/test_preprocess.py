@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import make_smoothing_spline
+
+from identification.preprocess import _Reinsch, noise_level, smooth
+
+
+def signal(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.5, 1.5, 600))
+    truth = np.sin(t / 20.0)
+    return t, truth, truth + noise * rng.standard_normal(600)
+
+
+@pytest.mark.parametrize("noise", [1e-3, 1e-2, 1e-1])
+def test_noise_level_is_found_at_irregular_times(noise: float) -> None:
+    t, _, values = signal(noise)
+    assert noise_level(t, values) == pytest.approx(noise, rel=0.15)
+
+
+def test_smooth_signal_has_no_noise_and_is_left_alone() -> None:
+    t, truth, _ = signal(0.0)
+    assert noise_level(t, truth) < 1e-5
+    assert smooth(t, truth) is not None
+    np.testing.assert_array_equal(smooth(t, truth), truth)
+
+
+def test_smoothing_takes_away_more_than_half_of_the_noise() -> None:
+    t, truth, values = signal(0.05)
+    assert np.std(smooth(t, values) - truth) < 0.4 * 0.05
+
+
+def test_smoothing_spline_is_that_of_scipy() -> None:
+    t, _, values = signal(0.05)
+    np.testing.assert_allclose(
+        _Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
+    )
