@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
 
@@ -219,7 +220,7 @@ class CourseKeepingEngine:
             lane = int(np.argmin(np.isfinite(array[:, 0])))
             raise InputError(f"actions: {array[lane, 0]} found in lane {lane}, expected numbers in [-1, 1]")
         self._actions.reshape(-1)[: self.num_envs] = array[:, 0]
-        self._advance()
+        self.advance()
         return (
             self.observations,
             self.outcome(rows.REWARD),
@@ -227,11 +228,17 @@ class CourseKeepingEngine:
             self.outcome(rows.TRUNCATED) > 0.0,
         )
 
-    def _advance(self) -> None:
+    def advance(self) -> None:
+        """One control interval with the actions as they stand."""
         self._kernel.step(
             self._states, self._keys, self._settings, self._ships, self._actions, self._observations,
             self.num_envs,
         )  # fmt: skip
+
+    def first_lane(self) -> tuple[Observation, Observation, Floats]:
+        """The first lane's action, observation and outcome as views of the arrays that `advance` works on."""
+        outcome = self._states[0, rows.OUTCOME : rows.OBSERVED : layout.LANES]
+        return self._actions[0, :1], self._observations[0, 0], outcome
 
     @property
     def observations(self) -> Observation:
@@ -323,6 +330,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observation_scales = observation_scales(self.model)
         self.render_mode = None
         self._engine = CourseKeepingEngine(self.model, 1, self.task)
+        self._command, self._seen, self._outcome = self._engine.first_lane()
         self._key = 0
         self._episode = -1
 
@@ -382,12 +390,10 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         InputError
             If the action is not one finite number.
         """
-        engine = self._engine
-        command = _one_number(action)
-        engine._actions[0, 0] = command
-        engine._advance()
+        self._command[0] = _one_number(action)
+        self._engine.advance()
         reward, heading, rudder, rate, end, terminated, truncated, extrapolating, distance, error = (
-            engine._states[0, rows.OUTCOME : rows.OBSERVED : layout.LANES].tolist()
+            self._outcome.tolist()
         )
         info = {
             "reward_heading": heading,
@@ -398,8 +404,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             "envelope_distance": distance,
             "extrapolating": extrapolating > 0.0,
         }
-        observation = engine._observations[0, 0].copy()
-        return observation, reward, terminated > 0.0, truncated > 0.0, info
+        return self._seen.copy(), reward, terminated > 0.0, truncated > 0.0, info
 
     def physical_state(self) -> dict[str, float]:
         """State and set-point by name, SI units."""
@@ -411,7 +416,7 @@ def _one_number(action: Any) -> float:
     array = action if isinstance(action, np.ndarray) else np.asarray(action, dtype=np.float32)
     if array.shape != (1,):
         raise InputError(f"action: shape {array.shape} found, expected (1,): the commanded rudder")
-    number = float(array[0])
-    if not -np.inf < number < np.inf:
+    number: float = array.item()
+    if not isfinite(number):
         raise InputError(f"action: {number} found, expected a number in [-1, 1]: the commanded rudder")
     return number
