@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
+    from shipgym import manoeuvres, plots
     from shipgym.errors import InputError, UnstableModelError
     from shipgym.models import ShipModel, list_models, load_model
     from shipgym.particulars import Particulars
@@ -32,6 +33,8 @@ _HOME = {
     "load_model": "shipgym.models",
 }
 
+_SUBPACKAGES = ("manoeuvres", "plots")
+
 __all__ = [
     "InputError",
     "Particulars",
@@ -42,18 +45,22 @@ __all__ = [
     "UnstableModelError",
     "list_models",
     "load_model",
+    "manoeuvres",
+    "plots",
 ]
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used."""
+    if name in _SUBPACKAGES:
+        return import_module(f"shipgym.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'shipgym' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return sorted({*globals(), *__all__})
 
 
 register_environments()
