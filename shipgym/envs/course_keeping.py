@@ -152,7 +152,7 @@ class CourseKeepingEngine:
         if len(fleet) not in (1, num_envs):
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
         self.model = fleet[0]
-        if any(model.table != self.model.table for model in fleet):
+        if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
         self.num_envs = num_envs
         self.task = task or CourseKeepingTask()
@@ -257,10 +257,9 @@ class CourseKeepingEngine:
 
     def physical_state(self) -> dict[str, Floats]:
         """State and set-point in SI units by name, each of shape (num_envs,)."""
-        names = (*self.model.state_names, "set_point")
-        return {
-            name: self.outcome(row) for row, name in zip(layout.offsets(0, len(names)), names, strict=True)
-        }
+        offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
+        state = {name: self.outcome(offsets[name]) for name in self.model.state_names}
+        return {**state, "set_point": self.outcome(rows.SET_POINT)}
 
 
 def _ship_tiles(fleet: list[ShipModel], tiles: int) -> Floats:

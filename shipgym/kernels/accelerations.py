@@ -6,21 +6,37 @@ from typing import Any
 
 from .compiling import inlined
 
+ROLL = False  # whether the ship has a rolling motion
+SHAFT = False  # whether the speed of its shaft is a state; if not, it is what is commanded
+
 
 @inlined
 def accelerations(
-    u: float, v: float, r: float, delta: float, n: float, ship: Any, lane: int
-) -> tuple[float, float, float]:
+    u: float,
+    v: float,
+    r: float,
+    p: float,
+    phi: float,
+    delta: float,
+    n: float,
+    depth: float,
+    ship: Any,
+    lane: int,
+) -> tuple[float, float, float, float]:
     """Accelerations of the ship in one lane, body frame, origin midship.
 
     Parameters
     ----------
-    u, v, r : float
-        Surge and sway speed through the water, m/s; yaw rate, rad/s.
+    u, v, r, p : float
+        Surge and sway speed through the water, m/s; yaw and roll rate, rad/s.
+    phi : float
+        Heel, rad.
     delta : float
         Rudder angle, rad, positive to starboard.
     n : float
         Shaft speed, 1/s.
+    depth : float
+        Of the water, m; infinite in deep water.
     ship : float64 array of shape (n_rows * 64,)
         A tile of ships: constants and coefficients (`layout`).
     lane : int
@@ -29,6 +45,12 @@ def accelerations(
     Returns
     -------
     tuple of float
-        udot, vdot in m/s^2, rdot in rad/s^2.
+        udot, vdot in m/s^2, rdot, pdot in rad/s^2.
     """
-    return 0.0, 0.0, 0.0
+    return 0.0, 0.0, 0.0, 0.0
+
+
+@inlined
+def shaft_acceleration(n: float, command: float, ship: Any, lane: int) -> float:
+    """Acceleration of the shaft towards a commanded speed, 1/s^2."""
+    return 0.0

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from .accelerations import ROLL, SHAFT
 from .compiling import inlined, kernel, rare
 from .course_keeping_rows import (
     CHANGE_INTERVAL,
@@ -49,7 +50,23 @@ from .course_keeping_rows import (
     TRUNCATED,
 )
 from .envelope import envelope_distance, outside_range
-from .layout import DELTA, LANES, LENGTH, PSI, RUDDER_LIMIT, SERVICE_SPEED, R, U, V, X, Y
+from .layout import (
+    DELTA,
+    LANES,
+    LENGTH,
+    PHI,
+    PSI,
+    RUDDER_LIMIT,
+    SERVICE_SHAFT,
+    SERVICE_SPEED,
+    N,
+    P,
+    R,
+    U,
+    V,
+    X,
+    Y,
+)
 from .motion import clip, runge_kutta, runs_away
 from .random import uniform
 from .trigonometry import sin_cos, wrap
@@ -107,6 +124,7 @@ def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: Any)
     for row in range(0, END, LANES):
         state[row + lane] = 0.0
     state[U + lane] = ship[SERVICE_SPEED + lane]
+    state[N + lane] = ship[SERVICE_SHAFT + lane] if SHAFT else 0.0
     state[PSI + lane] = draw(state, lane, keys, tile, -pi, pi)
     state[SET_POINT + lane] = state[PSI + lane]
     change_set_point(state, lane, keys, tile, settings)
@@ -137,19 +155,34 @@ def pick(condition: bool, yes: float, no: float) -> float:
 def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
     """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
     for lane in range(lanes):
-        x0, y0, psi0 = state[X + lane], state[Y + lane], state[PSI + lane]
-        u0, v0, r0, delta0 = state[U + lane], state[V + lane], state[R + lane], state[DELTA + lane]
+        old = (
+            state[X + lane],
+            state[Y + lane],
+            state[PSI + lane],
+            state[U + lane],
+            state[V + lane],
+            state[R + lane],
+            state[P + lane] if ROLL else 0.0,
+            state[PHI + lane] if ROLL else 0.0,
+            state[DELTA + lane],
+            state[N + lane] if SHAFT else 0.0,
+        )
         order = state[LAST_COMMAND + lane] * ship[RUDDER_LIMIT + lane]
-        x, y, psi, u, v, r, delta = runge_kutta(x0, y0, psi0, u0, v0, r0, delta0, order, 0.0, h, ship, lane)
-        away = runs_away(u, v, r, ship, lane)
+        new = runge_kutta(old, order, ship[SERVICE_SHAFT + lane], h, ship, lane)
+        away = runs_away(new[3], new[4], new[5], ship, lane)
         stays = away | (state[ENDED + lane] != 0.0)
-        state[X + lane] = pick(stays, x0, x)
-        state[Y + lane] = pick(stays, y0, y)
-        state[PSI + lane] = pick(stays, psi0, psi)
-        state[U + lane] = pick(stays, u0, u)
-        state[V + lane] = pick(stays, v0, v)
-        state[R + lane] = pick(stays, r0, r)
-        state[DELTA + lane] = pick(stays, delta0, delta)
+        state[X + lane] = pick(stays, old[0], new[0])
+        state[Y + lane] = pick(stays, old[1], new[1])
+        state[PSI + lane] = pick(stays, old[2], new[2])
+        state[U + lane] = pick(stays, old[3], new[3])
+        state[V + lane] = pick(stays, old[4], new[4])
+        state[R + lane] = pick(stays, old[5], new[5])
+        if ROLL:
+            state[P + lane] = pick(stays, old[6], new[6])
+            state[PHI + lane] = pick(stays, old[7], new[7])
+        state[DELTA + lane] = pick(stays, old[8], new[8])
+        if SHAFT:
+            state[N + lane] = pick(stays, old[9], new[9])
         state[TERMINATED + lane] = pick(away, 1.0, state[TERMINATED + lane])
 
 

@@ -21,20 +21,22 @@ def row(offset: int) -> int:
     return offset // LANES
 
 
-# state of a ship
-X, Y, PSI, U, V, R, DELTA = offsets(0, 7)
-STATE_END = 7 * LANES
-N_STATE = 7
+# state of a ship; roll (P, PHI) and shaft (N) stay 0 in ships that have none
+STATE_NAMES = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
+N_STATE = 10
+X, Y, PSI, U, V, R, P, PHI, DELTA, N = offsets(0, N_STATE)
+STATE_END = N_STATE * LANES
 
 # a ship: its constants, its operating envelope, then the coefficients of its accelerations
 LENGTH, SERVICE_SPEED = offsets(0, 2)  # m; m/s
 RUDDER_LIMIT, RUDDER_RATE = offsets(2 * LANES, 2)  # rad; rad/s
 GEAR_FREQUENCY = 4 * LANES  # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
-ENVELOPE_LOW = 5 * LANES  # 4 rows: least u, v, r, delta of the training data
-ENVELOPE_HIGH = 9 * LANES  # 4 rows: largest
-ENVELOPE_CENTRE = 13 * LANES  # 4 rows: centre of the ellipsoid around the training data
-ENVELOPE_SHAPE = 17 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
-COEFFICIENTS = 27 * LANES
+SERVICE_SHAFT, WATER_DEPTH = offsets(5 * LANES, 2)  # 1/s, shaft speed at service speed; m
+ENVELOPE_LOW = 7 * LANES  # 4 rows: least u, v, r, delta of the training data
+ENVELOPE_HIGH = 11 * LANES  # 4 rows: largest
+ENVELOPE_CENTRE = 15 * LANES  # 4 rows: centre of the ellipsoid around the training data
+ENVELOPE_SHAPE = 19 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
+COEFFICIENTS = 29 * LANES
 
 # a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
 RUNAWAY_SPEED = 3.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import fabs, sqrt
 from typing import Any
 
-from .accelerations import accelerations
+from .accelerations import ROLL, SHAFT, accelerations, shaft_acceleration
 from .compiling import inlined
 from .layout import (
     GEAR_FREQUENCY,
@@ -18,10 +18,11 @@ from .layout import (
     RUNAWAY_SPEED,
     RUNAWAY_YAW_RATE,
     SERVICE_SPEED,
+    WATER_DEPTH,
 )
 from .trigonometry import sin_cos
 
-State = tuple[float, float, float, float, float, float, float]
+State = tuple[float, float, float, float, float, float, float, float, float, float]
 
 
 @inlined
@@ -62,52 +63,87 @@ def rudder_velocity(delta: float, order: float, ship: Any, lane: int) -> float:
 
 
 @inlined
-def velocities(psi: float, u: float, v: float) -> tuple[float, float]:
-    """Velocity over ground, north and east, m/s."""
+def kinematics(psi: float, phi: float, u: float, v: float, r: float) -> tuple[float, float, float]:
+    """Velocity over ground, north and east, m/s, and rate of turn of the heading, rad/s."""
     sine, cosine = sin_cos(psi)
-    return u * cosine - v * sine, u * sine + v * cosine
+    if ROLL:
+        _, upright = sin_cos(phi)
+        return u * cosine - v * sine * upright, u * sine + v * cosine * upright, r * upright
+    return u * cosine - v * sine, u * sine + v * cosine, r
 
 
 @inlined
-def runge_kutta(
-    x: float, y: float, psi: float, u: float, v: float, r: float, delta: float,
-    command: float, n: float, h: float, ship: Any, lane: int,
-) -> State:  # fmt: skip
-    """State after one classical Runge-Kutta step of h seconds with the rudder command held."""
+def shaft_rate(n: float, command: float, ship: Any, lane: int) -> float:
+    """Acceleration of a shaft whose speed is a state, 1/s^2."""
+    if SHAFT:
+        return shaft_acceleration(n, command, ship, lane)
+    return 0.0
+
+
+@inlined
+def runge_kutta(state: State, command: float, n_command: float, h: float, ship: Any, lane: int) -> State:
+    """State after one classical Runge-Kutta step of h seconds with the commands held.
+
+    Parameters
+    ----------
+    state : tuple of 10 float
+        x, y, psi, u, v, r, p, phi, delta, n.
+    command : float
+        Commanded rudder, rad.
+    n_command : float
+        Commanded shaft speed, 1/s.
+    h : float
+        Step, s.
+    ship, lane
+        See `accelerations`.
+    """
+    x, y, psi, u, v, r, p, phi, delta, n = state
+    depth = ship[WATER_DEPTH + lane]
     order = rudder_order(command, ship, lane)
     half = 0.5 * h
     sixth = h / 6.0
+    n1 = n if SHAFT else n_command
 
-    d1 = rudder_rate(delta, order, ship, lane)
-    a1, b1, c1 = accelerations(u, v, r, delta, n, ship, lane)
-    x1, y1 = velocities(psi, u, v)
+    g1 = rudder_rate(delta, order, ship, lane)
+    s1 = shaft_rate(n1, n_command, ship, lane)
+    a1, b1, c1, d1 = accelerations(u, v, r, p, phi, delta, n1, depth, ship, lane)
+    x1, y1, e1 = kinematics(psi, phi, u, v, r)
 
-    u2, v2, r2 = u + half * a1, v + half * b1, r + half * c1
-    delta2 = rudder_after(delta, d1, order, half, ship, lane)
-    d2 = rudder_rate(delta2, order, ship, lane)
-    a2, b2, c2 = accelerations(u2, v2, r2, delta2, n, ship, lane)
-    x2, y2 = velocities(psi + half * r, u2, v2)
+    u2, v2, r2, p2 = u + half * a1, v + half * b1, r + half * c1, p + half * d1
+    psi2, phi2, n2 = psi + half * e1, phi + half * p, n1 + half * s1
+    delta2 = rudder_after(delta, g1, order, half, ship, lane)
+    g2 = rudder_rate(delta2, order, ship, lane)
+    s2 = shaft_rate(n2, n_command, ship, lane)
+    a2, b2, c2, d2 = accelerations(u2, v2, r2, p2, phi2, delta2, n2, depth, ship, lane)
+    x2, y2, e2 = kinematics(psi2, phi2, u2, v2, r2)
 
-    u3, v3, r3 = u + half * a2, v + half * b2, r + half * c2
-    delta3 = rudder_after(delta, d2, order, half, ship, lane)
-    d3 = rudder_rate(delta3, order, ship, lane)
-    a3, b3, c3 = accelerations(u3, v3, r3, delta3, n, ship, lane)
-    x3, y3 = velocities(psi + half * r2, u3, v3)
+    u3, v3, r3, p3 = u + half * a2, v + half * b2, r + half * c2, p + half * d2
+    psi3, phi3, n3 = psi + half * e2, phi + half * p2, n1 + half * s2
+    delta3 = rudder_after(delta, g2, order, half, ship, lane)
+    g3 = rudder_rate(delta3, order, ship, lane)
+    s3 = shaft_rate(n3, n_command, ship, lane)
+    a3, b3, c3, d3 = accelerations(u3, v3, r3, p3, phi3, delta3, n3, depth, ship, lane)
+    x3, y3, e3 = kinematics(psi3, phi3, u3, v3, r3)
 
-    u4, v4, r4 = u + h * a3, v + h * b3, r + h * c3
-    delta4 = rudder_after(delta, d3, order, h, ship, lane)
-    d4 = rudder_rate(delta4, order, ship, lane)
-    a4, b4, c4 = accelerations(u4, v4, r4, delta4, n, ship, lane)
-    x4, y4 = velocities(psi + h * r3, u4, v4)
+    u4, v4, r4, p4 = u + h * a3, v + h * b3, r + h * c3, p + h * d3
+    psi4, phi4, n4 = psi + h * e3, phi + h * p3, n1 + h * s3
+    delta4 = rudder_after(delta, g3, order, h, ship, lane)
+    g4 = rudder_rate(delta4, order, ship, lane)
+    s4 = shaft_rate(n4, n_command, ship, lane)
+    a4, b4, c4, d4 = accelerations(u4, v4, r4, p4, phi4, delta4, n4, depth, ship, lane)
+    x4, y4, e4 = kinematics(psi4, phi4, u4, v4, r4)
 
     return (
         x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
         y + sixth * (y1 + 2.0 * (y2 + y3) + y4),
-        psi + sixth * (r + 2.0 * (r2 + r3) + r4),
+        psi + sixth * (e1 + 2.0 * (e2 + e3) + e4),
         u + sixth * (a1 + 2.0 * (a2 + a3) + a4),
         v + sixth * (b1 + 2.0 * (b2 + b3) + b4),
         r + sixth * (c1 + 2.0 * (c2 + c3) + c4),
-        rudder_after(delta, (d1 + 2.0 * (d2 + d3) + d4) / 6.0, order, h, ship, lane),
+        p + sixth * (d1 + 2.0 * (d2 + d3) + d4),
+        phi + sixth * (p + 2.0 * (p2 + p3) + p4),
+        rudder_after(delta, (g1 + 2.0 * (g2 + g3) + g4) / 6.0, order, h, ship, lane),
+        n1 + sixth * (s1 + 2.0 * (s2 + s3) + s4),
     )
 
 

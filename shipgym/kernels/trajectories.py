@@ -9,16 +9,17 @@ from __future__ import annotations
 from math import ceil, fabs
 from typing import Any
 
-from .accelerations import accelerations
+from .accelerations import SHAFT, accelerations
 from .compiling import inlined, kernel
 from .layout import GEAR_FREQUENCY, N_STATE, RUDDER_LIMIT, RUDDER_RATE
 from .motion import (
     State,
+    kinematics,
     rudder_order,
     rudder_velocity,
     runge_kutta,
     runs_away,
-    velocities,
+    shaft_rate,
 )
 
 SWITCH_ITERATIONS = 12
@@ -28,7 +29,7 @@ SWITCH_ITERATIONS = 12
 def stored(states: Any, row: int) -> State:
     """State in one row."""
     s = states[row]
-    return s[0], s[1], s[2], s[3], s[4], s[5], s[6]
+    return s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8], s[9]
 
 
 @inlined
@@ -41,8 +42,7 @@ def store(states: Any, row: int, state: State) -> None:
 @inlined
 def advance(state: State, command: float, n: float, h: float, ship: Any) -> State:
     """State h seconds later, the command held."""
-    x, y, psi, u, v, r, delta = state
-    return runge_kutta(x, y, psi, u, v, r, delta, command, n, h, ship, 0)
+    return runge_kutta(state, command, n, h, ship, 0)
 
 
 @inlined
@@ -51,15 +51,17 @@ def lost(state: State, ship: Any) -> bool:
     return runs_away(state[3], state[4], state[5], ship, 0)
 
 
-@kernel("void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1])")
-def derivatives(states: Any, commands: Any, ship: Any, out: Any) -> None:
+@kernel("void(float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])")
+def derivatives(states: Any, commands: Any, depths: Any, ship: Any, out: Any) -> None:
     """Time derivative of each state; `commands` holds rudder angle and shaft speed."""
     for i in range(states.shape[0]):
-        _, _, psi, u, v, r, delta = stored(states, i)
-        udot, vdot, rdot = accelerations(u, v, r, delta, commands[i, 1], ship, 0)
-        north, east = velocities(psi, u, v)
-        order = rudder_order(commands[i, 0], ship, 0)
-        store(out, i, (north, east, r, udot, vdot, rdot, rudder_velocity(delta, order, ship, 0)))
+        _, _, psi, u, v, r, p, phi, delta, n = stored(states, i)
+        shaft = n if SHAFT else commands[i, 1]
+        udot, vdot, rdot, pdot = accelerations(u, v, r, p, phi, delta, shaft, depths[i], ship, 0)
+        north, east, turn = kinematics(psi, phi, u, v, r)
+        gear = rudder_velocity(delta, rudder_order(commands[i, 0], ship, 0), ship, 0)
+        ndot = shaft_rate(shaft, commands[i, 1], ship, 0)
+        store(out, i, (north, east, turn, udot, vdot, rdot, pdot, p, gear, ndot))
 
 
 @kernel("int64(float64[:, ::1], float64[:, ::1], float64, float64[::1])")
@@ -93,8 +95,8 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, longest_step: float, ship: A
             state = advance(state, delta[i + 1], shaft, interval / steps, ship)
         if lost(state, ship):
             return i
-        x, y, psi, u, v, r, _ = state
-        state = (x, y, psi, u, v, r, delta[i + 1])
+        x, y, psi, u, v, r, p, phi, _, shaft = state
+        state = (x, y, psi, u, v, r, p, phi, delta[i + 1], shaft)
         store(out, i + 1, state)
     return t.shape[0] - 1
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,7 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
     arrived = np.flatnonzero((side != 0) & (t >= start))
     turns = []
-    for before, after in zip(arrived[:-1], arrived[1:], strict=True):
+    for before, after in pairwise(arrived):
         if side[before] != side[after]:
             moving = slice(before, after + 1)
             ordered = "delta_command" in trial.channels

@@ -11,8 +11,8 @@ from shipgym._checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, ship_length
 from shipgym.manoeuvres.zigzags import number_of_steps
-from shipgym.models.ship_model import ShipModel, two_commands
-from shipgym.simulation.simulate import as_trial, unstable
+from shipgym.models.ship_model import ShipModel
+from shipgym.simulation.simulate import simulate
 from shipgym.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -47,7 +47,11 @@ class TurningIndices:
 
 
 def turning_circle(
-    model: ShipModel, rudder_deg: float = 35.0, duration: float = 900.0, dt: float = 0.1
+    model: ShipModel,
+    rudder_deg: float = 35.0,
+    duration: float = 900.0,
+    dt: float = 0.1,
+    water_depth: float = np.inf,
 ) -> Trial:
     """Simulate a turning circle from straight ahead at service speed, without an approach run.
 
@@ -59,6 +63,8 @@ def turning_circle(
         Rudder ordered at the start, degrees; negative turns to port.
     duration, dt : float
         s. The samples are dt apart.
+    water_depth : float
+        m.
 
     Returns
     -------
@@ -75,14 +81,9 @@ def turning_circle(
     if rudder_deg == 0.0:
         raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
     n_steps = number_of_steps(duration, dt)
-    commands = np.full((n_steps, 1), np.radians(rudder_deg))
-    states = np.empty((n_steps + 1, len(model.service_state)))
-    states[0] = model.service_state
-    reached = model.kernel("trajectories").simulate(states, two_commands(commands), dt, model.ship_tile())
-    times = dt * np.arange(n_steps + 1, dtype=float)
-    if reached < n_steps:
-        raise unstable(model, times[reached], states[reached])
-    return as_trial(model, times, states, np.vstack([commands, commands[-1:]]), kind="turning-circle")
+    commands = np.repeat(model.service_command[None], n_steps, axis=0)
+    commands[:, 0] = np.radians(rudder_deg)
+    return simulate(model, commands, dt, None, water_depth, kind="turning-circle")
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:

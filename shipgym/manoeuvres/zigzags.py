@@ -48,6 +48,7 @@ def zigzag(
     duration: float = 600.0,
     dt: float = 0.1,
     switch: Literal["inside", "step"] = "inside",
+    water_depth: float = np.inf,
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
@@ -64,6 +65,8 @@ def zigzag(
     switch : {"inside", "step"}
         Reverse the rudder at the instant at which the heading is reached, inside a step, or at the
         first sample at which it has been reached.
+    water_depth : float
+        m, for ships that know shallow water.
 
     Returns
     -------
@@ -82,16 +85,19 @@ def zigzag(
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
     states = np.empty((n_steps + 1, layout.N_STATE))
-    states[0] = model.service_state
+    states[0] = model.kernel_states(model.service_state[None])[0]
     commands = np.empty(n_steps + 1)
     first = -angle if port_first else angle
+    ship = model.ship_tile(water_depth)
     reached, _ = model.kernel("trajectories").zigzag(
-        states, commands, first, threshold, 0.0, dt, switch == "inside", model.ship_tile()
+        states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside", ship
     )
     times = dt * np.arange(n_steps + 1, dtype=float)
     if reached < n_steps:
         raise unstable(model, times[reached], states[reached])
-    return as_trial(model, times, states, commands[:, None], kind="zigzag")
+    orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
+    orders[:, 0] = commands
+    return as_trial(model, times, states, orders, kind="zigzag")
 
 
 def number_of_steps(duration: float, dt: float) -> int:
@@ -131,15 +137,30 @@ def zigzag_indices(
     if not turns:
         return ZigzagIndices(None, None, None, None)
     threshold = switch_heading_deg(trial) if heading_deg is None else heading_deg
-    ends = [*turns[1:3], trial.t[-1]]
-    overshoots = [_overshoot_deg(trial, start, turn, end, threshold) for turn, end in zip(turns[:2], ends)]
-    sailed = np.interp([start, turns[0]], trial.t, distance_sailed(trial))
+    ends = [*turns[1:3], trial.t[-1]][: len(turns)]
+    overshoots = [
+        _overshoot_deg(trial, start, turn, end, threshold)
+        for turn, end in zip(turns[:2], ends[:2], strict=True)
+    ]
     return ZigzagIndices(
         overshoot_1_deg=overshoots[0],
-        overshoot_2_deg=overshoots[1] if len(turns) > 1 else None,
-        initial_turning_lengths=float(sailed[1] - sailed[0]) / ship_length(trial, length),
+        overshoot_2_deg=overshoots[1] if len(overshoots) > 1 else None,
+        initial_turning_lengths=_initial_turning(trial, start, threshold, ship_length(trial, length)),
         period_s=float(turns[2] - turns[0]) if len(turns) > 2 else None,
     )
+
+
+def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, length: float) -> float | None:
+    """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
+    after = trial.t >= start
+    times, change = trial.t[after], np.abs(_heading_change(trial, start, trial.t[after]))
+    past = np.flatnonzero(change >= np.radians(threshold_deg or np.inf))
+    if len(past) == 0:
+        return None
+    step = slice(max(int(past[0]), 1) - 1, max(int(past[0]), 1) + 1)
+    when = np.interp(np.radians(threshold_deg or np.inf), change[step], times[step])
+    sailed = np.interp([start, when], trial.t, distance_sailed(trial))
+    return float(sailed[1] - sailed[0]) / length
 
 
 def switch_heading_deg(trial: Trial) -> float | None:
@@ -147,13 +168,14 @@ def switch_heading_deg(trial: Trial) -> float | None:
 
     Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and carried out
     after a delay in which the heading moves on. So it is the largest such angle that had been reached,
-    to 5 per cent, at the first reversal; where that lies more than 3 degrees back, the heading of the reversal itself.
+    to 5 per cent, at the first reversal; where that lies more than 3 degrees back, the heading of the
+    reversal itself.
     """
     start, turns = reversals(trial)
     if not turns:
         return None
-    before, at = np.degrees(_heading_change(trial, start, [turns[0] - _last_step(trial, turns[0]), turns[0]]))
-    before, at = sorted((abs(before), abs(at)))
+    around = [turns[0] - _last_step(trial, turns[0]), turns[0]]
+    before, at = sorted(np.abs(np.degrees(_heading_change(trial, start, around))).tolist())
     if "delta_command" in trial.channels:
         whole = np.floor(at + 1e-6)
         return float(whole) if whole >= before - 1e-6 else float(0.5 * (before + at))

@@ -6,11 +6,20 @@ from collections.abc import Callable
 from pathlib import Path
 
 from shipgym._checks import check_choice
+from shipgym.models.container import container
+from shipgym.models.kvlcc2 import kvlcc2, kvlcc2_l7
 from shipgym.models.mariner import mariner
 from shipgym.models.ship_model import ShipModel
+from shipgym.models.tanker import tanker
 
 LIBRARY = Path(__file__).parent / "library"
-REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {"mariner": mariner}
+REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
+    "mariner": mariner,
+    "container": container,
+    "tanker": tanker,
+    "kvlcc2": kvlcc2,
+    "kvlcc2-l7": kvlcc2_l7,
+}
 
 
 def list_models() -> list[str]:

@@ -4,8 +4,11 @@ Format 1:
 
     format         1
     name           text
-    structure      {"name", "source", "equations": {"u" | "v" | "r": [{"name", "powers"}, ...]}}
-    normalisation  "prime": coefficients by the SNAME prime system with the instantaneous speed
+    structure      {"name", "source", "equations": {"u" | "v" | "r": [{"name", "powers"}, ...]}}, or for a
+                   reference ship {"name", "source"}
+    normalisation  "prime": coefficients by the SNAME prime system with the instantaneous speed; "own" for
+                   the equations of a reference ship
+    service_shaft_speed  1/s
     coefficients   {name: value}
     covariance     null or a list of rows, in the order of the coefficients
     particulars    SI units, added masses in the prime system, "estimated": names
@@ -24,9 +27,10 @@ from typing import Any
 
 import numpy as np
 
-from shipgym._checks import check_keys, check_number, check_table, check_text, quoted
+from shipgym._checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.errors import InputError
 from shipgym.models.envelope import CHANNELS, Envelope
+from shipgym.models.equations import EQUATIONS, Equations
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.structures import FORCE_OF_EQUATION, SYMBOLS, Structure
 from shipgym.particulars import Particulars
@@ -35,7 +39,7 @@ from shipgym.steering import SteeringGear
 FORMAT = 1
 FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
-    "steering", "envelope", "provenance",
+    "steering", "service_shaft_speed", "envelope", "provenance",
 )  # fmt: skip
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 
@@ -45,12 +49,13 @@ def save(model: ShipModel, path: Path) -> None:
     fields = {
         "format": FORMAT,
         "name": model.name,
-        "structure": model.table.to_dict(),
-        "normalisation": "prime",
+        "structure": model.dynamics.to_dict(),
+        "normalisation": "prime" if isinstance(model.dynamics, Structure) else "own",
         "coefficients": model.coefficients,
         "covariance": None if model.covariance is None else model.covariance.tolist(),
         "particulars": model.particulars.to_dict(),
         "steering": model.steering.to_dict(),
+        "service_shaft_speed": model.service_shaft_speed,
         "envelope": None if model.envelope is None else model.envelope.to_dict(),
         "provenance": model.provenance,
     }
@@ -113,28 +118,41 @@ def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
     for name in REQUIRED:
         if name not in fields:
             raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
-    if fields.get("normalisation", "prime") != "prime":
-        raise InputError(f"{where}: normalisation {fields['normalisation']!r} found, expected 'prime'")
-    table = _structure(fields["structure"], f"{where}: structure")
-    coefficients = _coefficients(fields["coefficients"], table, f"{where}: coefficients")
+    dynamics = _dynamics(fields["structure"], f"{where}: structure")
+    normalisation = "prime" if isinstance(dynamics, Structure) else "own"
+    if fields.get("normalisation", normalisation) != normalisation:
+        raise InputError(
+            f"{where}: normalisation {fields['normalisation']!r} found, expected {normalisation!r}"
+        )
+    coefficients = _coefficients(fields["coefficients"], dynamics, f"{where}: coefficients")
     covariance = fields.get("covariance")
     provenance = fields.get("provenance")
     return ShipModel(
         name=check_text(fields["name"], f"{where}: name"),
-        structure=table.name,
+        structure=dynamics.name,
         particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
         coefficients=coefficients,
         covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
         envelope=_envelope(fields.get("envelope"), f"{where}: envelope"),
         provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
-        own_table=table,
+        own_table=dynamics if isinstance(dynamics, Structure) else None,
+        service_shaft_speed=check_number(
+            fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
+        ),
     )
 
 
-def _structure(value: Any, where: str) -> Structure:
+def _dynamics(value: Any, where: str) -> Structure | Equations:
+    """A table of terms, or the name of a reference ship's equations."""
     table = check_table(value, where)
     check_keys(table, ("name", "source", "equations"), where)
+    if "equations" in table:
+        return _structure(table, where)
+    return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
+
+
+def _structure(table: Mapping[str, Any], where: str) -> Structure:
     equations = check_table(table.get("equations"), f"{where}.equations")
     if tuple(equations) != tuple(FORCE_OF_EQUATION):
         raise InputError(f"{where}.equations: {quoted(equations)} found, expected 'u', 'v', 'r'")
@@ -162,7 +180,7 @@ def _structure(value: Any, where: str) -> Structure:
     return structure
 
 
-def _coefficients(value: Any, structure: Structure, where: str) -> dict[str, float]:
+def _coefficients(value: Any, structure: Structure | Equations, where: str) -> dict[str, float]:
     table = check_table(value, where)
     names = structure.coefficient_names
     if len(table) != len(names):

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.envelope import Envelope
+from shipgym.models.equations import EQUATIONS, Equations
 from shipgym.models.structures import Structure, get_structure
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
@@ -48,6 +49,8 @@ class ShipModel:
         Method, settings, software version and trials it came from, or the source of a reference ship.
     own_table : Structure or None
         The table of terms a model file came with; by default the one known by the structure's name.
+    service_shaft_speed : float
+        Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
     """
 
     name: str
@@ -59,9 +62,10 @@ class ShipModel:
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
     own_table: Structure | None = None
+    service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
-        names = self.table.coefficient_names
+        names = self.dynamics.coefficient_names
         missing = [name for name in names if name not in self.coefficients]
         unknown = [name for name in self.coefficients if name not in names]
         if missing or unknown:
@@ -84,25 +88,42 @@ class ShipModel:
 
     @property
     def table(self) -> Structure:
-        """The table of terms of its structure."""
+        """The table of terms of its structure.
+
+        Raises
+        ------
+        InputError
+            If the ship has equations written by hand instead.
+        """
         return get_structure(self.structure) if self.own_table is None else self.own_table
+
+    @property
+    def dynamics(self) -> Structure | Equations:
+        """The table of terms, or the equations of a reference ship."""
+        if self.own_table is None and self.structure in EQUATIONS:
+            return EQUATIONS[self.structure]
+        return self.table
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the state, in the order of `derivatives`."""
-        return ("x", "y", "psi", "u", "v", "r", "delta")
+        return self.dynamics.state_names
 
     @property
     def command_names(self) -> tuple[str, ...]:
         """Names of the commands."""
-        return ("delta", "n") if "n" in self.table.required_channels else ("delta",)
+        return self.dynamics.command_names
 
     @cached_property
     def service_state(self) -> Floats:
         """Straight ahead north at service speed with the rudder amidships, shape (n_state,)."""
-        state = np.zeros(len(self.state_names))
-        state[self.state_names.index("u")] = self.particulars["speed"]
-        return state
+        values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
+        return np.array([values.get(name, 0.0) for name in self.state_names])
+
+    @property
+    def service_command(self) -> Floats:
+        """Rudder amidships and shaft at service speed, shape (n_command,)."""
+        return np.array([0.0, self.service_shaft_speed])[: len(self.command_names)]
 
     def derivatives(self, state: ArrayLike, command: ArrayLike, water_depth: float = np.inf) -> Floats:
         """Time derivative of the state, steering gear included.
@@ -125,24 +146,61 @@ class ShipModel:
         InputError
             For another number of states or commands, or shallow water.
         """
-        if not np.all(np.isinf(water_depth)):
-            raise InputError(
-                f"water_depth: {water_depth} m found, but {self.name!r} is a deep-water model; leave it out"
-            )
+        depth = np.asarray(water_depth, dtype=float)
+        self.check_depth(float(depth.min()))
         states = np.asarray(state, dtype=float)
         _expect_last_axis("state", states, self.state_names)
         commands = np.asarray(command, dtype=float)
         _expect_last_axis("command", commands, self.command_names)
-        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1])
-        flat_states = np.array(np.broadcast_to(states, (*shape, layout.N_STATE))).reshape(-1, layout.N_STATE)
-        flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1]))
-        out = np.empty_like(flat_states)
+        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1], depth.shape)
+        flat = np.array(np.broadcast_to(states, (*shape, states.shape[-1]))).reshape(-1, states.shape[-1])
+        flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1])).reshape(len(flat), -1)
+        out = np.empty((len(flat), layout.N_STATE))
         self.kernel("trajectories").derivatives(
-            flat_states, two_commands(flat_commands.reshape(len(out), -1)), self.ship_tile(), out
+            self.kernel_states(flat),
+            two_commands(flat_commands),
+            np.array(np.broadcast_to(depth, shape)).reshape(-1),
+            self.ship_tile(),
+            out,
         )
-        return out.reshape(*shape, layout.N_STATE)
+        return self.own_states(out).reshape(*shape, len(self.state_names))
 
-    def simulate(self, commands: ArrayLike, dt: float, state: ArrayLike | None = None) -> Trial:
+    def check_depth(self, water_depth: float) -> None:
+        """Refuse water that is too shallow, or shallow water in a ship that knows none.
+
+        Raises
+        ------
+        InputError
+        """
+        if np.isposinf(water_depth):
+            return
+        if not self.dynamics.shallow_water:
+            raise InputError(
+                f"water_depth: {water_depth:g} m found, but {self.name!r} is a deep-water model; leave it out"
+            )
+        draught = self.particulars["draught"]
+        if not water_depth > draught:
+            raise InputError(
+                f"water_depth: {water_depth:g} m found, expected more than the draught of {draught:g} m"
+            )
+
+    def kernel_states(self, states: Floats) -> Floats:
+        """States of shape (n, n_state) with the columns that the kernels know, those without use 0."""
+        wide = np.zeros((len(states), layout.N_STATE))
+        wide[:, self._columns] = states
+        return wide
+
+    def own_states(self, states: Floats) -> Floats:
+        """The columns of `state_names` among the kernels', shape (n, n_state)."""
+        return states[:, self._columns]
+
+    @cached_property
+    def _columns(self) -> list[int]:
+        return [layout.STATE_NAMES.index(name) for name in self.state_names]
+
+    def simulate(
+        self, commands: ArrayLike, dt: float, state: ArrayLike | None = None, water_depth: float = np.inf
+    ) -> Trial:
         """Simulate with commands held over each step (classical Runge-Kutta).
 
         Parameters
@@ -153,6 +211,8 @@ class ShipModel:
             Step, s.
         state : array-like of shape (n_state,), optional
             Where to start; by default straight ahead at service speed.
+        water_depth : float
+            In m, for ships that know shallow water.
 
         Returns
         -------
@@ -166,7 +226,7 @@ class ShipModel:
         """
         from shipgym.simulation.simulate import simulate
 
-        return simulate(self, commands, dt, state)
+        return simulate(self, commands, dt, state, water_depth)
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[ShipModel]:
         """Models whose coefficients are drawn from the identified covariance.
@@ -224,23 +284,29 @@ class ShipModel:
 
         return load(Path(path))
 
+    @cached_property
+    def accelerations_source(self) -> str:
+        """Source of the accelerations that are compiled into the kernels."""
+        return self.dynamics.accelerations_source(self.coefficients)
+
     def kernel(self, name: str) -> ModuleType:
         """One file of kernels, compiled together with this ship."""
         from shipgym.simulation.compiled import kernel
-        from shipgym.simulation.generator import accelerations_source
 
-        return kernel(accelerations_source(self.table), name)
+        return kernel(self.accelerations_source, name)
 
-    def ship_column(self) -> Floats:
+    def ship_column(self, water_depth: float = np.inf) -> Floats:
         """Constants and coefficients in the order of the kernels' rows, shape (n_rows,)."""
         p, gear = self.particulars, self.steering
-        coefficients = self.table.acceleration_matrix(p) @ np.array(list(self.coefficients.values()))
+        coefficients = self.dynamics.kernel_coefficients(self.coefficients, p)
         column = np.zeros(layout.row(layout.COEFFICIENTS) + len(coefficients))
         column[layout.row(layout.LENGTH)] = p["length"]
         column[layout.row(layout.SERVICE_SPEED)] = p["speed"]
         column[layout.row(layout.RUDDER_LIMIT)] = gear.limit
         column[layout.row(layout.RUDDER_RATE)] = gear.rate
         column[layout.row(layout.GEAR_FREQUENCY)] = 1.0 / gear.time_constant if gear.time_constant else 0.0
+        column[layout.row(layout.SERVICE_SHAFT)] = self.service_shaft_speed
+        column[layout.row(layout.WATER_DEPTH)] = water_depth
         low, high, centre, shape, end = map(layout.row, (
             layout.ENVELOPE_LOW, layout.ENVELOPE_HIGH, layout.ENVELOPE_CENTRE, layout.ENVELOPE_SHAPE,
             layout.COEFFICIENTS,
@@ -253,9 +319,10 @@ class ShipModel:
         column[end:] = coefficients
         return column
 
-    def ship_tile(self) -> Floats:
+    def ship_tile(self, water_depth: float = np.inf) -> Floats:
         """A tile with the ship in each lane, as the kernels read it, shape (n_rows * 64,), a new array."""
-        return np.repeat(self.ship_column(), layout.LANES)
+        self.check_depth(water_depth)
+        return np.repeat(self.ship_column(water_depth), layout.LANES)
 
 
 def _expect_last_axis(argument: str, array: Floats, names: tuple[str, ...]) -> None:

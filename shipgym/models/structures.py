@@ -84,6 +84,32 @@ class Structure:
         channels = symbols - {"du", "U"} | {"u", "v", "r"}
         return tuple(name for name in SYMBOLS if name in channels)
 
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Rudder, and shaft speed where it stands in a term."""
+        return ("delta", "n") if "n" in self.required_channels else ("delta",)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the state."""
+        return ("x", "y", "psi", "u", "v", "r", "delta")
+
+    @property
+    def shallow_water(self) -> bool:
+        """Whether the depth of the water is known to it."""
+        return False
+
+    def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
+        """Source of the compiled accelerations; the coefficients are read at run time."""
+        from shipgym.simulation.generator import accelerations_source
+
+        return accelerations_source(self)
+
+    def kernel_coefficients(self, coefficients: Mapping[str, float], particulars: Particulars) -> Floats:
+        """Coefficients of the SI features, in the order of the kernel's rows."""
+        values: Floats = self.acceleration_matrix(particulars) @ np.array(list(coefficients.values()))
+        return values
+
     def terms(self, equation: str) -> tuple[Term, ...]:
         """Terms of the equation of surge `u`, sway `v` or yaw `r`."""
         return self.equations[equation]
@@ -216,7 +242,7 @@ STRUCTURES = {structure.name: structure for structure in (ABKOWITZ,)}
 
 
 def get_structure(name: str) -> Structure:
-    """A structure by name.
+    """An identified structure by name.
 
     Raises
     ------

@@ -11,9 +11,17 @@ from math import sqrt
 from .compiling import inlined
 from .layout import COEFFICIENTS, LANES, SERVICE_SPEED
 
+ROLL = False
+SHAFT = False
+
 
 @inlined
-def accelerations(u, v, r, delta, n, ship, lane):
+def shaft_acceleration(n, command, ship, lane):
+    return 0.0
+
+
+@inlined
+def accelerations(u, v, r, p, phi, delta, n, depth, ship, lane):
     U = sqrt(u * u + v * v)
     per_U = 1.0 / U
     du = u - ship[SERVICE_SPEED + lane]
@@ -36,7 +44,7 @@ def accelerations_source(structure: Structure) -> str:
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
     results = ", ".join(f"{equation}dot" for equation in structure.equations)
-    return HEADER.format(name=structure.name) + assignments + "".join(sums) + f"    return {results}\n"
+    return HEADER.format(name=structure.name) + assignments + "".join(sums) + f"    return {results}, 0.0\n"
 
 
 def product(term: Term, speed_power: int) -> str:

@@ -14,7 +14,14 @@ Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
 
 
-def simulate(model: ShipModel, commands: ArrayLike, dt: float, state: ArrayLike | None = None) -> Trial:
+def simulate(
+    model: ShipModel,
+    commands: ArrayLike,
+    dt: float,
+    state: ArrayLike | None = None,
+    water_depth: float = np.inf,
+    kind: str | None = None,
+) -> Trial:
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = np.asarray(commands, dtype=float)
     if held.ndim != 2 or held.shape[1] != len(model.command_names) or len(held) < 2:
@@ -27,12 +34,13 @@ def simulate(model: ShipModel, commands: ArrayLike, dt: float, state: ArrayLike 
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     states = np.empty((len(held) + 1, layout.N_STATE))
-    states[0] = initial_state(model, state)
-    reached = model.kernel("trajectories").simulate(states, two_commands(held), dt, model.ship_tile())
+    states[0] = model.kernel_states(initial_state(model, state)[None])[0]
+    ship = model.ship_tile(water_depth)
+    reached = model.kernel("trajectories").simulate(states, two_commands(held), dt, ship)
     times = dt * np.arange(len(states), dtype=float)
     if reached < len(held):
         raise unstable(model, times[reached], states[reached])
-    return as_trial(model, times, states, np.vstack([held, held[-1:]]))
+    return as_trial(model, times, states, np.vstack([held, held[-1:]]), kind)
 
 
 def open_loop(model: ShipModel, trial: Trial) -> Trial:
@@ -67,10 +75,7 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
         )
     t = np.array(trial.t)
     states = np.empty((len(t), layout.N_STATE))
-    states[0] = [
-        trial[name][0] if name in trial.channels else 0.0
-        for name in ("x", "y", "psi", "u", "v", "r", "delta")
-    ]
+    states[0] = [trial[name][0] if name in trial.channels else 0.0 for name in layout.STATE_NAMES]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
     reached = model.kernel("trajectories").open_loop(
@@ -78,7 +83,7 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
     )
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
-    channels = dict(zip(model.state_names, states.T, strict=True))
+    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
     return Trial(
         t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=model.particulars["length"]
     )
@@ -98,8 +103,8 @@ def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
 
 
 def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
-    """States and the commands held from each sample on as a Trial."""
-    channels = dict(zip(model.state_names, states.T, strict=True))
+    """States of the kernels and the commands held from each sample on as a Trial."""
+    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
@@ -107,7 +112,7 @@ def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind
 
 def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
     """The error for a ship that ran away after a given time and physical state."""
-    last = dict(zip(model.state_names, state.tolist(), strict=True))
+    last = dict(zip(model.state_names, model.own_states(state[None])[0].tolist(), strict=True))
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
         f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s): it is unstable there",
