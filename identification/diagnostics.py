@@ -13,7 +13,7 @@ from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.samples import Samples
 from identification.uncertainty import residuals
 from shipgym.errors import InputError
-from shipgym.models.structures import FORCE_OF_EQUATION, Structure
+from shipgym.models.structures import Structure
 from shipgym.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -84,7 +84,7 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
                     f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
                     'out (use = "skip")'
                 )
-    if "delta" not in structure.required_channels:
+    if not structure.has_rudder:
         return
     still = [trial for trial in trials if np.ptp(trial["delta"]) < LEAST_RUDDER]
     if len(still) == len(trials):
@@ -131,13 +131,13 @@ def diagnose(
     Returns
     -------
     dict of str to EquationDiagnostics
-        By equation: `u`, `v`, `r`.
+        By equation: those of `u`, `v`, `r` that the structure has.
     """
     errors = residuals(machines, samples)
     apart = _without_overlap(samples)
     found = {}
     for q, machine in machines.items():
-        names = [f"{FORCE_OF_EQUATION[q]}_{term.name}" for term in structure.terms(q)]
+        names = structure.names(q)
         features, target, error = samples.features[q], samples.targets[q], errors[q]
         size = np.sqrt(np.mean(features**2, axis=0))
         scaled = features / np.where(size > 0.0, size, 1.0)

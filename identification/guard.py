@@ -41,7 +41,9 @@ HARD_TURN = {"speed": 0.47, "drift": np.radians(20.5), "yaw_rate": 0.8, "rudder"
 STRENGTHS = tuple(float(strength) for strength in np.geomspace(1e-3, 1.0, 19))
 
 
-def hard_turn_features(structure: Structure, particulars: Particulars) -> dict[str, Floats]:
+def hard_turn_features(
+    structure: Structure, particulars: Particulars, shaft_speed: float = 1.0
+) -> dict[str, Floats]:
     """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
     speed = HARD_TURN["speed"] * particulars["speed"]
     state = {
@@ -49,10 +51,12 @@ def hard_turn_features(structure: Structure, particulars: Particulars) -> dict[s
         "v": -speed * np.sin(HARD_TURN["drift"]),
         "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
         "delta": HARD_TURN["rudder"],
-        "n": 1.0,
+        "n": shaft_speed,
     }
     channels = {name: np.array([state[name]]) for name in structure.required_channels}
-    return {q: np.abs(structure.features(q, channels, particulars)[0]) for q in structure.equations}
+    return {
+        q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
+    }
 
 
 def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
@@ -102,7 +106,7 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
 def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
     """Rudder hard over from side to side, at intervals in ship lengths."""
     steps = np.arange(round(LONG / STEP))
-    commands = np.zeros((len(steps), len(model.command_names)))
+    commands = np.tile(model.service_command, (len(steps), 1))
     commands[:, 0] = np.where(steps // round(interval / STEP) % 2 == 0, 1.0, -1.0) * np.radians(rudder_deg)
     return model.simulate(commands, STEP * model.particulars["length"] / model.particulars["speed"])
 

@@ -84,7 +84,7 @@ def guarded_fit(
     rejected = {"rejected": reasons}
     if not (guarded and method.regularised):
         return GuardedFit(model, machines, False, {"decision": "runs away, not guarded", **rejected})
-    sizes = hard_turn_features(blank.table, blank.particulars)
+    sizes = hard_turn_features(blank.table, blank.particulars, blank.service_shaft_speed)
     for strength in STRENGTHS:
         held = fit_held(samples, sizes, strength)
         candidate = with_coefficients(blank, held)
@@ -96,6 +96,6 @@ def guarded_fit(
 
 def with_coefficients(blank: ShipModel, machines: Mapping[str, Machine]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
-    matrix = blank.table.acceleration_matrix(blank.particulars)
+    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
     values = np.linalg.solve(matrix, np.concatenate([machines[q].coef_ for q in blank.table.equations]))
     return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))

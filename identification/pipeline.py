@@ -19,8 +19,9 @@ from identification.prediction import predict, trial_metrics
 from identification.samples import build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
+from shipgym._checks import check_number
 from shipgym.errors import InputError
-from shipgym.models import Envelope, ShipModel, get_structure
+from shipgym.models import Envelope, ShipModel, Structure, get_structure
 from shipgym.models.model_file import write_json
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
@@ -43,7 +44,7 @@ class IdentificationResult:
     metrics : dict
         For each trial by its name the errors of the open-loop prediction and the manoeuvre's indices.
     diagnostics : dict of str to EquationDiagnostics
-        Of each equation: `u`, `v`, `r`.
+        Of each equation: those of `u`, `v`, `r` that the structure has.
     predictions : dict of str to Trial or None
         The open-loop predictions by trial; None where the model ran away.
     """
@@ -56,12 +57,12 @@ class IdentificationResult:
 
     @property
     def coefficients(self) -> dict[str, float]:
-        """Hydrodynamic derivatives by name, prime system, rudder positive to starboard."""
+        """Coefficients by name, in the normalisation of the structure, rudder positive to starboard."""
         return self.model.coefficients
 
     @property
     def standard_errors(self) -> dict[str, float]:
-        """Standard error of each coefficient, prime system."""
+        """Standard error of each coefficient, in its units."""
         covariance = self.model.covariance
         if covariance is None:
             return dict.fromkeys(self.coefficients, float("nan"))
@@ -73,8 +74,8 @@ class IdentificationResult:
         Returns
         -------
         str
-            Name, value and standard error (prime system, 1e-5) and t; inertia that was not given is
-            marked as estimated.
+            Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was
+            not given is marked as estimated.
         """
         from identification.summary import summary_table
 
@@ -116,6 +117,7 @@ def identify(
     particulars: Particulars | Mapping[str, Any] | None = None,
     steering: SteeringGear | None = None,
     *,
+    service_shaft_speed: float | None = None,
     name: str | None = None,
     window: int | None = None,
     smooth: bool = True,
@@ -129,18 +131,23 @@ def identify(
     Parameters
     ----------
     trials : sequence of Trial
-        Those with `use` "fit" are fitted; they need the channels u, v, r and delta.
+        Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and n for structures
+        that know the shaft speed.
     structure : str
-        Terms of the model.
+        Terms of the model: a name of `shipgym.list_structures`.
     method : {"tls-svm", "ls-svm", "ls"}
         Truncated LS-SVM, LS-SVM, or least squares.
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
-        Of the ship; at least the length, and what is needed to estimate mass and added mass.
+        Of the ship; at least the length, and, for structures of forces, what is needed to estimate mass and
+        added mass.
         The service speed is estimated from the start of the trials where absent.
     steering : SteeringGear, optional
         Estimated from the rudders of the trials where absent.
+    service_shaft_speed : float, optional
+        Shaft speed at service speed, 1/s, for structures that know it; by default that at the start of the
+        trials.
     name : str, optional
         Of the model; by default the ship's.
     window : int, optional
@@ -165,15 +172,17 @@ def identify(
     chosen, table = get_method(method), get_structure(structure)
     used = _used(trials)
     check_trials(used, table)
-    ship = _ship(particulars, used)
-    regression = build_samples(used, table, ship, samples, window, steering, smooth)
+    ship = _ship(particulars, used, table)
+    shaft = _shaft_speed(service_shaft_speed, used, table)
+    regression = build_samples(used, table, ship, samples, window, steering, smooth, shaft)
     check_samples(regression, used, table)
     blank = ShipModel(
         name=ship["name"] if name is None else name,
         structure=structure,
         particulars=ship,
-        steering=estimated_gear(used) if steering is None else steering,
+        steering=_gear(used, table) if steering is None else steering,
         coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        service_shaft_speed=shaft,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
     )
     fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
@@ -193,7 +202,7 @@ def identify(
     }
     memory = MEMORY * ship["length"] / ship["speed"]
     covariance = coefficient_covariance(
-        joint_covariance(fit.machines, regression, memory), table.acceleration_matrix(ship)
+        joint_covariance(fit.machines, regression, memory), table.acceleration_matrix(ship, shaft)
     )
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     predictable = [trial for trial in trials if trial.use != "skip"]
@@ -219,8 +228,10 @@ def _used(trials: Sequence[Trial]) -> list[Trial]:
     return [trial for trial in trials if trial.use == "fit"]
 
 
-def _ship(particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial]) -> Particulars:
-    """Particulars with speed, inertia and added mass estimated where absent."""
+def _ship(
+    particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial], table: Structure
+) -> Particulars:
+    """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
     if particulars is None:
         raise InputError(
             "particulars: None found, expected those of the ship, at least its length and its mass and "
@@ -237,7 +248,27 @@ def _ship(particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[
                 "speed in the particulars (speed, m/s)"
             )
         ship = replace(ship, speed=speed, estimated=ship.estimated | {"speed"})
-    return ship.completed()
+    return ship.completed() if table.quantity == "force" else ship
+
+
+def _shaft_speed(given: float | None, trials: Sequence[Trial], table: Structure) -> float:
+    """Shaft speed at service speed, 1/s; 0 for a structure that knows no shaft."""
+    if "n" not in table.command_names:
+        return 0.0
+    if given is not None:
+        return check_number(given, "service_shaft_speed", above=0.0, hint="in 1/s")
+    shaft = float(np.median([trial["n"][0] for trial in trials]))
+    if shaft <= 0.0:
+        raise InputError(
+            f"trial {trials[0].name!r}: starts with a shaft speed of {shaft:g} 1/s, expected that of service "
+            "speed; give service_shaft_speed"
+        )
+    return shaft
+
+
+def _gear(trials: Sequence[Trial], table: Structure) -> SteeringGear:
+    """The gear as the rudders of the trials show it; a usual one where no rudder has to move."""
+    return estimated_gear(trials) if table.has_rudder else SteeringGear()
 
 
 def _plain(value: Any) -> Any:

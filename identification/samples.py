@@ -71,6 +71,7 @@ def build_samples(
     window: int | None = None,
     gear: SteeringGear | None = None,
     smooth: bool = True,
+    shaft_speed: float = 0.0,
 ) -> Samples:
     """Stack the regressions of all trials.
 
@@ -91,6 +92,8 @@ def build_samples(
         Helps to rebuild the rudder between samples (spline only).
     smooth : bool
         Whether channels with noise are smoothed before the terms are formed.
+    shaft_speed : float
+        At service speed, 1/s, for terms that refer to it.
 
     Returns
     -------
@@ -113,7 +116,11 @@ def build_samples(
                 f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of {steps} "
                 "steps; give a smaller window"
             )
-        parts.append(_one_trial(trial, index, structure, particulars, samples, steps, gear, smooth))
+
+        def terms(equation: str, channels: Channels) -> Floats:
+            return structure.features(equation, channels, particulars, shaft_speed)
+
+        parts.append(_one_trial(trial, index, structure, terms, samples, steps, gear, smooth))
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.equations},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.equations},
@@ -155,7 +162,7 @@ def _one_trial(
     trial: Trial,
     index: int,
     structure: Structure,
-    particulars: Particulars,
+    terms: Callable[[str, Channels], Floats],
     samples: str,
     window: int,
     gear: SteeringGear | None,
@@ -168,9 +175,6 @@ def _one_trial(
             name: values if name == "delta" else preprocess.smooth(t, values)
             for name, values in channels.items()
         }
-
-    def terms(equation: str, values: Channels) -> Floats:
-        return structure.features(equation, values, particulars)
 
     if samples == "spline":
         noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
@@ -205,8 +209,7 @@ def _spline_integrals(
     times = middle[:, None] + half[:, None] * NODES
     at_nodes: dict[str, Floats] = {}
     for name, values in channels.items():
-        between = rudder if name == "delta" else broken_spline(t, values, rudder)
-        at_nodes[name] = between(times.ravel())
+        at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
     step = np.searchsorted(t, middle, side="right") - 1
     starts = np.flatnonzero(np.diff(step, prepend=-1))
     integrals = {}
@@ -215,6 +218,15 @@ def _spline_integrals(
         pieces = half[:, None] * np.einsum("ijk,j->ik", values, WEIGHTS)
         integrals[q] = np.add.reduceat(pieces, starts, axis=0)
     return integrals
+
+
+def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:
+    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
+    if name == "delta":
+        return rudder
+    if name == "n":
+        return lambda times: np.interp(times, t, values)
+    return broken_spline(t, values, rudder)
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:

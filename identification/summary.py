@@ -34,14 +34,19 @@ def summary_table(result: IdentificationResult) -> str:
 
 
 def _coefficients(result: IdentificationResult) -> Table:
-    table = Table(title="Hydrodynamic derivatives, prime system, 1e-5", title_justify="left")
+    structure = result.model.table
+    title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
+    if (structure.normalisation, structure.quantity) != ("prime", "force"):
+        title, unit = f"Coefficients of {structure.quantity}s, normalisation {structure.normalisation}", 1.0
+    table = Table(title=title, title_justify="left")
     table.add_column("name")
     for heading in ("value", "standard error", "t"):
         table.add_column(heading, justify="right")
     for name, error in result.standard_errors.items():
         value = result.coefficients[name]
         t = f"{value / error:.1f}" if error > 0.0 else "-"
-        table.add_row(name, f"{value / PRIME:.2f}", f"{error / PRIME:.2g}", t)
+        shown = f"{value / unit:.2f}" if unit == PRIME else f"{value:.6g}"
+        table.add_row(name, shown, f"{error / unit:.2g}", t)
     return table
 
 
@@ -52,6 +57,8 @@ def _inertia(result: IdentificationResult) -> Table:
         table.add_column(heading, justify="right" if heading == "value" else "left")
     units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
     for name in INERTIA + ADDED_MASSES:
+        if ship[name] is None:  # not needed by a structure of accelerations
+            continue
         value = ship[name] / PRIME if name in ADDED_MASSES else ship[name]
         source = "estimated" if name in ship.estimated else "given"
         table.add_row(name, f"{value:.6g}", units.get(name, "1e-5"), source)

@@ -13,7 +13,7 @@ from shipgym.envs.registration import register_environments
 if TYPE_CHECKING:
     from shipgym import manoeuvres, plots
     from shipgym.errors import InputError, UnstableModelError
-    from shipgym.models import ShipModel, list_models, load_model
+    from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.particulars import Particulars
     from shipgym.ship_file import ShipFile
     from shipgym.steering import SteeringGear
@@ -30,7 +30,9 @@ _HOME = {
     "Trial": "shipgym.trial",
     "UnstableModelError": "shipgym.errors",
     "list_models": "shipgym.models",
+    "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
+    "register_structure": "shipgym.models",
 }
 
 _SUBPACKAGES = ("manoeuvres", "plots")
@@ -44,9 +46,11 @@ __all__ = [
     "Trial",
     "UnstableModelError",
     "list_models",
+    "list_structures",
     "load_model",
     "manoeuvres",
     "plots",
+    "register_structure",
 ]
 
 

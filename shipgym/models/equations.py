@@ -70,7 +70,9 @@ class Equations:
         changed = {name: value for name, value in coefficients.items() if value != self.coefficients[name]}
         return text + "".join(f"{name} = {value!r}\n" for name, value in changed.items())
 
-    def kernel_coefficients(self, coefficients: Mapping[str, float], particulars: Particulars) -> Floats:
+    def kernel_coefficients(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
         """None: they are compiled into the kernels."""
         return np.empty(0)
 

@@ -40,7 +40,7 @@ class ShipModel:
     steering : SteeringGear
         Rudder limit, rate and lag.
     coefficients : dict of str to float
-        By name, prime system, rudder positive to starboard.
+        By name, in the normalisation of the structure, rudder positive to starboard.
     covariance : array of shape (n_coefficients, n_coefficients) or None
         Of the coefficients in their order; None where not identified.
     envelope : Envelope or None
@@ -80,6 +80,15 @@ class ShipModel:
                 f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
             )
         object.__setattr__(self, "coefficients", ordered)
+        if (
+            isinstance(self.dynamics, Structure)
+            and "n" in self.command_names
+            and not self.service_shaft_speed > 0
+        ):
+            raise InputError(
+                f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g} found, expected that at "
+                f"service speed in 1/s: the terms of structure {self.structure!r} have a shaft speed"
+            )
         if self.covariance is not None and self.covariance.shape != (len(names), len(names)):
             raise InputError(
                 f"covariance of {self.name!r}: shape {self.covariance.shape}, "
@@ -185,9 +194,15 @@ class ShipModel:
             )
 
     def kernel_states(self, states: Floats) -> Floats:
-        """States of shape (n, n_state) with the columns that the kernels know, those without use 0."""
+        """States of shape (n, n_state) with the columns that the kernels know, those without use 0.
+
+        A table without an equation of sway or yaw is that of a ship that does not drift or turn.
+        """
         wide = np.zeros((len(states), layout.N_STATE))
         wide[:, self._columns] = states
+        if isinstance(self.dynamics, Structure):
+            still = [name for name in ("v", "r") if name not in self.dynamics.equations]
+            wide[:, [layout.STATE_NAMES.index(name) for name in still]] = 0.0
         return wide
 
     def own_states(self, states: Floats) -> Floats:
@@ -298,7 +313,7 @@ class ShipModel:
     def ship_column(self, water_depth: float = np.inf) -> Floats:
         """Constants and coefficients in the order of the kernels' rows, shape (n_rows,)."""
         p, gear = self.particulars, self.steering
-        coefficients = self.dynamics.kernel_coefficients(self.coefficients, p)
+        coefficients = self.dynamics.kernel_coefficients(self.coefficients, p, self.service_shaft_speed)
         column = np.zeros(layout.row(layout.COEFFICIENTS) + len(coefficients))
         column[layout.row(layout.LENGTH)] = p["length"]
         column[layout.row(layout.SERVICE_SPEED)] = p["speed"]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from shipgym.models.structures import Structure, Term
+from shipgym.models.structures import FORCE_OF_EQUATION, Structure, Term
+from shipgym.models.terms import CHANNEL
 
 HEADER = '''"""Accelerations of the structure `{name}`, written from its table of terms."""
 
-from math import sqrt
-
-from .compiling import inlined
-from .layout import COEFFICIENTS, LANES, SERVICE_SPEED
+{library}from .compiling import inlined
+from .layout import {rows}
 
 ROLL = False
 SHAFT = False
@@ -22,9 +21,6 @@ def shaft_acceleration(n, command, ship, lane):
 
 @inlined
 def accelerations(u, v, r, p, phi, delta, n, depth, ship, lane):
-    U = sqrt(u * u + v * v)
-    per_U = 1.0 / U
-    du = u - ship[SERVICE_SPEED + lane]
 '''
 
 
@@ -43,12 +39,41 @@ def accelerations_source(structure: Structure) -> str:
         joined = "\n        + ".join(products)
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
-    results = ", ".join(f"{equation}dot" for equation in structure.equations)
-    return HEADER.format(name=structure.name) + assignments + "".join(sums) + f"    return {results}, 0.0\n"
+    results = ", ".join(
+        f"{equation}dot" if equation in structure.equations else "0.0" for equation in FORCE_OF_EQUATION
+    )
+    body = assignments + "".join(sums) + f"    return {results}, 0.0\n"
+    return _header(structure, " ".join(variables)) + body
 
 
 def product(term: Term, speed_power: int) -> str:
     """A term as a product of its symbols, with the power of U that makes it dimensional."""
-    factors = [symbol for symbol, power in term.powers for _ in range(power)]
+    powers = dict(term.powers)
+    speed_power += powers.pop("U", 0)
+    factors = [symbol_variable(symbol) for symbol, power in powers.items() for _ in range(power)]
     factors += ["U" if speed_power > 0 else "per_U"] * abs(speed_power)
     return " * ".join(factors) or "1.0"
+
+
+def symbol_variable(symbol: str) -> str:
+    """Name of a symbol in the source."""
+    return f"abs_{CHANNEL[symbol]}" if symbol[0] == "|" else symbol
+
+
+def _header(structure: Structure, products: str) -> str:
+    """Everything above the products: imports of what they use, and the symbols that are no arguments."""
+    words = set(products.split())
+    absolute = [symbol for symbol in structure.symbols if symbol[0] == "|"]
+    functions = ["fabs"] * bool(absolute) + ["sqrt"] * bool(words & {"U", "per_U"})
+    rows = (
+        ["COEFFICIENTS", "LANES"] + ["SERVICE_SHAFT"] * ("dn" in words) + ["SERVICE_SPEED"] * ("du" in words)
+    )
+    library = f"from math import {', '.join(functions)}\n\n" if functions else ""
+    lines = {
+        "    U = sqrt(u * u + v * v)\n": words & {"U", "per_U"},
+        "    per_U = 1.0 / U\n": "per_U" in words,
+        "    du = u - ship[SERVICE_SPEED + lane]\n": "du" in words,
+        "    dn = n - ship[SERVICE_SHAFT + lane]\n": "dn" in words,
+    } | {f"    {symbol_variable(symbol)} = fabs({CHANNEL[symbol]})\n": True for symbol in absolute}
+    header = HEADER.format(name=structure.name, library=library, rows=", ".join(rows))
+    return header + "".join(line for line, used in lines.items() if used)

@@ -75,7 +75,8 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
         )
     t = np.array(trial.t)
     states = np.empty((len(t), layout.N_STATE))
-    states[0] = [trial[name][0] if name in trial.channels else 0.0 for name in layout.STATE_NAMES]
+    first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
+    states[0] = model.kernel_states(np.array([first]))[0]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
     reached = model.kernel("trajectories").open_loop(

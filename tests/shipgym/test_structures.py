@@ -1,6 +1,7 @@
 """Tables of terms: the compiled accelerations, the regression features and the inertia agree."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import shipgym
-from shipgym import InputError
-from shipgym.models.structures import ABKOWITZ, Structure, get_structure
+from shipgym import InputError, Particulars, ShipModel, SteeringGear
+from shipgym.models.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
 
 speeds = st.floats(2.0, 10.0)
 
@@ -60,3 +61,182 @@ def test_inertia_that_cannot_be_is_refused():
     p = replace(shipgym.load_model("mariner").particulars, N_vdot=0.9, Y_rdot=0.9)
     with pytest.raises(InputError, match="inertia of the ship is not positive"):
         ABKOWITZ.acceleration_matrix(p)
+
+
+def virtual_ship(name: str, **coefficients: float) -> ShipModel:
+    """A ship of 160.93 m and 7.7175 m/s that has a structure; coefficients that are not given are 0."""
+    table = get_structure(name)
+    return ShipModel(
+        name="virtual",
+        structure=name,
+        particulars=Particulars(length=160.93, speed=7.7175),
+        steering=SteeringGear(35.0, 5.0, 1.0),
+        coefficients=dict.fromkeys(table.coefficient_names, 0.0) | coefficients,
+        service_shaft_speed=1.2 if "n" in table.command_names else 0.0,
+    )
+
+
+@pytest.mark.parametrize("name", sorted(set(STRUCTURES) - {"abkowitz"}))
+def test_accelerations_of_every_structure_are_written_from_its_features(name):
+    table = get_structure(name)
+    random = np.random.default_rng(0)
+    model = virtual_ship(name, **{c: random.normal() for c in table.coefficient_names})
+    theta = table.kernel_coefficients(model.coefficients, model.particulars, model.service_shaft_speed)
+    state = np.array([0.0, 0.0, 0.3, 6.0, -0.9, -0.01, 0.2])
+    channels = dict(zip(model.state_names, state[:, None], strict=True)) | {"n": [1.1]}
+    if "v" not in table.equations:
+        channels["v"] = np.zeros(1)
+    expected, row = dict.fromkeys("uvr", 0.0), 0
+    for equation, terms in table.equations.items():
+        features = table.features(equation, channels, model.particulars, model.service_shaft_speed)[0]
+        expected[equation] = features @ theta[row : row + len(terms)]
+        row += len(terms)
+    u, v, r, delta = (float(channels[symbol][0]) for symbol in ("u", "v", "r", "delta"))
+    source = model.accelerations_source.replace("from .", "from shipgym.kernels.")
+    namespace: dict[str, Any] = {}
+    exec(source, namespace)
+    plain = getattr(namespace["accelerations"], "py_func", namespace["accelerations"])
+    found = plain(u, v, r, 0.0, 0.0, delta, 1.1, np.inf, model.ship_tile(), 0)
+    np.testing.assert_allclose(found, [*expected.values(), 0.0], rtol=1e-12)
+
+
+def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
+    """T rdot + r = K delta with K = 0.031 1/s, T = 30.2487 s (Zhu 2018, Table 7.4.8)."""
+    K, T = 0.031, 30.2487
+    ship = virtual_ship("nomoto", c_r=-1.0 / T, c_d=K / T)
+    start = [0.0, 0.0, 0.0, 7.0, 0.5, 0.0, 0.1]
+    trial = ship.simulate(np.full((600, 1), 0.1), 0.5, start)
+    np.testing.assert_allclose(trial["r"], K * 0.1 * (1.0 - np.exp(-trial.t / T)), rtol=1e-6, atol=1e-12)
+    assert np.all(trial["u"] == 7.0)  # no surge: the speed stays
+    assert np.all(trial["v"] == 0.0)  # no sway: no drift
+
+
+def test_norrbin_turns_at_the_root_of_its_cubic():
+    """n1 r + n3 r^3 = K delta: r = 0.01 1/s for delta = 0.2, n1 = 1, n3 = 5000, K = 0.075."""
+    T, K, n3 = 20.0, 0.075, 5000.0
+    ship = virtual_ship("norrbin", c_r=-1.0 / T, c_r3=-n3 / T, c_d=K / T)
+    assert ship.simulate(np.full((800, 1), 0.2), 0.5)["r"][-1] == pytest.approx(0.01, rel=1e-6)
+
+
+def test_linear_steering_has_the_form_of_astrom_and_kallstrom():
+    """The Mariner of Zhu 2018, equation A.9 and table 7.3.1, rudder turned positive to starboard."""
+    a11, a12, a21, a22, b11, b21 = -0.693, -0.304, -3.41, -2.17, -0.207, 1.63
+    ship = virtual_ship("linear-steering", b_v=a11, b_r=a12, b_d=b11, c_v=a21, c_r=a22, c_d=b21)
+    v, r, delta, U, L = 0.3, 0.004, 0.1, np.hypot(7.0, 0.3), 160.93
+    expected = [
+        a11 * v * U / L + a12 * r * U + b11 * delta * U**2 / L,
+        a21 * v * U / L**2 + a22 * r * U / L + b21 * delta * U**2 / L**2,
+    ]
+    found = ship.derivatives([0.0, 0.0, 0.0, 7.0, v, r, delta], [delta])[3:6]
+    np.testing.assert_allclose(found, [0.0, *expected], rtol=1e-12)
+
+
+def test_surge_reaches_the_speed_at_which_thrust_meets_resistance():
+    """From rest, and with the shaft astern, udot = -4e-4 |u| u + 0.0165 |n| n."""
+    ship = virtual_ship("surge", **{"a_|u|u": -4e-4, "a_|n|n": 0.0165})
+    speed = np.sqrt(0.0165 / 4e-4)
+    ahead = ship.simulate(np.tile([0.0, 1.0], (4000, 1)), 0.5, np.zeros(7))
+    np.testing.assert_allclose(ahead["u"], speed * np.tanh(np.sqrt(4e-4 * 0.0165) * ahead.t), rtol=1e-8)
+    stop = ship.simulate(np.tile([0.0, -1.0], (40, 1)), 0.5)
+    assert np.all(np.diff(stop["u"]) < 0.0)
+    np.testing.assert_array_equal(ahead["psi"], 0.0)
+
+
+def test_perturbed_surge_holds_service_speed_at_service_revolutions():
+    ship = virtual_ship("surge-perturbed", a_du=-0.01, a_du3=-0.001, a_dn=0.2)
+    trial = ship.simulate(np.tile(ship.service_command, (100, 1)), 1.0)
+    np.testing.assert_array_equal(trial["u"], 7.7175)
+
+
+def test_cubic_at_service_is_in_parts_of_service():
+    """udot L / U0^2 is the sum of the coefficients of n2, nu, u2 at service speed and revolutions."""
+    ship = virtual_ship("cubic", a_n2=0.03, a_nu=-0.01, a_u2=-0.005, b_Uv=-0.4, **{"c_v3/U": 2.0})
+    udot = ship.derivatives(ship.service_state, ship.service_command)[3]
+    assert udot * 160.93 / 7.7175**2 == pytest.approx(0.015)
+    U0, v = 7.7175, 0.1 * 7.7175
+    state = [0.0, 0.0, 0.0, np.sqrt(U0**2 - v**2), v, 0.0, 0.0]
+    vdot, rdot = ship.derivatives(state, ship.service_command)[4:6]
+    assert vdot * 160.93 / U0**2 == pytest.approx(-0.4 * 0.1)
+    assert rdot * 160.93**2 / U0**2 == pytest.approx(2.0 * 0.1**3)
+
+
+def test_printed_structures_have_the_terms_of_their_papers():
+    assert get_structure("steering7").coefficient_names[:7] == (
+        "b_v", "b_|v|v", "b_|r|v", "b_r", "b_|v|r", "b_|r|r", "b_d",
+    )  # fmt: skip
+    assert get_structure("zhu-6").equations == get_structure("steering5").equations
+    assert get_structure("zhu-8").coefficient_names == ("b_v", "b_|v|v", "b_d", "c_r", "c_|r|r", "c_d")
+    assert [term.name for term in get_structure("cubic").terms("u")] == [
+        *("n2", "nu", "u2", "v2", "vr", "r2", "n2d2")
+    ]
+    assert "v2r/U" in [term.name for term in get_structure("cubic").terms("r")]
+    assert sum(name.startswith("zhu-") for name in STRUCTURES) == 10
+    assert get_structure("cubic").required_channels == ("u", "v", "r", "delta", "n")
+
+
+@pytest.mark.parametrize("name", sorted(STRUCTURES))
+def test_every_table_survives_its_model_file(name, tmp_path):
+    table = get_structure(name)
+    assert Structure.from_dict(table.to_dict()) == table
+    model = shipgym.load_model("mariner") if name == "abkowitz" else virtual_ship(name)
+    model.save(tmp_path / "model.json")
+    again = ShipModel.load(tmp_path / "model.json")
+    assert again.table == table
+    assert again.accelerations_source == model.accelerations_source
+
+
+def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():
+    """Yaw alone: N' r' / (Iz' - N_rdot') with the Mariner's 83e-5."""
+    table = Structure("yaw", "own", {"r": read_terms("r, delta")}, "service", "force")
+    p = shipgym.load_model("mariner").particulars
+    matrix = table.acceleration_matrix(p)
+    np.testing.assert_allclose(
+        matrix * 83e-5, np.diag([p["speed"] / p["length"], (p["speed"] / p["length"]) ** 2]), rtol=2e-4
+    )
+    assert table.coefficient_names == ("N_r", "N_d")
+
+
+def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, monkeypatch):
+    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(STRUCTURES))
+    table = shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"})
+    assert shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}) == table
+    ship = virtual_ship("mine", **{"b_v": -0.05, "c_r": -0.1, "c_d": 0.002, "c_r2v/U": 0.1})
+    ship.save(tmp_path / "mine.json")
+    monkeypatch.undo()
+    with pytest.raises(InputError, match="structure: 'mine' found"):
+        get_structure("mine")
+    assert shipgym.load_model(tmp_path / "mine.json").simulate([[0.2]] * 20, 1.0)["r"][-1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"equations": {"r": "r, delat"}}, "'delat' found in 'delat'.*Did you mean 'delta'"),
+        ({"equations": {"r": "r,, delta"}}, "nothing found between two commas"),
+        ({"equations": {"r": "r^10"}}, "'r\\^10' found"),
+        ({"equations": {"r": "1/v"}}, "equations.r: term '1/v': power -1 of 'v'"),
+        ({"equations": {"w": "u"}}, "equations 'w' found, expected some of 'u', 'v', 'r'"),
+        ({"equations": {"r": "v r, r v"}}, "stands twice in one equation: 'rv'"),
+        ({"equations": {"r": ()}}, "no terms found"),
+        ({"equations": {"r": "U r"}, "normalisation": "prime"}, "'U' found, which is 1 in the prime system"),
+        ({"equations": {"r": "r"}, "normalisation": "prim"}, "Did you mean 'prime'"),
+        ({"equations": {"r": "r"}, "quantity": "force"}, "forces in 'si' found"),
+        (
+            {"equations": {"v": "v", "r": "r"}, "quantity": "force", "normalisation": "prime"},
+            "'v' and 'r' differ, expected the same terms",
+        ),
+        ({"equations": {"r": "r"}, "source": ""}, "source: '' found"),
+        ({"equations": {"r": "r"}, "name": "nomoto"}, "name 'nomoto' found, which is another structure's"),
+        ({"equations": {"r": "r"}, "name": "container"}, "name 'container' found"),
+    ],
+)
+def test_a_table_that_cannot_be_is_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        shipgym.register_structure(**({"name": "mine"} | arguments))
+
+
+def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
+    with pytest.raises(InputError, match="service_shaft_speed of 'virtual': 0 found"):
+        replace(virtual_ship("cubic"), service_shaft_speed=0.0)
+    with pytest.raises(InputError, match="service_shaft_speed: 0 found"):
+        get_structure("surge-perturbed").acceleration_matrix(Particulars(length=100.0, speed=5.0))

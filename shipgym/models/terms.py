@@ -1,0 +1,118 @@
+"""Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from shipgym._checks import did_you_mean, quoted
+from shipgym.errors import InputError
+
+# du is the surge speed above service speed, dn the shaft speed above that of service, U the speed through
+# the water; bars stand for absolute values; all in SI units
+SYMBOLS = ("u", "du", "|u|", "v", "|v|", "r", "|r|", "delta", "|delta|", "n", "dn", "|n|", "U")
+SPEEDS = ("u", "du", "|u|", "v", "|v|", "U")
+YAW_RATES = ("r", "|r|")
+SHAFT_SPEEDS = ("n", "dn", "|n|")
+SHORT = {"delta": "d", "|delta|": "|d|"}  # in names
+
+CHANNEL = {symbol: symbol.strip("|") for symbol in SYMBOLS} | {"du": "u", "dn": "n"}
+LARGEST_POWER = 9
+
+
+@dataclass(frozen=True)
+class Term:
+    """A product of integer powers of symbols, in the units of the structure.
+
+    Attributes
+    ----------
+    name : str
+        As the field writes it: `vvr`, `0u`, `dd`, `|v|r`.
+    powers : tuple of (str, int)
+        Symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative.
+    """
+
+    name: str
+    powers: tuple[tuple[str, int], ...]
+
+    def power(self, *symbols: str) -> int:
+        """Sum of the powers of the given symbols."""
+        return sum(power for symbol, power in self.powers if symbol in symbols)
+
+    def check(self, where: str) -> None:
+        """Refuse symbols and powers that cannot be computed.
+
+        Raises
+        ------
+        InputError
+            Naming the term.
+        """
+        for symbol, power in self.powers:
+            if symbol not in SYMBOLS:
+                raise InputError(
+                    f"{where}: term '{self.name}': symbol '{symbol}' found, expected one of "
+                    f"{quoted(SYMBOLS)}.{did_you_mean(symbol, SYMBOLS)}"
+                )
+            least = -LARGEST_POWER if symbol == "U" else 1
+            whole = isinstance(power, int) and not isinstance(power, bool)
+            if not whole or power == 0 or not least <= power <= LARGEST_POWER:
+                below = " (or negative)" if symbol == "U" else ""
+                raise InputError(
+                    f"{where}: term '{self.name}': power {power!r} of '{symbol}' found, expected a whole "
+                    f"number from 1 to {LARGEST_POWER}{below}"
+                )
+
+
+def read_terms(text: str) -> tuple[Term, ...]:
+    """Terms from formulas separated by commas.
+
+    Parameters
+    ----------
+    text : str
+        Each formula is a product of symbols (`SYMBOLS`), written side by side with spaces between, with
+        powers after `^` and the speed U also below a stroke: `"v, |v| r, v^3/U, n^2 delta"`. `1` is the
+        constant. The name of a term is its formula without spaces and carets, `d` for `delta`: `v3/U`, `n2d`.
+
+    Returns
+    -------
+    tuple of Term
+
+    Raises
+    ------
+    InputError
+        For a formula that cannot be read, naming it.
+    """
+    return tuple(_read_term(formula.strip()) for formula in text.split(","))
+
+
+def _read_term(formula: str) -> Term:
+    powers: dict[str, int] = {}
+    name = ""
+    for factor in re.sub(r"\s*/\s*", " /", formula).split():
+        found = re.fullmatch(r"(/?)(\|?[A-Za-z]+\|?|1)(?:\^([1-9]))?", factor)
+        if found is None or (found[2] != "1" and found[2] not in SYMBOLS):
+            raise InputError(
+                f"terms: '{factor}' found in '{formula}', expected a product of {quoted(SYMBOLS)} with "
+                f"spaces between, such as '|v| r' or 'v^3/U'.{did_you_mean(factor, SYMBOLS)}"
+            )
+        below, symbol, power = found[1], found[2], found[3] or ""
+        name += below + SHORT.get(symbol, symbol) + power
+        if symbol != "1":
+            powers[symbol] = powers.get(symbol, 0) + int(power or 1) * (-1 if below else 1)
+    if not name:
+        raise InputError("terms: nothing found between two commas, expected a formula such as '|v| r'")
+    return Term("0" if name == "1" else name, tuple(powers.items()))
+
+
+def prime_terms(words: str) -> tuple[Term, ...]:
+    """Terms from the short names of Abkowitz's polynomials: letters u v r d (delta), 0 for the constant.
+
+    `u` is the perturbation from service speed, so `0u` is the constant's change with it.
+    """
+    symbol_of = {"u": "du", "v": "v", "r": "r", "d": "delta"}
+    terms = []
+    for word in words.split():
+        letters = word.lstrip("0")
+        powers = {symbol_of[letter]: letters.count(letter) for letter in letters}
+        terms.append(Term(word, tuple(powers.items())))
+    return tuple(terms)
