@@ -37,7 +37,7 @@ def _coefficients(result: IdentificationResult) -> Table:
     structure = result.model.table
     title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     if (structure.normalisation, structure.quantity) != ("prime", "force"):
-        title, unit = f"Coefficients of {structure.quantity}s, normalisation {structure.normalisation}", 1.0
+        title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0
     table = Table(title=title, title_justify="left")
     table.add_column("name")
     for heading in ("value", "standard error", "t"):

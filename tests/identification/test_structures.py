@@ -1,0 +1,154 @@
+"""Each structure finds itself back: a virtual ship of it, its trials without noise, the fit."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+
+import shipgym
+from identification import identify
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym.manoeuvres import zigzag
+from shipgym.models.structures import STRUCTURES, get_structure
+
+L, U0, N0 = 160.93, 7.7175, 1.2
+PARTICULARS = Particulars(length=L, speed=U0)  # accelerations need no mass
+GEAR = SteeringGear(35.0, 5.0, 1.0)
+STEERED = [name for name in STRUCTURES if name not in ("abkowitz", "surge", "surge-perturbed")]
+
+LINEAR = {"b_v": -0.06, "b_r": -2.3, "b_d": -0.08, "c_v": -1e-3, "c_r": -0.104, "c_d": 3.7e-3}
+SWAY = {"b_|v|v": -0.02, "b_|r|v": -3.0, "b_|v|r": -0.9, "b_|r|r": -60.0}
+YAW = {"c_|v|v": -2e-4, "c_|r|v": -0.03, "c_|v|r": -0.03, "c_|r|r": -3.0}
+PRIME = {"b_v": -0.693, "b_r": -0.304, "b_d": -0.207, "c_v": -3.41, "c_r": -3.6, "c_d": 1.63}
+CUBIC = {
+    "a_n2": 0.045, "a_nu": -0.02, "a_u2": -0.025, "a_v2": -0.3, "a_vr": 0.5, "a_r2": 0.02, "a_n2d2": -0.1,
+    "b_n2": 0.0005, "b_Uv": -0.7, "b_Ur": -0.3, "b_v3/U": -4.0, "b_v2r/U": 1.0, "b_vr2/U": -1.0,
+    "b_r3/U": 0.1, "b_n2d": -0.15, "b_nud": -0.05, "b_n2d3": 0.05,
+    "c_n2": -0.002, "c_Uv": -3.0, "c_Ur": -2.2, "c_v3/U": 3.0, "c_v2r/U": -9.0, "c_vr2/U": -2.0,
+    "c_r3/U": -0.5, "c_n2d": 1.1, "c_nud": 0.5, "c_n2d3": -0.4,
+}  # fmt: skip
+
+
+def own(name: str) -> dict[str, float]:
+    """Coefficients of a ship of about the Mariner's manners."""
+    known = {
+        "nomoto": {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0},
+        "norrbin": {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0},
+        "linear-steering": PRIME,
+        "cubic": CUBIC,
+        "zhu-9": {"b_r": -2.3, "b_|v|v": -0.02, "b_d": -0.08, "c_v": 2e-3, "c_|v|v": 1e-3, "c_d": 3.7e-3},
+    }
+    pool = LINEAR | SWAY | YAW
+    return known.get(name) or {c: pool[c] for c in get_structure(name).coefficient_names}
+
+
+def ship_of(name: str, coefficients: dict[str, float]) -> ShipModel:
+    shaft = N0 if "n" in get_structure(name).command_names else 0.0
+    return ShipModel(name, name, PARTICULARS, GEAR, coefficients, service_shaft_speed=shaft)
+
+
+def recorded(run: Trial, name: str, every: int = 5, use: str = "fit") -> Trial:
+    """What sensors without noise record of a run: the shaft speed that was held, no orders."""
+    names = {"n_command" if c == "n" else c: c for c in ("x", "y", "psi", "u", "v", "r", "delta", "n")}
+    names |= {"n": "n"} if "n" in run.channels else {}
+    channels = {channel: run[name][::every] for name, channel in names.items() if name in run.channels}
+    return Trial(run.t[::every], channels, name=name, kind=run.kind, use=use)
+
+
+def zigzags(ship: ShipModel, limit_deg: float = 35.0, use: str = "fit") -> list[Trial]:
+    """To both sides."""
+    plan = [(angle, port_first) for angle, port_first in ((10, False), (20, True), (35, False))]
+    runs = {a: zigzag(ship, a, a, duration=600, dt=0.1, port_first=p) for a, p in plan if a <= limit_deg}
+    return [recorded(run, f"zigzag_{angle}", use=use) for angle, run in runs.items()]
+
+
+@pytest.mark.parametrize("name", STEERED)
+def test_a_ship_of_each_structure_is_found_back(name: str) -> None:
+    ship = ship_of(name, own(name))
+    fit = identify(zigzags(ship), name, particulars=PARTICULARS)
+    assert fit.stable
+    for coefficient, value in ship.coefficients.items():
+        assert fit.coefficients[coefficient] == pytest.approx(value, rel=5e-4), coefficient
+    assert all(np.degrees(trial["rmse"]["r"]) < 2e-4 for trial in fit.metrics["trials"].values())
+    assert f"Coefficients of accelerations, {ship.table.normalisation}" in fit.summary()
+
+
+@pytest.mark.parametrize(
+    ("name", "coefficients"),
+    [
+        ("surge", {"a_u": -1e-3, "a_|u|u": -2e-4, "a_u3": -2e-5, "a_|n|n": 0.02}),
+        ("surge-perturbed", {"a_du": -0.01, "a_du3": -4e-4, "a_dn": 0.05}),
+    ],
+)
+def test_surge_is_found_back_from_accelerations_and_a_crash_stop(
+    name: str, coefficients: dict[str, float]
+) -> None:
+    """Straight runs with the rudder amidships: no rudder has to move."""
+    ship = ship_of(name, coefficients)
+    runs = [(2.0, 1.2), (7.7, 0.6), (1.0, 0.9), (7.7, -0.2)]
+    trials = []
+    for speed, shaft in runs:
+        start = np.array([0.0, 0.0, 0.0, speed, 0.0, 0.0, 0.0])
+        run = ship.simulate(np.tile([0.0, shaft], (1500, 1)), 0.1, start)
+        trials.append(recorded(run, f"{speed} m/s, {shaft} 1/s"))
+    fit = identify(trials, name, particulars=PARTICULARS, service_shaft_speed=N0)
+    for coefficient, value in coefficients.items():
+        assert fit.coefficients[coefficient] == pytest.approx(value, rel=1e-4), coefficient
+    assert set(fit.diagnostics) == {"u"}
+
+
+def test_the_container_ship_is_predicted_by_four_terms_as_well_as_zhu_printed() -> None:
+    """10/10 to fit, 20/20 predicted: Zhu 2018 prints 0.0472 m2/s2 of sway and 0.0162 deg2/s2 of yaw rate."""
+    ship = shipgym.load_model("container")
+    fit_to, predicted = (
+        recorded(zigzag(ship, a, a, duration=600, dt=0.1), f"{a}", every=10) for a in (10, 20)
+    )
+    fit = identify([fit_to, predicted.with_(use="validate")], "steering5", particulars=ship.particulars)
+    rmse = fit.metrics["trials"]["20"]["rmse"]
+    assert rmse["v"] ** 2 < 0.0472
+    assert np.degrees(rmse["r"]) ** 2 < 0.0162
+
+
+def test_cubic_follows_the_speed_loss_of_the_container_ship() -> None:
+    ship = shipgym.load_model("container")
+    trials = zigzags(ship)
+    to_validate = trials[1].with_(use="validate")
+    fit = identify([trials[0], to_validate, trials[2]], "cubic", particulars=ship.particulars)
+    assert fit.stable
+    assert fit.model.service_shaft_speed == pytest.approx(ship.service_shaft_speed)
+    rmse = fit.metrics["trials"]["zigzag_20"]["rmse"]
+    assert rmse["u"] < 0.02 * np.ptp(to_validate["u"])
+    assert rmse["r"] < 0.02 * np.ptp(to_validate["r"])
+
+
+@pytest.mark.parametrize("name", ["nomoto", "cubic"])
+def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
+    ship = ship_of(name, own(name))
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)
+    env.reset(seed=0)
+    for _ in range(20):
+        observation, *_ = env.step(np.array([1.0], dtype=np.float32))
+    names = env.unwrapped.observation_names  # type: ignore[attr-defined]
+    assert observation[names.index("yaw_rate")] > 0.1
+    assert observation[names.index("surge")] == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_registered_table_is_identified_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(STRUCTURES))
+    shipgym.register_structure("drag", {"u": "du, r^2", "r": "r, |r| r, delta"}, source="a user's own")
+    ship = ship_of("drag", {"a_du": -0.01, "a_r2": -300.0, "c_r": -0.03, "c_|r|r": -3.0, "c_d": 2e-3})
+    fit = identify(zigzags(ship), "drag", particulars=PARTICULARS)
+    for coefficient, value in ship.coefficients.items():
+        assert fit.coefficients[coefficient] == pytest.approx(value, rel=1e-4), coefficient
+
+
+def test_a_missing_shaft_speed_is_named() -> None:
+    still = zigzags(ship_of("nomoto", own("nomoto")), 10.0)[0]
+    with pytest.raises(InputError, match=r"zigzag_10.*channel 'n' is missing, structure 'cubic' needs"):
+        identify([still], "cubic", particulars=PARTICULARS)
+    stopped = Trial(still.t, {**still.channels, "n": np.zeros(len(still.t))}, name="stopped")
+    with pytest.raises(InputError, match=r"stopped.*shaft speed of 0 1/s.*give service_shaft_speed"):
+        identify([stopped], "cubic", particulars=PARTICULARS)
+    with pytest.raises(InputError, match="service_shaft_speed: -1 found"):
+        identify([stopped], "cubic", particulars=PARTICULARS, service_shaft_speed=-1.0)
