@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from shipgym import manoeuvres, plots
     from shipgym.errors import InputError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
+    from shipgym.models.checker import ModelCheck, check_ship_model
+    from shipgym.models.scaling import scale_model
     from shipgym.particulars import Particulars
     from shipgym.ship_file import ShipFile
     from shipgym.steering import SteeringGear
@@ -23,34 +25,40 @@ __version__ = "0.1.0"
 
 _HOME = {
     "InputError": "shipgym.errors",
+    "ModelCheck": "shipgym.models.checker",
     "Particulars": "shipgym.particulars",
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
     "SteeringGear": "shipgym.steering",
     "Trial": "shipgym.trial",
     "UnstableModelError": "shipgym.errors",
+    "check_ship_model": "shipgym.models.checker",
     "list_models": "shipgym.models",
     "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
     "register_structure": "shipgym.models",
+    "scale_model": "shipgym.models.scaling",
 }
 
 _SUBPACKAGES = ("manoeuvres", "plots")
 
 __all__ = [
     "InputError",
+    "ModelCheck",
     "Particulars",
     "ShipFile",
     "ShipModel",
     "SteeringGear",
     "Trial",
     "UnstableModelError",
+    "check_ship_model",
     "list_models",
     "list_structures",
     "load_model",
     "manoeuvres",
     "plots",
     "register_structure",
+    "scale_model",
 ]
 
 

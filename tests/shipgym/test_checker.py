@@ -1,0 +1,108 @@
+"""check_ship_model finds what is wrong with a model, and passes the shipped ones."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import Particulars, ShipModel, SteeringGear, check_ship_model
+from shipgym.models.structures import get_structure
+
+
+@pytest.fixture(scope="module")
+def mariner() -> ShipModel:
+    return shipgym.load_model("mariner")
+
+
+def nomoto(K: float, T: float) -> ShipModel:
+    return ShipModel(
+        "nomoto", "nomoto", Particulars(length=160.93, speed=7.7175), SteeringGear(),
+        {"c_r": -1.0 / T, "c_d": K / T},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", shipgym.list_models())
+def test_shipped_models_are_sound(name):
+    check = check_ship_model(name)
+    assert check.ok, str(check)
+    assert check.asymmetry < 0.1
+
+
+def test_a_symmetric_ship_has_no_asymmetry(mariner):
+    assert check_ship_model(nomoto(0.05, 30.0)).asymmetry == 0.0
+    odd = {"Y_0": 0.0, "Y_0u": 0.0, "Y_0uu": 0.0, "N_0": 0.0, "N_0u": 0.0, "N_0uu": 0.0}
+    assert check_ship_model(replace(mariner, coefficients=mariner.coefficients | odd)).asymmetry < 1e-12
+    assert 0.001 < check_ship_model(mariner).asymmetry < 0.05
+
+
+def test_an_asymmetric_ship_is_remarked(mariner):
+    lopsided = replace(mariner, coefficients=mariner.coefficients | {"N_0": 60e-5})
+    check = check_ship_model(lopsided)
+    assert any("port and starboard differ" in remark for remark in check.remarks)
+    assert "remark: port and starboard" in str(check)
+
+
+def test_a_rudder_that_turns_to_the_wrong_side_is_found(mariner):
+    check = check_ship_model(nomoto(-0.05, 30.0))
+    assert not check.ok
+    assert "a positive rudder turns to starboard; read the trials with rudder_positive='port'" in str(check)
+    literature = {name: -c if name.count("d") % 2 else c for name, c in mariner.coefficients.items()}
+    assert (
+        "rudder: 5 deg to starboard"
+        in check_ship_model(replace(mariner, coefficients=literature)).problems[0]
+    )
+
+
+def test_a_ship_that_runs_away_is_found(mariner):
+    wild = replace(mariner, coefficients=mariner.coefficients | {"N_r": 0.01, "N_vvr": 5.0})
+    problems = check_ship_model(wild).problems
+    assert any("deg to starboard: model 'mariner' runs away after" in problem for problem in problems)
+    assert any("deg to port" in problem for problem in problems)
+
+
+def test_accelerations_that_are_no_numbers_are_found(mariner):
+    huge = replace(mariner, coefficients=mariner.coefficients | {"X_uuu": 1.7e308})
+    assert check_ship_model(huge).problems[0].startswith("derivatives: ")
+    assert "expected a number; look for coefficients" in check_ship_model(huge).problems[0]
+
+
+def test_inertia_that_cannot_be_is_found(mariner):
+    light = replace(mariner, particulars=replace(mariner.particulars, N_vdot=0.9, Y_rdot=0.9))
+    assert "inertia of the ship is not positive" in check_ship_model(light).problems[0]
+
+
+def test_a_missing_coefficient_in_a_file_is_a_problem_found(mariner, tmp_path):
+    mariner.save(tmp_path / "model.json")
+    fields = json.loads((tmp_path / "model.json").read_text())
+    del fields["coefficients"]["Y_v"]
+    (tmp_path / "model.json").write_text(json.dumps(fields))
+    check = check_ship_model(tmp_path / "model.json")
+    assert "missing: 'Y_v'" in check.problems[0]
+    assert np.isnan(check.asymmetry)
+    assert "there is no such model file" in check_ship_model(tmp_path / "none.json").problems[0]
+
+
+def test_a_covariance_that_is_none_is_found(mariner):
+    root = np.eye(40)
+    root[0, 1] = root[1, 0] = 2.0
+    assert "least eigenvalue" in check_ship_model(replace(mariner, covariance=root)).problems[0]
+    negative = np.diag([-1.0, *np.ones(39)])
+    assert "variance of 'X_u' is -1" in check_ship_model(replace(mariner, covariance=negative)).problems[0]
+
+
+def test_a_ship_without_rudder_or_thrust_is_remarked():
+    table = get_structure("surge")
+    drag = dict(zip(table.coefficient_names, [0.0, -4e-4, 0.0, 1e-3], strict=True))
+    ship = ShipModel(
+        "surge",
+        "surge",
+        Particulars(length=160.93, speed=7.7175),
+        SteeringGear(),
+        drag,
+        service_shaft_speed=1.2,
+    )
+    remarks = check_ship_model(ship).remarks
+    assert any("no rudder turns this model" in remark for remark in remarks)
+    assert any("% of service speed" in remark for remark in remarks)

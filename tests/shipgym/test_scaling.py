@@ -1,0 +1,105 @@
+"""Similar ships sail similar manoeuvres, in ship lengths."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, scale_model
+from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
+from shipgym.models import Envelope
+from shipgym.models.structures import get_structure
+
+NUMBERS = {
+    "steering5": [-0.06, -2.3, -0.9, -0.08, -1e-3, -0.104, -0.03, 3.7e-3],
+    "surge": [-1e-3, -2e-4, -2e-5, 0.02],
+}
+
+
+def small_ship(name: str) -> ShipModel:
+    coefficients = dict(zip(get_structure(name).coefficient_names, NUMBERS[name], strict=True))
+    particulars = Particulars(length=160.93, speed=7.7175)
+    return ShipModel(name, name, particulars, SteeringGear(35.0, 5.0, 1.0), coefficients,
+                     service_shaft_speed=1.2 if name == "surge" else 0.0)  # fmt: skip
+
+
+def test_a_model_of_the_mariner_sails_the_same_circle_in_ship_lengths():
+    """At the same Froude number a 1:50 model is sqrt(50) times as quick."""
+    ship = shipgym.load_model("mariner")
+    model = scale_model(ship, length=160.93 / 50.0)
+    assert model.particulars.speed == pytest.approx(7.7175 / np.sqrt(50.0))
+    assert model.particulars.mass == pytest.approx(ship.particulars.mass / 50.0**3)
+    assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
+    assert model.coefficients == ship.coefficients
+    assert model.steering.rudder_rate_deg_s == pytest.approx(5.0 * np.sqrt(50.0))
+    slow, quick = (turning_circle(s, 35, duration=d, dt=dt) for s, d, dt in (
+        (ship, 900, 0.5), (model, 900 / np.sqrt(50.0), 0.5 / np.sqrt(50.0))))  # fmt: skip
+    np.testing.assert_allclose(quick["x"] * 50.0, slow["x"], rtol=1e-9, atol=1e-6)
+    full, small = (turning_indices(t) for t in (slow, quick))
+    assert small.tactical_diameter_lengths == pytest.approx(full.tactical_diameter_lengths, rel=1e-9)
+
+
+def test_a_steering_model_in_si_units_keeps_its_overshoot():
+    ship = small_ship("steering5")
+    model = scale_model(ship, length=7.0)
+    assert model.coefficients["c_d"] == pytest.approx(3.7e-3 * 160.93 / 7.0)  # U^2/L^2 at one Froude number
+    quicker = np.sqrt(160.93 / 7.0)
+    overshoots = [
+        zigzag_indices(zigzag(s, 20, 20, duration=400 / q, dt=0.5 / q)).overshoot_1_deg
+        for s, q in ((ship, 1.0), (model, quicker))
+    ]
+    assert overshoots[0] == pytest.approx(overshoots[1], rel=1e-8)
+
+
+def test_a_surge_model_stops_in_as_many_ship_lengths_at_another_speed():
+    """Another service speed at the same length: not Froude's, and similar all the same."""
+    ship = small_ship("surge")
+    quick = scale_model(ship, length=160.93, speed=2.0 * 7.7175)
+    assert quick.service_shaft_speed == pytest.approx(2.4)
+    stops = [s.simulate(np.tile([0.0, -s.service_shaft_speed], (300, 1)), dt)
+             for s, dt in ((ship, 0.2), (quick, 0.1))]  # fmt: skip
+    np.testing.assert_allclose(stops[0]["x"], stops[1]["x"], rtol=1e-9, atol=1e-9)
+
+
+def test_there_and_back_is_the_ship_itself():
+    random = np.random.default_rng(0)
+    root = random.standard_normal((8, 8))
+    ship = replace(
+        small_ship("steering5"),
+        covariance=root @ root.T,
+        envelope=Envelope.from_samples(*random.normal([[7.0], [0.0], [0.0], [0.0]], 1.0, (4, 200))),
+    )
+    model = scale_model(ship, 7.0)
+    again = scale_model(model, 160.93)
+    np.testing.assert_allclose(again.covariance, ship.covariance, rtol=1e-12)
+    np.testing.assert_allclose(again.ship_column(), ship.ship_column(), rtol=1e-9, atol=1e-15)
+    state = np.array([7.0, 0.3, 0.01, 0.2])
+    scale = [np.sqrt(7.0 / 160.93)] * 2 + [np.sqrt(160.93 / 7.0), 1.0]
+    assert model.envelope.distance(*state * scale) == pytest.approx(ship.envelope.distance(*state))
+    deviations = [
+        np.sqrt(np.diag(s.covariance)) / np.abs(list(s.coefficients.values())) for s in (ship, model)
+    ]
+    np.testing.assert_allclose(*deviations, rtol=1e-12)
+
+
+def test_fresh_water_at_model_scale_becomes_salt_water():
+    ship = shipgym.load_model("mariner")
+    model = scale_model(ship, 3.0, water_density=1000.0)
+    assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
+    assert scale_model(model, 160.93, water_density=1025.0).particulars.mass == pytest.approx(
+        ship.particulars.mass
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "message"),
+    [
+        ("mariner", {"length": -3.0}, "length: -3 found, expected a number > 0; in m"),
+        ("mariner", {"length": 3.0, "speed": 0.0}, "speed: 0 found"),
+        ("container", {"length": 3.0}, "equations of reference ship 'container' found"),
+    ],
+)
+def test_what_cannot_be_scaled_is_refused(name, arguments, message):
+    with pytest.raises(InputError, match=message):
+        scale_model(shipgym.load_model(name), **arguments)
