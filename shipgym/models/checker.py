@@ -207,9 +207,10 @@ def _wrong_rudder(model: ShipModel) -> Iterator[str]:
     if not turned[0] > turned[1]:
         port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
         yield (
-            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate of {starboard:.3g} deg/s, "
-            f"as much to port {port:.3g} deg/s, expected the first to be larger: a positive rudder turns to "
-            "starboard; read the trials with rudder_positive='port', or turn the signs of the terms odd in it"
+            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate of {starboard:.3g} "
+            f"deg/s, as much to port {port:.3g} deg/s, expected the first to be larger: a positive rudder "
+            "turns to starboard; read the trials with rudder_positive='port', or turn the signs of the terms "
+            "odd in the rudder"
         )
 
 

@@ -15,7 +15,7 @@ from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.envelope import Envelope
 from shipgym.models.equations import EQUATIONS, Equations
-from shipgym.models.structures import Structure, get_structure
+from shipgym.models.structures import PRINTED, Structure, get_structure
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 
@@ -48,7 +48,8 @@ class ShipModel:
     provenance : dict or None
         Method, settings, software version and trials it came from, or the source of a reference ship.
     own_table : Structure or None
-        The table of terms a model file came with; by default the one known by the structure's name.
+        The table of terms a model file came with, or a registered one; by default the printed one of the
+        structure's name.
     service_shaft_speed : float
         Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
     """
@@ -65,6 +66,8 @@ class ShipModel:
     service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.own_table is None and self.structure not in PRINTED | EQUATIONS.keys():
+            object.__setattr__(self, "own_table", get_structure(self.structure))  # another process lacks it
         names = self.dynamics.coefficient_names
         missing = [name for name in names if name not in self.coefficients]
         unknown = [name for name in self.coefficients if name not in names]

@@ -105,6 +105,7 @@ STRUCTURES = {
         ABKOWITZ, CUBIC,
     )
 }  # fmt: skip
+PRINTED = frozenset(STRUCTURES)
 
 
 def list_structures() -> list[str]:
@@ -132,7 +133,7 @@ def register_structure(
 ) -> Structure:
     """Make a table of terms known by a name, so that it works wherever a structure does.
 
-    Model files carry their table, so only the process that identifies has to register it.
+    Models and their files carry their table, so only the process that identifies has to register it.
 
     Parameters
     ----------

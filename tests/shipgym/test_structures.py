@@ -1,5 +1,6 @@
 """Tables of terms: the compiled accelerations, the regression features and the inertia agree."""
 
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -205,7 +206,8 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, mon
     monkeypatch.undo()
     with pytest.raises(InputError, match="structure: 'mine' found"):
         get_structure("mine")
-    assert shipgym.load_model(tmp_path / "mine.json").simulate([[0.2]] * 20, 1.0)["r"][-1] > 0.0
+    for elsewhere in (shipgym.load_model(tmp_path / "mine.json"), pickle.loads(pickle.dumps(ship))):
+        assert elsewhere.simulate([[0.2]] * 20, 1.0)["r"][-1] > 0.0
 
 
 @pytest.mark.parametrize(
