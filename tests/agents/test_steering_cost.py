@@ -1,0 +1,47 @@
+"""Neither design costs more than 1.15 times the best gains that a direct search finds for it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from agents import LQ, PID, fly
+from shipgym.envs.course_keeping import CourseKeepingTask
+from shipgym.models import load_model
+from shipgym.steering import SteeringGear
+
+SEEDS = np.arange(64)
+MARINER = load_model("mariner")
+UNSTABLE = replace(
+    MARINER,
+    coefficients={**MARINER.coefficients, "N_v": -449e-5, "N_uv": -449e-5},
+    steering=SteeringGear(35.0, 2.5),
+)
+
+
+def best_cost(controller, model, task):
+    """Least mean cost that Nelder-Mead finds over the same gains, from the design and from half of it."""
+    names = list(controller.gains)
+    design = np.array([controller.gains[name] for name in names])
+
+    def cost(factors):
+        other = replace(controller, gains=dict(zip(names, design * factors, strict=True)))
+        return fly(other, model, task, seeds=SEEDS).cost.mean()
+
+    starts = np.ones(len(names)), np.full(len(names), 0.5)
+    return min(minimize(cost, start, method="Nelder-Mead", options={"maxfev": 90}).fun for start in starts)
+
+
+@pytest.mark.parametrize("design", [PID, LQ])
+@pytest.mark.parametrize(
+    ("model", "change_deg"),
+    [(MARINER, 30.0), (MARINER, 5.0), (MARINER, 0.0), (UNSTABLE, 30.0)],
+    ids=["mariner", "mariner small changes", "mariner one course", "unstable ship"],
+)
+def test_designs_are_near_the_best_of_their_kind(design, model, change_deg):
+    task = CourseKeepingTask(course_change_deg=change_deg)
+    controller = design.from_model(model)
+    cost = fly(controller, model, task, seeds=SEEDS).cost.mean()
+    best = best_cost(controller, model, task)
+    assert best <= cost <= 1.15 * best
