@@ -172,7 +172,8 @@ def _rates(model: ShipModel, states: Floats) -> Floats:
 def linearise(model: ShipModel, at: StraightRunning) -> tuple[Floats, Floats]:
     """Linear steering dynamics about a state without yaw rate, by central differences.
 
-    Speed and shaft are held. Roll, where the model knows it, is taken to follow at once.
+    Speed and shaft are held. Roll, where the model knows it, is taken to follow at once. Where even the
+    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken.
 
     Parameters
     ----------
