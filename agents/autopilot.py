@@ -14,11 +14,11 @@ from agents.concerns import why_unstable
 from agents.output import check_folder, whole_folder
 from agents.spread import ManoeuvreSpread, manoeuvre_spread
 from identification import IdentificationResult, identify
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.json_file import write_json
 from shipgym.models import ShipModel
 from shipgym.models.linear import Nomoto, is_course_stable, nomoto
-from shipgym.models.model_file import write_json
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
 from shipgym.trial import Trial

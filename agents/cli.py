@@ -10,12 +10,9 @@ import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ParamSpec
+from typing import Annotated, ParamSpec
 
 import typer
-
-if TYPE_CHECKING:
-    pass
 
 P = ParamSpec("P")
 

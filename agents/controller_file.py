@@ -16,7 +16,6 @@ Format 1:
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, fields
 from importlib import import_module
@@ -27,13 +26,14 @@ import numpy as np
 
 from agents.controller import Controller, check_names
 from agents.linear_loop import Margins
-from shipgym._checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.envs.course_keeping import OBSERVATION_NAMES
 from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel
-from shipgym.models.model_file import write_json
 
 FORMAT = 1
+REMEDY = "design the controller again or take another copy"
 FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
@@ -85,29 +85,10 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
         Naming the file and the field at fault, or the difference to the model.
     """
     where = str(path)
-    controller = _controller(_read(Path(path)), where)
+    controller = _controller(read_json(Path(path), "controller file", REMEDY), where)
     if model is not None:
         controller.check_fits_model(model)
     return controller
-
-
-def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such controller file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: binary content found, expected a controller file (JSON)") from None
-    try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path}: broken JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
-            f"the file may be cut short: design the controller again or take another copy"
-        ) from None
-    return check_table(content, f"{path}:")
 
 
 def _controller(content: Mapping[str, Any], where: str) -> Controller:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controller import Controller, Policy
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.envs.course_keeping import (
     INTEGRAL_ZONE,
     OBSERVATION_NAMES,

@@ -24,7 +24,7 @@ from agents.linear_loop import (
     rate_weight,
     sample_ship,
 )
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.envs.course_keeping import RUDDER_WEIGHT, control_interval
 from shipgym.models import ShipModel
 

@@ -12,7 +12,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym._checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.kernels import course_keeping_rows as rows
 from shipgym.kernels import layout
