@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.linear_loop import Margins, SampledShip, loop_margins
-from shipgym.envs.course_keeping import OBSERVATION_NAMES, observation_scales
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 

@@ -27,7 +27,7 @@ import numpy as np
 from agents.controller import Controller, check_names
 from agents.linear_loop import Margins
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
-from shipgym.envs.course_keeping import OBSERVATION_NAMES
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controller import Controller, Policy
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping import (
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import (
     INTEGRAL_ZONE,
     OBSERVATION_NAMES,
     REWARD_PARTS,
-    CourseKeepingEngine,
     CourseKeepingTask,
     observation_scales,
 )

@@ -28,7 +28,7 @@ from agents.report_verification import (
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
-    from agents.autopilot import AutopilotResult, Verification
+    from agents.autopilot_result import AutopilotResult, Verification
 
 SURE = 0.95  # probability of passing from which on a criterion counts as met
 

@@ -29,7 +29,7 @@ from shipgym.particulars import ADDED_MASSES
 from shipgym.trial import Trial
 
 if TYPE_CHECKING:
-    from agents.autopilot import AutopilotResult
+    from agents.autopilot_result import AutopilotResult
     from shipgym.models import ShipModel
 
 KNOT = 1852.0 / 3600.0

@@ -30,7 +30,7 @@ from agents.report_html import (
 )
 
 if TYPE_CHECKING:
-    from agents.autopilot import AutopilotResult, Pilot, Verification
+    from agents.autopilot_result import AutopilotResult, Pilot, Verification
 
 SIGNALS = {
     "heading_error": ("heading error", "rad/rad"),
@@ -128,7 +128,7 @@ def autopilots_section(result: AutopilotResult, found: Verification) -> Html:
     nomoto = found.nomoto
     t = found.pilots[0].step[0]
     responses = {pilot.name: pilot.step[1:] for pilot in _by_name(found)}
-    from agents.autopilot import STEP_DEG
+    from agents.autopilot_result import STEP_DEG
 
     return section(
         "autopilots",

@@ -15,7 +15,8 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from agents.autopilot import AutopilotResult, Progress
+    from agents.autopilot import Progress
+    from agents.autopilot_result import AutopilotResult
     from identification import IdentificationResult
     from shipgym.manoeuvres import Criterion
 

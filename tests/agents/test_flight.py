@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, fly, step_response
-from shipgym.envs.course_keeping import CourseKeepingTask
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.models.mariner import mariner

@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from agents import LQ, PID, fly
-from shipgym.envs.course_keeping import CourseKeepingTask
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.models import load_model
 
 SEEDS = np.arange(64)
