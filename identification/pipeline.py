@@ -19,10 +19,10 @@ from identification.prediction import predict, trial_metrics
 from identification.samples import build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
+from shipgym.json_file import write_json
 from shipgym.models import Envelope, ShipModel, Structure, get_structure
-from shipgym.models.model_file import write_json
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 from shipgym.trial import Trial

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.models.envelope import Envelope
 from shipgym.models.ship_model import ShipModel

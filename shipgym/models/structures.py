@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from shipgym._checks import check_choice
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.models.equations import EQUATIONS
 from shipgym.models.term_table import FORCE_OF_EQUATION, Structure

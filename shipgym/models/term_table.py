@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_choice, check_text, quoted
+from shipgym.checks import check_choice, check_text, quoted
 from shipgym.errors import InputError
 from shipgym.models.terms import CHANNEL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, YAW_RATES, Term
 from shipgym.particulars import Particulars

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from shipgym._checks import did_you_mean, quoted
+from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
 # du is the surge speed above service speed, dn the shaft speed above that of service, U the speed through
