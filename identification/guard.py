@@ -34,7 +34,10 @@ QUICKEST = 3.0
 
 #: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
 #: SIMMAN 2008 slows down to 0.37 at r L / U = 0.8 and a drift of 20 degrees.
-HARD_TURN = {"speed": 0.47, "drift": np.radians(20.5), "yaw_rate": 0.8, "rudder": np.radians(35.0)}
+#: The shaft turns somewhat slower under its load.
+HARD_TURN = {
+    "speed": 0.47, "drift": np.radians(20.5), "yaw_rate": 0.8, "rudder": np.radians(35.0), "shaft": 0.9,
+}  # fmt: skip
 
 #: Strengths of the penalty tried in turn: rms error allowed in the regression, relative to what the terms
 #: contribute in a hard turn.
@@ -51,7 +54,7 @@ def hard_turn_features(
         "v": -speed * np.sin(HARD_TURN["drift"]),
         "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
         "delta": HARD_TURN["rudder"],
-        "n": shaft_speed,
+        "n": HARD_TURN["shaft"] * shaft_speed,
     }
     channels = {name: np.array([state[name]]) for name in structure.required_channels}
     return {

@@ -152,13 +152,14 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
 
 def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats]) -> Floats:
     """Accelerations as sums of the table's terms, shape (n, 3)."""
-    moving = {**channels, **{name: np.zeros(SAMPLES) for name in "vr" if name not in table.equations}}
+    length, speed = model.particulars["length"], model.particulars["speed"]
     shaft = model.service_shaft_speed
     theta = table.kernel_coefficients(model.coefficients, model.particulars, shaft)
     accelerations = np.zeros((SAMPLES, 3))
+    accelerations[:, 1:] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
     row = 0
     for equation, terms in table.equations.items():
-        features = table.features(equation, moving, model.particulars, shaft)
+        features = table.features(equation, channels, model.particulars, shaft)
         accelerations[:, "uvr".index(equation)] = features @ theta[row : row + len(terms)]
         row += len(terms)
     return accelerations

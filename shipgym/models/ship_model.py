@@ -197,15 +197,9 @@ class ShipModel:
             )
 
     def kernel_states(self, states: Floats) -> Floats:
-        """States of shape (n, n_state) with the columns that the kernels know, those without use 0.
-
-        A table without an equation of sway or yaw is that of a ship that does not drift or turn.
-        """
+        """States of shape (n, n_state) with the columns that the kernels know, those without use 0."""
         wide = np.zeros((len(states), layout.N_STATE))
         wide[:, self._columns] = states
-        if isinstance(self.dynamics, Structure):
-            still = [name for name in ("v", "r") if name not in self.dynamics.equations]
-            wide[:, [layout.STATE_NAMES.index(name) for name in still]] = 0.0
         return wide
 
     def own_states(self, states: Floats) -> Floats:

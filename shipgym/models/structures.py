@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
 from shipgym.models.equations import EQUATIONS
 from shipgym.models.term_table import FORCE_OF_EQUATION, Structure
@@ -126,7 +127,7 @@ def get_structure(name: str) -> Structure:
 
 def register_structure(
     name: str,
-    equations: Mapping[str, str | tuple[Term, ...]],
+    equations: Mapping[str, str | Sequence[Term]],
     source: str = "own",
     normalisation: str = "si",
     quantity: str = "acceleration",
@@ -159,11 +160,24 @@ def register_structure(
     InputError
         For a formula that cannot be read, a table that cannot be computed, or a name that another table has.
     """
-    tables = {q: read_terms(terms) if isinstance(terms, str) else terms for q, terms in equations.items()}
-    structure = Structure(name, source, tables, normalisation, quantity)
+    table = check_table(equations, "register_structure: equations")
+    terms = {q: _terms(given, f"register_structure: equations.{q}") for q, given in table.items()}
+    structure = Structure(name, source, terms, normalisation, quantity)
     if name in EQUATIONS or STRUCTURES.get(name, structure) != structure:
         raise InputError(
             f"register_structure: name {name!r} found, which is another structure's; expected a new name"
         )
     STRUCTURES[name] = structure
     return structure
+
+
+def _terms(given: Any, where: str) -> tuple[Term, ...]:
+    """Terms from formulas, or terms as they are."""
+    if isinstance(given, str):
+        return read_terms(given)
+    if not isinstance(given, Sequence):
+        raise InputError(f"{where}: {given!r} found, expected formulas such as 'v, |v| r, delta'")
+    for term in given:
+        if not isinstance(term, Term):
+            raise InputError(f"{where}: {term!r} found, expected a formula in one text, or Terms")
+    return tuple(given)

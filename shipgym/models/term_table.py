@@ -33,7 +33,7 @@ class Structure:
     """A table of terms for surge, sway and yaw, or some of them.
 
     Without an equation of surge the ship keeps the speed it has; without one of sway or of yaw it does not
-    drift or turn.
+    drift or turn, and what drift or turn it is given dies out within about a ship length.
 
     Attributes
     ----------

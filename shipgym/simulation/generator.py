@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from shipgym.models.structures import FORCE_OF_EQUATION, Structure, Term
 from shipgym.models.terms import CHANNEL
 
@@ -23,15 +25,26 @@ def shaft_acceleration(n, command, ship, lane):
 def accelerations(u, v, r, p, phi, delta, n, depth, ship, lane):
 '''
 
+#: Where a structure has no equation: the speed stays, and what drift or turn there is dies out within about
+#: a ship length.
+WITHOUT = {
+    "u": "    udot = 0.0\n",
+    "v": "    vdot = -v * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
+    "r": "    rdot = -r * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
+}
+
 
 def accelerations_source(structure: Structure) -> str:
     """Source of `accelerations.py` for a structure: each distinct term once, then a sum per equation."""
     variables: dict[str, str] = {}
     sums = []
     row = 0
-    for equation, terms in structure.equations.items():
+    for equation in FORCE_OF_EQUATION:
+        if equation not in structure.equations:
+            sums.append(WITHOUT[equation])
+            continue
         products = []
-        for term in terms:
+        for term in structure.terms(equation):
             expression = product(term, structure.speed_power(equation, term))
             variable = variables.setdefault(expression, f"t{len(variables)}")
             products.append(f"ship[COEFFICIENTS + {row} * LANES + lane] * {variable}")
@@ -39,11 +52,8 @@ def accelerations_source(structure: Structure) -> str:
         joined = "\n        + ".join(products)
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
-    results = ", ".join(
-        f"{equation}dot" if equation in structure.equations else "0.0" for equation in FORCE_OF_EQUATION
-    )
-    body = assignments + "".join(sums) + f"    return {results}, 0.0\n"
-    return _header(structure, " ".join(variables)) + body
+    body = assignments + "".join(sums) + "    return udot, vdot, rdot, 0.0\n"
+    return _header(structure, body) + body
 
 
 def product(term: Term, speed_power: int) -> str:
@@ -60,14 +70,14 @@ def symbol_variable(symbol: str) -> str:
     return f"abs_{CHANNEL[symbol]}" if symbol[0] == "|" else symbol
 
 
-def _header(structure: Structure, products: str) -> str:
+def _header(structure: Structure, body: str) -> str:
     """Everything above the products: imports of what they use, and the symbols that are no arguments."""
-    words = set(products.split())
+    words = set(re.findall(r"\w+", body))
     absolute = [symbol for symbol in structure.symbols if symbol[0] == "|"]
     functions = ["fabs"] * bool(absolute) + ["sqrt"] * bool(words & {"U", "per_U"})
-    rows = (
-        ["COEFFICIENTS", "LANES"] + ["SERVICE_SHAFT"] * ("dn" in words) + ["SERVICE_SPEED"] * ("du" in words)
-    )
+    rows = ["COEFFICIENTS", "LANES"]
+    rows += ["LENGTH"] * ("LENGTH" in words) + ["SERVICE_SHAFT"] * ("dn" in words)
+    rows += ["SERVICE_SPEED"] * bool(words & {"du", "SERVICE_SPEED"})
     library = f"from math import {', '.join(functions)}\n\n" if functions else ""
     lines = {
         "    U = sqrt(u * u + v * v)\n": words & {"U", "per_U"},

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
+from shipgym.models.linear import nomoto
 from shipgym.models.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
 
 speeds = st.floats(2.0, 10.0)
@@ -85,9 +86,7 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     theta = table.kernel_coefficients(model.coefficients, model.particulars, model.service_shaft_speed)
     state = np.array([0.0, 0.0, 0.3, 6.0, -0.9, -0.01, 0.2])
     channels = dict(zip(model.state_names, state[:, None], strict=True)) | {"n": [1.1]}
-    if "v" not in table.equations:
-        channels["v"] = np.zeros(1)
-    expected, row = dict.fromkeys("uvr", 0.0), 0
+    expected, row = {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93}, 0
     for equation, terms in table.equations.items():
         features = table.features(equation, channels, model.particulars, model.service_shaft_speed)[0]
         expected[equation] = features @ theta[row : row + len(terms)]
@@ -109,7 +108,8 @@ def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
     trial = ship.simulate(np.full((600, 1), 0.1), 0.5, start)
     np.testing.assert_allclose(trial["r"], K * 0.1 * (1.0 - np.exp(-trial.t / T)), rtol=1e-6, atol=1e-12)
     assert np.all(trial["u"] == 7.0)  # no surge: the speed stays
-    assert np.all(trial["v"] == 0.0)  # no sway: no drift
+    np.testing.assert_allclose(trial["v"], 0.5 * np.exp(-trial.t * 7.7175 / 160.93), rtol=1e-6)
+    assert np.all(ship.simulate(np.full((600, 1), 0.1), 0.5)["v"] == 0.0)  # no sway: no drift
 
 
 def test_norrbin_turns_at_the_root_of_its_cubic():
@@ -220,6 +220,9 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, mon
         ({"equations": {"w": "u"}}, "equations 'w' found, expected some of 'u', 'v', 'r'"),
         ({"equations": {"r": "v r, r v"}}, "stands twice in one equation: 'rv'"),
         ({"equations": {"r": ()}}, "no terms found"),
+        ({"equations": {"r": ["v", "r"]}}, "equations.r: 'v' found, expected a formula"),
+        ({"equations": {"r": 3}}, "equations.r: 3 found, expected formulas"),
+        ({"equations": "r, delta"}, "expected a table of keys and values"),
         ({"equations": {"r": "U r"}, "normalisation": "prime"}, "'U' found, which is 1 in the prime system"),
         ({"equations": {"r": "r"}, "normalisation": "prim"}, "Did you mean 'prime'"),
         ({"equations": {"r": "r"}, "quantity": "force"}, "forces in 'si' found"),
@@ -242,3 +245,10 @@ def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
         replace(virtual_ship("cubic"), service_shaft_speed=0.0)
     with pytest.raises(InputError, match="service_shaft_speed: 0 found"):
         get_structure("surge-perturbed").acceleration_matrix(Particulars(length=100.0, speed=5.0))
+
+
+def test_nomoto_is_recovered_from_its_own_linear_form():
+    """K and T of the table are those of the ship's transfer function: it has no sway to disturb them."""
+    found = nomoto(virtual_ship("nomoto", c_r=-1.0 / 30.2487, c_d=0.031 / 30.2487))
+    assert found.K == pytest.approx(0.031, rel=1e-6)
+    assert found.T == pytest.approx(30.2487, rel=1e-6)
