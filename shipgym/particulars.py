@@ -148,7 +148,8 @@ class Particulars(Mapping[str, Any]):
             raise InputError(f"{where} added_mass: {min(twice)} is given twice, expected it in one place")
         values = table | added
         estimated = values.pop("estimated", None) or ()
-        if isinstance(estimated, str) or not all(name in FIELDS for name in estimated):
+        names = isinstance(estimated, list | tuple | set | frozenset)
+        if not names or not all(name in FIELDS for name in estimated):
             raise InputError(f"{where} estimated: {estimated!r} found, expected a list of names of values")
         if values.get("length") is None:
             raise InputError(f"{where} length: missing, expected the length between perpendiculars in m")

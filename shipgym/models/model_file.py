@@ -173,7 +173,7 @@ def _numbers(value: Any, shape: tuple[int, ...], where: str) -> np.ndarray[Any, 
     """An array of finite numbers of the given shape."""
     try:
         array = np.array(value, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: expected numbers of shape {shape}, all rows of one length") from None
     if array.shape != shape or not np.all(np.isfinite(array)):
         raise InputError(f"{where}: shape {array.shape} found, expected {shape} finite numbers")

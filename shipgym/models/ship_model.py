@@ -68,6 +68,7 @@ class ShipModel:
     def __post_init__(self) -> None:
         if self.own_table is None and self.structure not in PRINTED | EQUATIONS.keys():
             object.__setattr__(self, "own_table", get_structure(self.structure))  # another process lacks it
+        self.particulars.require("speed")
         names = self.dynamics.coefficient_names
         missing = [name for name in names if name not in self.coefficients]
         unknown = [name for name in self.coefficients if name not in names]

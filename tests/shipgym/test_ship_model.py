@@ -132,6 +132,12 @@ CASES = [
     (broken(lambda f: f.update(pickle="gASV")), "unknown key 'pickle'"),
     (broken(lambda f: f["particulars"].update(length=-3)), "length"),
     (broken(lambda f: f["envelope"].update(low=[0, 1])), r"envelope\.low"),
+    (broken(lambda f: f["particulars"].update(speed=None)), "speed is needed and not known"),
+    (broken(lambda f: f["particulars"].update(estimated=3)), "estimated: 3 found"),
+    (broken(lambda f: f["structure"].update(normalisation="si")), "forces in 'si' found"),
+    (broken(lambda f: f["structure"].update(quantity="power")), "quantity: 'power' found"),
+    (broken(lambda f: f["structure"]["equations"].update(w=[])), "unknown key 'w'"),
+    (broken(lambda f: f["structure"]["equations"]["r"].reverse()), "'v' and 'r' differ"),
     (lambda _: "[1, 2]", "expected a table"),
 ]
 
