@@ -20,7 +20,7 @@ from shipgym.units import CHANNELS, check_channel
 Array = npt.NDArray[np.float64]
 
 #: Kinds of manoeuvre that have indices or a meaning of their own.
-KINDS = ("zigzag", "turning-circle", "straight", "random")
+KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "random")
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
@@ -42,7 +42,7 @@ class Trial:
         Values of each channel.
     name : str, optional
         Name of the trial; for a file its file name.
-    kind : {"zigzag", "turning-circle", "straight", "random"}, optional
+    kind : {"zigzag", "turning-circle", "spiral", "pull-out", "straight", "random"}, optional
         The manoeuvre, where known.
     use : {"fit", "validate", "skip"}, optional
         What the trial is for.

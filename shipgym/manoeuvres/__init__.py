@@ -1,14 +1,32 @@
 """Standard manoeuvres, their indices and the criteria they are judged by."""
 
 from shipgym.manoeuvres.imo import Criterion, imo_assessment
+from shipgym.manoeuvres.pull_outs import PullOutIndices, pull_out, pull_out_indices
+from shipgym.manoeuvres.spirals import (
+    Spiral,
+    SpiralIndices,
+    direct_spiral,
+    reverse_spiral,
+    spiral_from_trial,
+    spiral_indices,
+)
 from shipgym.manoeuvres.turning import TurningIndices, turning_circle, turning_indices
 from shipgym.manoeuvres.zigzags import ZigzagIndices, switch_heading_deg, zigzag, zigzag_indices
 
 __all__ = [
     "Criterion",
+    "PullOutIndices",
+    "Spiral",
+    "SpiralIndices",
     "TurningIndices",
     "ZigzagIndices",
+    "direct_spiral",
     "imo_assessment",
+    "pull_out",
+    "pull_out_indices",
+    "reverse_spiral",
+    "spiral_from_trial",
+    "spiral_indices",
     "switch_heading_deg",
     "turning_circle",
     "turning_indices",
