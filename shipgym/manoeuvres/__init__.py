@@ -1,5 +1,11 @@
 """Standard manoeuvres, their indices and the criteria they are judged by."""
 
+from shipgym.manoeuvres.excitation import (
+    multi_sine_rudder,
+    prbs_rudder,
+    random_rudder_steps,
+    shaft_speed_steps,
+)
 from shipgym.manoeuvres.imo import Criterion, imo_assessment
 from shipgym.manoeuvres.pull_outs import PullOutIndices, pull_out, pull_out_indices
 from shipgym.manoeuvres.spirals import (
@@ -22,9 +28,13 @@ __all__ = [
     "ZigzagIndices",
     "direct_spiral",
     "imo_assessment",
+    "multi_sine_rudder",
+    "prbs_rudder",
     "pull_out",
     "pull_out_indices",
+    "random_rudder_steps",
     "reverse_spiral",
+    "shaft_speed_steps",
     "spiral_from_trial",
     "spiral_indices",
     "switch_heading_deg",
