@@ -12,7 +12,7 @@ from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from shipgym import manoeuvres, plots
-    from shipgym.errors import InputError, UnstableModelError
+    from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, load_model
     from shipgym.particulars import Particulars
     from shipgym.ship_file import ShipFile
@@ -23,6 +23,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "InputError": "shipgym.errors",
+    "ManoeuvreError": "shipgym.errors",
     "Particulars": "shipgym.particulars",
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
@@ -37,6 +38,7 @@ _SUBPACKAGES = ("manoeuvres", "plots")
 
 __all__ = [
     "InputError",
+    "ManoeuvreError",
     "Particulars",
     "ShipFile",
     "ShipModel",

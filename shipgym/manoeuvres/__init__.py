@@ -16,16 +16,28 @@ from shipgym.manoeuvres.spirals import (
     spiral_from_trial,
     spiral_indices,
 )
+from shipgym.manoeuvres.stopping import (
+    AccelerationIndices,
+    StoppingIndices,
+    acceleration,
+    acceleration_indices,
+    stopping,
+    stopping_indices,
+)
 from shipgym.manoeuvres.turning import TurningIndices, turning_circle, turning_indices
 from shipgym.manoeuvres.zigzags import ZigzagIndices, switch_heading_deg, zigzag, zigzag_indices
 
 __all__ = [
+    "AccelerationIndices",
     "Criterion",
     "PullOutIndices",
     "Spiral",
     "SpiralIndices",
+    "StoppingIndices",
     "TurningIndices",
     "ZigzagIndices",
+    "acceleration",
+    "acceleration_indices",
     "direct_spiral",
     "imo_assessment",
     "multi_sine_rudder",
@@ -37,6 +49,8 @@ __all__ = [
     "shaft_speed_steps",
     "spiral_from_trial",
     "spiral_indices",
+    "stopping",
+    "stopping_indices",
     "switch_heading_deg",
     "turning_circle",
     "turning_indices",

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym._checks import check_number
+from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel
 from shipgym.simulation.simulate import as_trial, unstable
@@ -19,6 +20,8 @@ Floats = NDArray[np.float64]
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
 STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged
 MOST_STRETCHES = 60  # after which a leg ends, steady or not
+HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
+HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
 STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
 
 #: Sails on: kernel states of shape (n_steps + 1, 10) with the start in row 0 and commands (n_steps, 2)
@@ -56,6 +59,7 @@ class Voyage:
         self.length_time = model.particulars["length"] / model.particulars["speed"]
         default = self.length_time / STEPS_PER_LENGTH
         self.dt = default if dt is None else check_number(dt, "dt", above=0.0, at_most=self.length_time)
+        self.water_depth = water_depth
         self.ship = model.ship_tile(water_depth)
         start = model.service_state if state is None else state
         self._states = [model.kernel_states(start[None])]
@@ -90,6 +94,29 @@ class Voyage:
 
         return sail
 
+    def rate_helmsman(self) -> Callable[[float], Sail]:
+        """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
+
+        He is designed from the rudder's effect at service speed, and remembers his integral part.
+        """
+        model, memory = self.model, np.zeros(1)
+        steer, shaft = model.kernel("rate_steering").steer_rate, model.service_shaft_speed
+        gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
+        reset_time = HELMSMAN_RESET * self.length_time
+
+        def held(rate: float) -> Sail:
+            def sail(states: Floats, commands: Floats) -> int:
+                orders = np.empty(len(commands))
+                reached: int = steer(
+                    states, orders, memory, rate, shaft, self.dt, gain, reset_time, self.ship
+                )
+                commands[:, 0], commands[:, 1] = orders, shaft
+                return reached
+
+            return sail
+
+        return held
+
     def settle(self, sail: Sail) -> Steady:
         """Sail until the motion no longer changes, 300 ship lengths at most."""
         n_steps = max(round(STRETCH * self.length_time / self.dt), 2)
@@ -106,10 +133,26 @@ class Voyage:
             before = now
         return Steady(float(rudder), float(r))
 
-    def trial(self, kind: str | None = None) -> Trial:
-        """What was sailed so far."""
+    def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
+        """What was sailed so far, up to the sample number `last`."""
         states = np.concatenate(self._states)
         commands = np.concatenate([*self._commands, self._commands[-1][-1:]])
         orders = commands[:, : len(self.model.command_names)]
         times = self.dt * np.arange(len(states), dtype=float)
-        return as_trial(self.model, times, states, orders, kind)
+        kept = slice(None if last is None else last + 1)
+        return as_trial(self.model, times[kept], states[kept], orders[kept], kind)
+
+
+def _rudder_effect(model: ShipModel, water_depth: float) -> float:
+    """Yaw acceleration per rudder angle at service speed, 1/s^2."""
+    angle = float(np.radians(5.0))
+    states = np.repeat(model.service_state[None], 2, axis=0)
+    states[:, model.state_names.index("delta")] = angle, -angle
+    rates = model.derivatives(states, model.service_command, water_depth)[:, model.state_names.index("r")]
+    effect = float(rates[0] - rates[1]) / (2.0 * angle)
+    if not effect > 0.0:
+        raise InputError(
+            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed, expected a "
+            "rudder that turns the ship to its side; check the signs of its coefficients"
+        )
+    return effect

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from shipgym._checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
-from shipgym.manoeuvres.settling import Sail, Voyage
+from shipgym.manoeuvres.settling import Voyage
 from shipgym.models.ship_model import ShipModel
 from shipgym.trial import Trial
 
@@ -29,8 +29,6 @@ DIRECT_RUDDER_DEG = (
 )  # fmt: skip
 #: Yaw rates of the reverse spiral by U0 / L, from starboard to port.
 REVERSE_RATES = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
-HELMSMAN_BANDWIDTH = 2.0  # of the reverse spiral's helmsman, U0 / L
-HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
 STEADY_PART = 1.0 / 3.0  # of a measured plateau, its last part
 SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on its way
 
@@ -153,22 +151,8 @@ def reverse_spiral(
     given = usual if yaw_rate_deg_s is None else yaw_rate_deg_s
     most = float(np.degrees(1.0 / voyage.length_time))
     rates = _one_way(given, "yaw_rate_deg_s", "deg/s", most, "one radian per ship length sailed")
-    gain = HELMSMAN_BANDWIDTH / voyage.length_time / _rudder_effect(model, water_depth)
-    reset_time = HELMSMAN_RESET * voyage.length_time
-    steer, memory = model.kernel("rate_steering").steer_rate, np.zeros(1)
-
-    def held(rate: float) -> Sail:
-        def sail(states: Floats, commands: Floats) -> int:
-            orders, shaft = np.empty(len(commands)), model.service_shaft_speed
-            reached: int = steer(
-                states, orders, memory, rate, shaft, voyage.dt, gain, reset_time, voyage.ship
-            )
-            commands[:, 0], commands[:, 1] = orders, shaft
-            return reached
-
-        return sail
-
-    points = [voyage.settle(held(np.radians(rate))) for rate in rates]
+    helmsman = voyage.rate_helmsman()
+    points = [voyage.settle(helmsman(np.radians(rate))) for rate in rates]
     angles = np.degrees([point.rudder for point in points])
     return Spiral(voyage.trial("spiral"), angles, np.array(rates), "reverse")
 
@@ -186,21 +170,6 @@ def _one_way(values: Sequence[float], argument: str, unit: str, limit: float, wh
             "side to the other, such as 10, 5, 0, -5, -10"
         )
     return numbers
-
-
-def _rudder_effect(model: ShipModel, water_depth: float) -> float:
-    """Yaw acceleration per rudder angle at service speed, 1/s^2."""
-    angle = float(np.radians(5.0))
-    states = np.repeat(model.service_state[None], 2, axis=0)
-    states[:, model.state_names.index("delta")] = angle, -angle
-    rates = model.derivatives(states, model.service_command, water_depth)[:, model.state_names.index("r")]
-    effect = float(rates[0] - rates[1]) / (2.0 * angle)
-    if not effect > 0.0:
-        raise InputError(
-            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed, expected a "
-            "rudder that turns the ship to its side; check the signs of its coefficients"
-        )
-    return effect
 
 
 def spiral_from_trial(
