@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from shipgym import manoeuvres, plots
+    from shipgym import manoeuvres, plots, towing_tank
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, load_model
     from shipgym.particulars import Particulars
@@ -34,7 +34,7 @@ _HOME = {
     "load_model": "shipgym.models",
 }
 
-_SUBPACKAGES = ("manoeuvres", "plots")
+_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank")
 
 __all__ = [
     "InputError",
@@ -49,6 +49,7 @@ __all__ = [
     "load_model",
     "manoeuvres",
     "plots",
+    "towing_tank",
 ]
 
 
