@@ -160,6 +160,18 @@ def test_a_force_trial_is_a_file_like_any_other(mariner, tmp_path):
     assert "pure_yaw" in dir(shipgym.towing_tank)
 
 
+def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_path):
+    """The moment about midship is that about the centre of gravity and xG Y; kilonewtons are converted."""
+    trial = towing_tank.static_drift(mariner, [8.0])
+    xg = mariner.particulars["xg"]
+    channels = {"Y": trial["Y"], "N": trial["N"] - xg * trial["Y"]}
+    Trial(trial.t, {name: values / 1000.0 for name, values in channels.items()}).to_csv(tmp_path / "run.csv")
+    columns = {"t": "t", "Y": {"column": "Y", "unit": "kN"}, "N": {"column": "N", "unit": "kN m"}}
+    again = Trial.from_csv(tmp_path / "run.csv", columns, origin="cg", xg=xg)
+    np.testing.assert_allclose(again["Y"], trial["Y"], rtol=1e-12)
+    np.testing.assert_allclose(again["N"], trial["N"], rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
