@@ -20,8 +20,8 @@ from identification.samples import build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
 from shipgym.errors import InputError
+from shipgym.json_file import write_json
 from shipgym.models import Envelope, ShipModel, get_structure
-from shipgym.models.model_file import write_json
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 from shipgym.trial import Trial

@@ -23,7 +23,8 @@ from rich.table import Table
 import shipgym
 from identification import TruncatedLSSVM
 from identification.lssvm import dense_dual_solution
-from shipgym.envs.course_keeping import CourseKeepingEngine, CourseKeepingTask
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 
 MODEL = "mariner-tls-svm"
 STEPS_IN_PYTHON = """

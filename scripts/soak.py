@@ -18,12 +18,8 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import shipgym
-from shipgym.envs.course_keeping import (
-    OBSERVATION_HIGH,
-    OBSERVATION_LOW,
-    CourseKeepingEngine,
-    CourseKeepingTask,
-)
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import OBSERVATION_HIGH, OBSERVATION_LOW, CourseKeepingTask
 
 LANES = 1024
 CHECK_EVERY = 500

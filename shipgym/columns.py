@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym._checks import check_keys, check_table, check_text, quoted
+from shipgym.checks import check_keys, check_table, check_text, quoted
 from shipgym.csv_reader import CsvTable
 from shipgym.errors import InputError
 from shipgym.units import QUANTITIES, check_channel, si_factor, si_unit

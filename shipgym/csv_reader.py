@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from shipgym._checks import did_you_mean, quoted
+from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
 #: Cells that stand for "no value".

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
-from shipgym._checks import check_keys, check_number, check_table, check_text
+from shipgym.checks import check_keys, check_number, check_table, check_text
 from shipgym.errors import InputError
 
 #: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.

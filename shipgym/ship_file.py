@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym._checks import check_choice, check_keys, check_table, check_text
+from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.columns import parse_columns
 from shipgym.csv_reader import check_readable, read_bytes
 from shipgym.errors import InputError

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, TypedDict
 
-from shipgym._checks import check_keys, check_number, check_table
+from shipgym.checks import check_keys, check_number, check_table
 
 
 class _Bounds(TypedDict, total=False):

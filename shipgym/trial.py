@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym._checks import check_choice, check_number, check_text, did_you_mean, quoted
+from shipgym.checks import check_choice, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.units import CHANNELS, check_channel
 

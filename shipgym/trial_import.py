@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym._checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.columns import Source, choose_columns
 from shipgym.csv_reader import read_table
 from shipgym.derivatives import time_derivative

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from shipgym._checks import did_you_mean, quoted
+from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
 _DEGREE = math.pi / 180.0

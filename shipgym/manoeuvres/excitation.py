@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.zigzags import number_of_steps
 from shipgym.models.ship_model import ShipModel

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.settling import Voyage

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel

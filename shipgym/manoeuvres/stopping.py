@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, ship_length

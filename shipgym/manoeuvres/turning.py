@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, ship_length
 from shipgym.manoeuvres.zigzags import number_of_steps

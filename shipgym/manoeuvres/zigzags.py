@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.kernels import layout
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length

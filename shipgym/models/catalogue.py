@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from shipgym._checks import check_choice
+from shipgym.checks import check_choice
 from shipgym.models.container import container
 from shipgym.models.kvlcc2 import kvlcc2, kvlcc2_l7
 from shipgym.models.mariner import mariner

@@ -19,16 +19,15 @@ Format 1:
 
 from __future__ import annotations
 
-import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shipgym._checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
 from shipgym.models.envelope import CHANNELS, Envelope
 from shipgym.models.equations import EQUATIONS, Equations
 from shipgym.models.ship_model import ShipModel
@@ -62,51 +61,14 @@ def save(model: ShipModel, path: Path) -> None:
     write_json(fields, path)
 
 
-def write_json(fields: Mapping[str, Any], path: Path) -> None:
-    """Write JSON whole or not at all.
-
-    Raises
-    ------
-    InputError
-        If the folder does not exist or cannot be written.
-    """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    try:
-        draft.write_text(json.dumps(fields, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    finally:
-        draft.unlink(missing_ok=True)
-
-
 def load(path: Path) -> ShipModel:
     """Read and validate a model file."""
-    fields = _read(path)
+    fields = read_json(path, "model file", "identify the model again or take another copy")
     try:
         return _model(fields, str(path))
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
-
-
-def _read(path: Path) -> Mapping[str, Any]:
-    try:
-        text = path.read_bytes().decode("utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such model file") from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: binary content found, expected a model file (JSON)") from None
-    try:
-        fields = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path}: broken JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
-            f"the file may be cut short: identify the model again or take another copy"
-        ) from None
-    return check_table(fields, f"{path}:")
 
 
 def _model(fields: Mapping[str, Any], where: str) -> ShipModel:

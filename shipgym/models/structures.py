@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_choice
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.particulars import Particulars
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym._checks import check_number
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trial import Trial
 from shipgym.units import CHANNELS, check_channel

@@ -13,9 +13,9 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.course_keeping import (
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import (
     OBSERVATION_NAMES,
-    CourseKeepingEngine,
     CourseKeepingTask,
     control_interval,
     observation_scales,

@@ -1,0 +1,51 @@
+"""Autopilots for the ships of shipgym: classical designs, their flights, and the command line.
+
+Everything is imported when it is first used.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from agents.controller import Controller, Policy
+    from agents.controller_file import load_agent
+    from agents.flight import Flights, StepResponses, fly, step_response
+    from agents.lq import LQ
+    from agents.pid import PID
+
+_HOME = {
+    "LQ": "agents.lq",
+    "PID": "agents.pid",
+    "Controller": "agents.controller",
+    "Flights": "agents.flight",
+    "Policy": "agents.controller",
+    "StepResponses": "agents.flight",
+    "fly": "agents.flight",
+    "load_agent": "agents.controller_file",
+    "step_response": "agents.flight",
+}
+
+__all__ = [
+    "LQ",
+    "PID",
+    "Controller",
+    "Flights",
+    "Policy",
+    "StepResponses",
+    "fly",
+    "load_agent",
+    "step_response",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'agents' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *_HOME])

@@ -1,0 +1,201 @@
+"""The whole chain: recorded trials in; a model, its certainty, two verified autopilots and a report out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verification
+from agents.concerns import why_unstable
+from agents.output import check_folder, whole_folder
+from agents.spread import manoeuvre_spread
+from identification import identify
+from shipgym.checks import check_number
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.json_file import write_json
+from shipgym.models import ShipModel
+from shipgym.models.linear import is_course_stable, nomoto
+from shipgym.plots import graph_objects
+from shipgym.ship_file import ShipFile
+
+if TYPE_CHECKING:
+    from agents.controller import Controller
+
+Floats = NDArray[np.float64]
+
+FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
+#: Told the stage of the work, the units of it done and their total.
+Progress = Callable[[str, int, int], None]
+
+
+def build_autopilot(
+    ship_file: str | Path,
+    out: str | Path,
+    *,
+    draws: int = 200,
+    seed: int = 0,
+    structure: str | None = None,
+    method: str | None = None,
+    samples: str | None = None,
+    progress: Progress | None = None,
+) -> AutopilotResult:
+    """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
+
+    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the
+    model is unstable only the first two. It is written whole or not at all.
+
+    Parameters
+    ----------
+    ship_file : str or Path
+        The ship file (TOML) with its trials.
+    out : str or Path
+        Folder of the results; an earlier report there is replaced, anything else is refused.
+    draws : int
+        Number of models drawn from the coefficient covariance, at least 2.
+    seed : int
+        Of the draws and of the episodes flown.
+    structure, method, samples : str, optional
+        As in `identify`; by default what the ship file says.
+    progress : callable, optional
+        Called as the work goes on.
+
+    Returns
+    -------
+    AutopilotResult
+
+    Raises
+    ------
+    InputError
+        For anything wrong with the files or arguments; nothing is written then.
+    """
+    from agents.report import write_report
+
+    folder = Path(out)
+    check_number(draws, "draws", at_least=2)
+    check_number(seed, "seed", at_least=0)
+    check_folder(folder, FILES)
+    graph_objects()  # a missing extra shall be told now, not after the work
+    result = examine(
+        ship_file, draws=int(draws), seed=int(seed), structure=structure, method=method,
+        samples=samples, progress=progress,
+    )  # fmt: skip
+    with whole_folder(folder, FILES) as draft:
+        _tell(progress, "writing the report", 0, 1)
+        write_json(result.metrics, draft / "metrics.json")
+        if result.verification is not None:
+            result.model.save(draft / "model.json")
+            for pilot in result.verification.pilots:
+                pilot.controller.save(draft / f"{pilot.controller.name}.json")
+        write_report(result, draft / "report.html")
+        _tell(progress, "writing the report", 1, 1)
+    return result
+
+
+def examine(
+    ship_file: str | Path,
+    *,
+    draws: int = 200,
+    seed: int = 0,
+    structure: str | None = None,
+    method: str | None = None,
+    samples: str | None = None,
+    progress: Progress | None = None,
+) -> AutopilotResult:
+    """The chain without its files: see `build_autopilot`."""
+    _tell(progress, "reading trials", 0, 1)
+    ship = ShipFile.load(ship_file)
+    trials = tuple(ship.trials())
+    _tell(progress, "reading trials", 1, 1)
+    _tell(progress, "identifying", 0, 1)
+    chosen = identification_settings(ship, structure, method, samples)
+    identification = identify(trials, particulars=ship.particulars, steering=ship.steering, **chosen)
+    _tell(progress, "identifying", 1, 1)
+    instability = why_unstable(identification)
+    verification = None
+    if instability is None:
+        try:
+            verification = verify(identification.model, draws, seed, progress)
+        except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
+            instability = str(error)
+    return AutopilotResult(ship, trials, identification, instability, verification)
+
+
+def identification_settings(
+    ship: ShipFile, structure: str | None, method: str | None, samples: str | None
+) -> dict[str, Any]:
+    """Settings of `identify`: those given, else the ship file's, else the defaults of `identify`."""
+    given = {"structure": structure, "method": method, "samples": samples}
+    chosen = {key: value or ship.identify.get(key) for key, value in given.items()}
+    return {key: value for key, value in chosen.items() if value is not None}
+
+
+def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = None) -> Verification:
+    """Design both autopilots on a model and fly them over models drawn from its covariance.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a covariance.
+    draws, seed : int
+        See `build_autopilot`.
+    progress : callable, optional
+        Called as the work goes on.
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    UnstableModelError
+        If the model itself runs away.
+    """
+    from agents.lq import LQ
+    from agents.pid import PID
+
+    drawn = model.sample(draws, seed)
+    stage = "manoeuvres of the models drawn"
+    _tell(progress, stage, 0, draws)
+    manoeuvres = manoeuvre_spread(model, drawn, lambda done: _tell(progress, stage, done, draws))
+    stable = [draw for draw, lost in zip(drawn, manoeuvres.unstable, strict=True) if not lost]
+    pilots = []
+    designs: tuple[Any, ...] = (PID, LQ)
+    for k, design in enumerate(designs):
+        _tell(progress, "flying the autopilots", k, len(designs))
+        pilots.append(_fly(design.from_model(model), model, drawn, stable, seed))
+    _tell(progress, "flying the autopilots", len(designs), len(designs))
+    return Verification(
+        draws=draws,
+        seed=seed,
+        manoeuvres=manoeuvres,
+        course_unstable=np.array([not _holds_course(draw) for draw in drawn]),
+        nomoto=nomoto(model),
+        pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
+    )
+
+
+def _fly(
+    controller: Controller, model: ShipModel, drawn: list[ShipModel], stable: list[ShipModel], seed: int
+) -> Pilot:
+    """Episodes on all models drawn, and the step response of the identified and the stable ones."""
+    from agents.flight import fly, step_response
+
+    seeds = np.arange(len(drawn)) + seed  # the same episodes for every autopilot
+    step = step_response(controller, [model, *stable], STEP_DEG)
+    return Pilot(controller, fly(controller, drawn, seeds=seeds), step)
+
+
+def _holds_course(model: ShipModel) -> bool:
+    try:
+        return is_course_stable(model)
+    except InputError:  # there is no straight course at all
+        return False
+
+
+def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+    if progress is not None:
+        progress(stage, done, total)

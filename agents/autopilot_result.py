@@ -1,0 +1,161 @@
+"""What the whole chain found out: the model, its certainty, the autopilots and how they flew."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.spread import ManoeuvreSpread
+from identification import IdentificationResult
+from shipgym.models import ShipModel
+from shipgym.models.linear import Nomoto
+from shipgym.ship_file import ShipFile
+from shipgym.trial import Trial
+
+if TYPE_CHECKING:
+    from agents.controller import Controller
+    from agents.flight import Flights, StepResponses
+
+Floats = NDArray[np.float64]
+
+STEP_DEG = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """One autopilot and how it flew.
+
+    Attributes
+    ----------
+    controller : Controller
+        With name, gains and margins.
+    flights : Flights
+        One episode on each model drawn.
+    step : StepResponses
+        Of the identified model, first, and of the stable models drawn.
+    """
+
+    controller: Controller
+    flights: Flights
+    step: StepResponses
+
+    @property
+    def name(self) -> str:
+        """Short name, in capitals as the field writes it."""
+        return str(self.controller.name).upper()
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What was found out about a stable model and its autopilots.
+
+    Attributes
+    ----------
+    draws : int
+        Number of models drawn from the coefficient covariance.
+    seed : int
+        Of the draw and of the episodes.
+    manoeuvres : ManoeuvreSpread
+        Indices and IMO criteria of the model and its draws.
+    course_unstable : bool array of shape (n_draws,)
+        Draws that do not hold a straight course with the rudder held.
+    nomoto : Nomoto
+        Of the identified model.
+    pilots : tuple of Pilot
+        Ranked: the lowest mean cost first.
+    """
+
+    draws: int
+    seed: int
+    manoeuvres: ManoeuvreSpread
+    course_unstable: NDArray[np.bool_]
+    nomoto: Nomoto
+    pilots: tuple[Pilot, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class AutopilotResult:
+    """All that the report tells.
+
+    Attributes
+    ----------
+    ship : ShipFile
+        What was read.
+    trials : tuple of Trial
+        In the order of the file.
+    identification : IdentificationResult
+        The model and its predictions.
+    instability : str or None
+        Why the model must not be used; None where it is stable.
+    verification : Verification or None
+        None where the model is unstable.
+    """
+
+    ship: ShipFile
+    trials: tuple[Trial, ...]
+    identification: IdentificationResult
+    instability: str | None
+    verification: Verification | None
+
+    @property
+    def model(self) -> ShipModel:
+        """The identified model."""
+        return self.identification.model
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model can be used."""
+        return self.verification is not None
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """The contents of metrics.json."""
+        result = self.identification
+        metrics: dict[str, Any] = {
+            **result.metrics,
+            "stable": self.stable,
+            "instability": self.instability,
+            "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
+        }
+        if self.verification is not None:
+            metrics |= _verification_metrics(self.verification)
+        return metrics
+
+
+def _verification_metrics(found: Verification) -> dict[str, Any]:
+    return {
+        "draws": {
+            "count": found.draws,
+            "seed": found.seed,
+            "unstable": int(found.manoeuvres.unstable.sum()),
+            "course_unstable": int(found.course_unstable.sum()),
+        },
+        "nomoto": asdict(found.nomoto),
+        "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
+        "controllers": {pilot.controller.name: pilot_metrics(pilot) for pilot in found.pilots},
+        "ranking": [pilot.controller.name for pilot in found.pilots],
+    }
+
+
+def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
+    """Margins of one autopilot and its flights over the models drawn."""
+    flights = pilot.flights
+    return {
+        "gains": {name: float(value) for name, value in pilot.controller.gains.items()},
+        "margins": {name: _finite(value) for name, value in asdict(pilot.controller.margins).items()},
+        "cost_mean": float(np.mean(flights.cost)),
+        "cost_quantile_95": float(np.quantile(flights.cost, 0.95)),
+        "heading_rmse_deg_mean": float(np.mean(flights.heading_rmse_deg)),
+        "heading_rmse_deg_quantile_95": float(np.quantile(flights.heading_rmse_deg, 0.95)),
+        "rudder_travel_deg_min_mean": float(np.mean(flights.rudder_travel_deg_min)),
+        "extrapolating_mean": float(np.mean(flights.extrapolating)),
+        "lost_control": int(np.sum(flights.terminated)),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """A number as JSON knows it: infinite margins become null."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,257 @@
+"""The command `shipgym`: each subcommand imports what it needs when it is called.
+
+Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage, with one message on
+standard error and nothing written; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, ParamSpec
+
+import typer
+
+P = ParamSpec("P")
+
+FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+MODEL_FILES = ("model.json", "metrics.json")
+
+app = typer.Typer(
+    help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
+Structure = Annotated[
+    str | None, typer.Option(help="Terms of the model; default: the ship file's, else abkowitz.")
+]
+Method = Annotated[
+    str | None, typer.Option(help="tls-svm, ls-svm or ls; default: the ship file's, else tls-svm.")
+]
+Samples = Annotated[
+    str | None, typer.Option(help="spline, integral or euler; default: the ship file's, else spline.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
+
+
+def answered(command: Callable[P, None]) -> Callable[P, None]:
+    """Turn what goes wrong in a command into one message and the exit code it stands for."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        from shipgym.errors import InputError, UnstableModelError
+
+        try:
+            command(*args, **kwargs)
+        except InputError as error:
+            _fail(str(error), WRONG_INPUT)
+        except UnstableModelError as error:
+            _fail(str(error), FAILED)
+        except KeyboardInterrupt:
+            _fail("interrupted, nothing was written", INTERRUPTED)
+        except BrokenPipeError:  # the reader of the output went away
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            raise typer.Exit(FAILED) from None
+
+    return wrapped
+
+
+def _fail(message: str, code: int) -> None:
+    from agents.terminal import fail
+
+    fail(message)
+    raise typer.Exit(code) from None
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import shipgym
+
+        typer.echo(f"shipgym {shipgym.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def shipgym_command(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
+
+
+@app.command("identify")
+@answered
+def identify_command(
+    ship: ShipFileArgument,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for model.json and metrics.json.")],
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    as_json: Json = False,
+) -> None:
+    """Identify a manoeuvring model from recorded trials; write model.json and metrics.json.
+
+    Exits with 1 if the identified model is unstable.
+    """
+    from agents.autopilot import identification_settings
+    from agents.concerns import concerns, why_unstable
+    from agents.output import check_folder, whole_folder
+    from agents.terminal import err, prediction_table, print_json, warn
+    from agents.terminal import out as console
+    from identification import identify
+    from shipgym.ship_file import ShipFile
+
+    check_folder(out, MODEL_FILES)
+    read = ShipFile.load(ship)
+    chosen = identification_settings(read, structure, method, samples)
+    with err.status("identifying"):
+        result = identify(read.trials(), particulars=read.particulars, steering=read.steering, **chosen)
+    with whole_folder(out, MODEL_FILES) as draft:
+        result.save(draft)
+    instability = why_unstable(result)
+    if as_json:
+        print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
+    else:
+        if instability is None:
+            console.print(result.summary(), markup=False, soft_wrap=True)
+            console.print(prediction_table(result))
+        console.print(f"\nwritten: {out / 'model.json'}, {out / 'metrics.json'}", soft_wrap=True)
+    if instability is not None:
+        _fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
+    for concern in concerns(result):
+        warn(concern)
+
+
+@app.command("trials")
+@answered
+def trials_command(
+    model: Annotated[
+        str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="PLOTS.HTML", help="Write figures to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Put a model through zigzags and turning circles and judge it by the IMO criteria."""
+    from dataclasses import asdict
+
+    from agents.standard_trials import check_page, criteria_of, standard_trials, write_page
+    from agents.terminal import criteria_table, manoeuvre_table, print_json
+    from agents.terminal import out as console
+    from shipgym.models import load_model
+
+    ship = load_model(model)
+    if out is not None:
+        check_page(out)
+    runs = standard_trials(ship)
+    criteria = criteria_of(ship)
+    if out is not None:
+        write_page(ship, runs, criteria, out)
+    indices = {name: run.indices for name, run in runs.items()}
+    if as_json:
+        print_json(
+            {
+                "model": ship.name,
+                "manoeuvres": indices,
+                "imo": {name: asdict(criterion) for name, criterion in criteria.items()},
+            }
+        )
+        return
+    console.print(manoeuvre_table(indices))
+    console.print()
+    console.print(criteria_table(criteria))
+    if out is not None:
+        console.print(f"\nwritten: {out}", soft_wrap=True)
+
+
+@app.command("autopilot")
+@answered
+def autopilot_command(
+    ship: ShipFileArgument,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
+    draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes flown.")] = 0,
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    as_json: Json = False,
+) -> None:
+    """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
+
+    Exits with 1 if the identified model is unstable; the report then says so.
+    """
+    from agents.autopilot import build_autopilot
+    from agents.concerns import concerns
+    from agents.terminal import (
+        criteria_table,
+        prediction_table,
+        print_json,
+        progress_bars,
+        ranking_table,
+        warn,
+    )
+    from agents.terminal import out as console
+
+    with progress_bars(not as_json) as progress:
+        result = build_autopilot(
+            ship, out, draws=draws, seed=seed, structure=structure, method=method, samples=samples,
+            progress=progress,
+        )  # fmt: skip
+    report = out / "report.html"
+    if as_json:
+        print_json({**result.metrics, "report": str(report)})
+    elif result.verification is not None:
+        found = result.verification.manoeuvres
+        console.print(prediction_table(result.identification))
+        console.print()
+        nominal = {name: spread.nominal for name, spread in found.criteria.items()}
+        passing = {name: spread.probability for name, spread in found.criteria.items()}
+        console.print(criteria_table(nominal, passing))
+        console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
+        console.print(ranking_table(result))
+        console.print()
+    if not result.stable:
+        _fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
+    for concern in concerns(result.identification):
+        warn(concern)
+    if not as_json:
+        console.print(f"report: {report}", soft_wrap=True)
+
+
+@app.command("doctor")
+@answered
+def doctor_command(as_json: Json = False) -> None:
+    """Check the installation: versions, cache, optional packages, the import name agents.
+
+    Exits with 1 if something does not work.
+    """
+    from agents.doctor import examine_installation
+    from agents.terminal import out as console
+    from agents.terminal import print_json
+
+    findings = examine_installation()
+    if as_json:
+        print_json({"findings": [finding.to_dict() for finding in findings]})
+    else:
+        for finding in findings:
+            console.print(finding.line(), soft_wrap=True)
+    if any(finding.state == "wrong" for finding in findings):
+        raise typer.Exit(FAILED)
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="shipgym")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,82 @@
+"""What speaks against an identified model: why it must not be used, and what to know before using it."""
+
+from __future__ import annotations
+
+from pathlib import PurePath
+
+import numpy as np
+
+from identification import IdentificationResult
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+from shipgym.models.linear import nomoto
+
+LOST_HEADING = np.radians(10.0)  # rms error beyond which a prediction is not one
+
+
+def why_unstable(identification: IdentificationResult) -> str | None:
+    """Why an identified model must not be used, in one sentence; None where it is stable."""
+    ran_away = [name for name, prediction in identification.predictions.items() if prediction is None]
+    if ran_away:
+        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {ran_away[0]} first"
+    if not identification.stable:
+        guard = (identification.model.provenance or {}).get("guard", {})
+        reasons = guard.get("rejected", ["in a standard manoeuvre"])
+        return f"its simulation runs away ({reasons[0]})"
+    return None
+
+
+def concerns(identification: IdentificationResult) -> list[str]:
+    """What a user has to know of a model before using it, one sentence each.
+
+    Parameters
+    ----------
+    identification : IdentificationResult
+        Of a stable model.
+
+    Returns
+    -------
+    list of str
+        A rudder that steers to the wrong side, a fit that had to be penalised, no trial to validate,
+        values that were estimated.
+    """
+    model = identification.model
+    found = []
+    if _steers_to_port(model):
+        found.append(
+            "with the rudder to starboard the identified ship turns to port: likely a wrong rudder_positive "
+            "in [conventions], or a wrong sign of heading and yaw rate; settle this before using the model"
+        )
+    guard = (model.provenance or {}).get("guard", {})
+    if "rejected" in guard:
+        found.append(
+            f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
+            "held back; predictions far from the recorded manoeuvres deserve caution"
+        )
+    lost = {
+        name: float(np.degrees(metrics["rmse"]["psi"]))
+        for name, metrics in identification.metrics["trials"].items()
+        if (metrics["rmse"]["psi"] or 0.0) > LOST_HEADING
+    }
+    if lost:
+        worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in lost.items())
+        found.append(
+            "the predicted heading drifts from the measured one by more than "
+            f"{np.degrees(LOST_HEADING):.0f} deg rms on {worst}: "
+            "a ship that hardly holds a course magnifies small errors"
+        )
+    if not any(metrics["use"] == "validate" for metrics in identification.metrics["trials"].values()):
+        found.append(
+            'no trial is marked use = "validate": nothing tells how the model predicts what it has not seen'
+        )
+    if model.particulars.estimated:
+        names = ", ".join(sorted(model.particulars.estimated))
+        found.append(f"estimated, not given in the ship file: {names}")
+    return found
+
+
+def _steers_to_port(model: ShipModel) -> bool:
+    try:
+        return nomoto(model).rudder_effect < 0.0
+    except InputError:  # no straight course to tell it from
+        return False

@@ -1,0 +1,228 @@
+"""The classical autopilots' common part: from what the environment shows to the rudder.
+
+A controller is a list of gains on deviations from straight running. It keeps no state: the integral of
+the heading error, with its anti-windup, is part of the observation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.linear_loop import Margins, SampledShip, loop_margins
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+Action = NDArray[np.float32]
+
+SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
+
+
+class Policy(Protocol):
+    """Anything that steers: our controllers, stable-baselines3's agents, a user's own."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Actions for observations of shape (n_observations,) or (n, n_observations), and the state."""
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """Feedback of deviations from straight running to the commanded rudder.
+
+    Attributes
+    ----------
+    gains : dict of str to float
+        By the names of `feedback`, SI units: rad of rudder per rad, rad/s, rad s or m/s.
+    neutral_rudder : float
+        Rudder at which the ship runs straight, rad.
+    neutral_sway : float
+        Sway speed in straight running, m/s.
+    margins : Margins
+        Of the loop with the model it was designed on.
+    observation_scales : tuple of float
+        Physical value of each observation of 1, SI units; the rudder's is also the action's.
+    model_name, model_sha256 : str
+        The model it was designed on, and a hash of its structure and numbers.
+    design : dict of str to float
+        How it was designed: settings and intermediate results.
+    observation_names : tuple of str
+        What it observes.
+    """
+
+    kind: ClassVar[str] = ""
+    #: For each gain the signal it acts on and the sign with which it does.
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
+
+    gains: dict[str, float]
+    neutral_rudder: float
+    neutral_sway: float
+    margins: Margins
+    observation_scales: tuple[float, ...]
+    model_name: str
+    model_sha256: str
+    design: dict[str, float] = field(default_factory=dict)
+    observation_names: tuple[str, ...] = OBSERVATION_NAMES
+
+    @classmethod
+    def designed(
+        cls, model: ShipModel, ship: SampledShip, gains: dict[str, float], design: dict[str, float]
+    ) -> Self:
+        """The controller with these gains, its margins computed.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The model it was designed on.
+        ship : SampledShip
+            The same, linearised and sampled.
+        gains : dict of str to float
+            By the names of `feedback`.
+        design : dict of str to float
+            How they were found.
+
+        Raises
+        ------
+        InputError
+            If the closed loop is unstable.
+        """
+        by_signal = {signal: sign * gains[gain] for gain, (signal, sign) in cls.feedback.items()}
+        return cls(
+            gains=gains,
+            neutral_rudder=ship.about.rudder,
+            neutral_sway=ship.about.sway,
+            margins=loop_margins(ship, by_signal, f"{cls.__name__} on model '{model.name}'"),
+            observation_scales=tuple(observation_scales(model).tolist()),
+            model_name=model.name,
+            model_sha256=model_hash(model),
+            design={"dt": ship.dt, **design},
+        )
+
+    @property
+    def name(self) -> str:
+        """Short name: `pid`, `lq`."""
+        return self.kind
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Action, Any]:
+        """Commanded rudder for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (8,) or (n, 8)
+            Of the course-keeping environment.
+        state, episode_start, deterministic
+            Not used: the controller has no memory and no chance in it.
+
+        Returns
+        -------
+        action : float32 array of shape (1,) or (n, 1)
+            Part of the rudder limit, in [-1, 1].
+        state
+            As given.
+
+        Raises
+        ------
+        InputError
+            If the observation has another shape.
+        """
+        seen = np.asarray(observation, dtype=np.float64)
+        if seen.ndim not in (1, 2) or seen.shape[-1] != len(self.observation_names):
+            n = len(self.observation_names)
+            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n})")
+        deviations = self._deviations(seen)
+        order = np.full(seen.shape[:-1], self.neutral_rudder)
+        for gain, (signal, sign) in self.feedback.items():
+            order = order + sign * self.gains[gain] * deviations[signal]
+        limit = self.observation_scales[self.observation_names.index("rudder")]
+        return np.clip(order / limit, -1.0, 1.0)[..., None].astype(np.float32), state
+
+    def _deviations(self, seen: Floats) -> dict[str, Floats]:
+        """Deviations from straight running by signal, SI units, each of shape (...)."""
+        values = dict(zip(self.observation_names, (seen * self.observation_scales).T, strict=True))
+        return {
+            "heading_error": np.arctan2(values["heading_error_sin"], values["heading_error_cos"]),
+            "yaw_rate": values["yaw_rate"],
+            "sway": values["sway"] - self.neutral_sway,
+            "rudder": values["rudder"] - self.neutral_rudder,
+            "heading_error_integral": values["heading_error_integral"],
+        }
+
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse to steer what shows other quantities, or in other scales, than those designed for.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `observation_names` of an environment.
+        scales : sequence of float
+            Its `observation_scales`.
+        where : str
+            Start of the message.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        check_names(names, self.observation_names, where)
+        for name, found, expected in zip(names, scales, self.observation_scales, strict=True):
+            if abs(found - expected) > SCALE_TOLERANCE * abs(expected):
+                raise InputError(
+                    f"{where}: the scale of '{name}' is {found:g}, but controller '{self.name}' was "
+                    f"designed for {expected:g} (model '{self.model_name}'): another ship or rudder limit; "
+                    f"design a controller on this model with {type(self).__name__}.from_model"
+                )
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
+        self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
+
+    def save(self, path: str | Path) -> None:
+        """Write the controller as a JSON file (format in `agents.controller_file`)."""
+        from agents.controller_file import save
+
+        save(self, Path(path))
+
+
+def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
+    """Refuse observations by other names or in another order, naming the first difference."""
+    for i, (one, other) in enumerate(zip(found, expected, strict=False)):
+        if one != other:
+            raise InputError(f"{where}: observation {i} is '{one}', expected '{other}'")
+    if len(found) != len(expected):
+        difference = [name for name in (*found, *expected) if (name in found) != (name in expected)]
+        raise InputError(
+            f"{where}: {len(found)} observations found, expected {len(expected)}; "
+            f"in one and not in the other: {', '.join(difference)}"
+        )
+
+
+def model_hash(model: ShipModel) -> str:
+    """SHA-256 of a model's structure, coefficients, particulars and steering gear."""
+    content = [
+        model.dynamics.to_dict(),
+        model.coefficients,
+        model.particulars.to_dict(),
+        model.steering.to_dict(),
+    ]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

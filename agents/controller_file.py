@@ -1,0 +1,160 @@
+"""The controller file: JSON, versioned, written whole or not at all, validated field by field on reading.
+
+Format 1:
+
+    format               1
+    kind                 "pid" or "lq"
+    observation_names    what it observes, in order
+    observation_scales   physical value of each observation of 1, SI units
+    gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
+    neutral_rudder       rad, positive to starboard
+    neutral_sway         m/s
+    model                {"name", "sha256"}: what it was designed on
+    margins              {name: value or null for no limit}
+    design               {name: value}: how it was designed
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.controller import Controller, check_names
+from agents.linear_loop import Margins
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+from shipgym.models import ShipModel
+
+FORMAT = 1
+REMEDY = "design the controller again or take another copy"
+FIELDS = (
+    "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
+    "model", "margins", "design",
+)  # fmt: skip
+HOMES = {"pid": ("agents.pid", "PID"), "lq": ("agents.lq", "LQ")}
+
+
+def save(controller: Controller, path: Path) -> None:
+    """Write a controller file: to a temporary name, then renamed.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist or cannot be written.
+    """
+    margins = asdict(controller.margins)
+    content = {
+        "format": FORMAT,
+        "kind": controller.kind,
+        "observation_names": list(controller.observation_names),
+        "observation_scales": list(controller.observation_scales),
+        "gains": controller.gains,
+        "neutral_rudder": controller.neutral_rudder,
+        "neutral_sway": controller.neutral_sway,
+        "model": {"name": controller.model_name, "sha256": controller.model_sha256},
+        "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
+        "design": controller.design,
+    }
+    write_json(content, path)
+
+
+def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
+    """Read a controller file.
+
+    Parameters
+    ----------
+    path : str or Path
+    model : ShipModel, optional
+        The ship it shall steer; one with other observation scales is refused.
+
+    Returns
+    -------
+    Controller
+        A `PID` or an `LQ`.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the field at fault, or the difference to the model.
+    """
+    where = str(path)
+    controller = _controller(read_json(Path(path), "controller file", REMEDY), where)
+    if model is not None:
+        controller.check_fits_model(model)
+    return controller
+
+
+def _controller(content: Mapping[str, Any], where: str) -> Controller:
+    if "format" in content and content["format"] != FORMAT:
+        raise InputError(
+            f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
+        )
+    check_keys(content, FIELDS, where)
+    for name in FIELDS:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(FIELDS)}")
+    home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
+    design: type[Controller] = getattr(import_module(home), name)
+    model = check_table(content["model"], f"{where}: model")
+    check_keys(model, ("name", "sha256"), f"{where}: model")
+    _check_observations(content["observation_names"], where)
+    return design(
+        gains=_numbers(content["gains"], tuple(design.feedback), f"{where}: gains"),
+        neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
+        neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
+        margins=_margins(content["margins"], f"{where}: margins"),
+        observation_scales=_scales(content["observation_scales"], where),
+        model_name=check_text(model.get("name"), f"{where}: model.name"),
+        model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
+        design=_design(content["design"], f"{where}: design"),
+    )
+
+
+def _check_observations(names: Any, where: str) -> None:
+    """The observations must be those of the environment, in its order."""
+    if not isinstance(names, list):
+        raise InputError(f"{where}: observation_names: {names!r} found, expected a list of names")
+    check_names([str(name) for name in names], OBSERVATION_NAMES, f"{where}: observation_names")
+
+
+def _scales(value: Any, where: str) -> tuple[float, ...]:
+    n = len(OBSERVATION_NAMES)
+    if not isinstance(value, list) or len(value) != n:
+        found = len(value) if isinstance(value, list) else repr(value)
+        raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
+    return tuple(
+        check_number(scale, f"{where}: observation_scales[{i}] ('{OBSERVATION_NAMES[i]}')", above=0.0)
+        for i, scale in enumerate(value)
+    )
+
+
+def _numbers(value: Any, names: tuple[str, ...], where: str) -> dict[str, float]:
+    """A finite number for each name and none besides."""
+    table = check_table(value, where)
+    check_keys(table, names, where)
+    for name in names:
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(names)}")
+    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+
+
+def _margins(value: Any, where: str) -> Margins:
+    """Margins; null is no limit."""
+    names = tuple(margin.name for margin in fields(Margins))
+    table = check_table(value, where)
+    finite = {name: number for name, number in table.items() if number is not None}
+    unlimited = {name: np.inf for name, number in table.items() if number is None}
+    known = _numbers({**finite, **dict.fromkeys(unlimited, 0.0)}, names, where)
+    return Margins(**{**known, **unlimited})
+
+
+def _design(value: Any, where: str) -> dict[str, float]:
+    table = check_table(value, where)
+    return {name: check_number(number, f"{where}.{name}") for name, number in table.items()}

@@ -1,0 +1,308 @@
+"""The report of the whole chain: one self-contained HTML page that works offline."""
+
+from __future__ import annotations
+
+from importlib.resources import files
+from pathlib import Path, PurePath
+from string import Template
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+import shipgym
+from agents.concerns import concerns
+from agents.report_figures import CRITERIA
+from agents.report_html import NONE, Html, html, join, note, number, paragraph, percent, section, table
+from agents.report_sections import (
+    coefficients_section,
+    data_section,
+    prediction_section,
+    ship_tables,
+    trials_table,
+)
+from agents.report_verification import (
+    autopilots_section,
+    manoeuvres_section,
+    ranking_section,
+)
+from shipgym.errors import InputError
+
+if TYPE_CHECKING:
+    from agents.autopilot_result import AutopilotResult, Verification
+
+SURE = 0.95  # probability of passing from which on a criterion counts as met
+
+TITLES = {
+    "verdict": "Verdict",
+    "data": "Data and fit",
+    "coefficients": "Coefficients",
+    "prediction": "Prediction of trials",
+    "manoeuvres": "Manoeuvres and IMO",
+    "autopilots": "Autopilots",
+    "ranking": "Ranking",
+    "origin": "How this was made",
+    "remedy": "What to do",
+    "imo": "IMO criteria",
+    "zigzags": "Zigzags",
+    "circles": "Turning circles",
+}
+
+
+def plotly_script() -> str:
+    """The source of plotly.js, to stand once in a page.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    try:
+        from plotly.offline import get_plotlyjs
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "plotly is not installed, the report needs it: pip install 'shipgym[report]'"
+        ) from error
+    return str(get_plotlyjs()).replace("</script", "<\\/script")
+
+
+def write_report(result: AutopilotResult, path: str | Path) -> None:
+    """Write the report.
+
+    Parameters
+    ----------
+    result : AutopilotResult
+        What the chain found.
+    path : str or Path
+        The HTML file.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    found = result.verification
+    body = unstable_body(result) if found is None else stable_body(result, found)
+    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body), encoding="utf-8")
+
+
+def page(title: str, body: dict[str, Html]) -> str:
+    """A whole page from its sections by name, in order."""
+    template = Template(files("agents").joinpath("report_template.html").read_text(encoding="utf-8"))
+    contents = join(
+        Html(f'<li><a href="#{name}">{html(TITLES[name])}</a></li>') for name in body if name in TITLES
+    )
+    return template.substitute(
+        title=html(title),
+        version=html(shipgym.__version__),
+        plotly=plotly_script(),
+        contents=contents,
+        body=join(body.values(), "\n"),
+    )
+
+
+def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]:
+    """All sections."""
+    return {
+        "header": header(result),
+        "verdict": verdict(result, found),
+        "data": data_section(result),
+        "coefficients": coefficients_section(result),
+        "prediction": prediction_section(result),
+        "manoeuvres": manoeuvres_section(result, found),
+        "autopilots": autopilots_section(result, found),
+        "ranking": ranking_section(found),
+        "origin": origin_section(result),
+    }
+
+
+def unstable_body(result: AutopilotResult) -> dict[str, Html]:
+    """What can be said of an unstable model: that it is, and what to do; no numbers of its own."""
+    headline = (
+        f'<div class="verdict bad" id="verdict"><div class="headline">The identified model is unstable: '
+        f"{html(result.instability)}. It must not be used, and no coefficients, predictions, manoeuvres or "
+        "autopilots are given.</div>"
+        f'<div class="cards">{ship_card(result)}{data_card(result)}</div></div>'
+    )
+    advice = section(
+        "remedy",
+        "What to do",
+        paragraph(
+            "An unstable fit usually means that the trials do not hold enough: manoeuvres with other "
+            "rudder angles and to the other side, a turning circle, more samples. Or that the data is not "
+            "what the ship file says: check the signs of the rudder and of sway and yaw, the units, and "
+            "whether the velocities are those of midship."
+        ),
+        paragraph(
+            "A simpler structure, or the default method with its guard against models that run away, may "
+            "hold as well."
+        ),
+    )
+    data = section("data", "Data", trials_table(result), ship_tables(result))
+    return {
+        "header": header(result),
+        "verdict": Html(headline),
+        "remedy": advice,
+        "data": data,
+        "origin": origin_section(result),
+    }
+
+
+def ship_name(result: AutopilotResult) -> str:
+    """The name of the ship."""
+    return str(result.ship.particulars.name)
+
+
+def header(result: AutopilotResult) -> Html:
+    """Title of the page."""
+    return Html(
+        "<header><p class=kicker>Identified manoeuvring model and "
+        f"autopilots</p><h1>{html(ship_name(result))}</h1><p class=lead>Identified from recorded "
+        "manoeuvres, with the uncertainty of every coefficient carried through to the manoeuvring "
+        "criteria and to the autopilots.</p></header>"
+    )
+
+
+def card(label: str, value: object, detail: object) -> Html:
+    """One fact of the verdict."""
+    return Html(
+        f'<div class="card"><div class="label">{html(label)}</div><div class="value">{html(value)}</div>'
+        f'<div class="detail">{html(detail)}</div></div>'
+    )
+
+
+def headline(found: Verification) -> str:
+    """The verdict in two or three sentences."""
+    criteria = found.manoeuvres.criteria
+    missed = [CRITERIA[name].lower() for name, spread in criteria.items() if not spread.nominal.passed]
+    unsure = [
+        CRITERIA[name].lower()
+        for name, spread in criteria.items()
+        if spread.nominal.passed and spread.probability < SURE
+    ]
+    imo = f"The model is stable but misses the IMO criterion of {', '.join(missed)}."
+    if not missed:
+        imo = "The model is stable and meets all IMO criteria."
+    if unsure:
+        imo += f" Not certain: {', '.join(unsure)}."
+    unstable = int(found.manoeuvres.unstable.sum())
+    if unstable:
+        imo += f" {unstable} of {found.draws} models drawn run away in a manoeuvre."
+    best = found.pilots[0]
+    lost = int(np.sum(best.flights.terminated))
+    control = f"keeps control of all {found.draws} models drawn"
+    if lost:
+        control = f"loses control of {lost} of {found.draws} models drawn"
+    return f"{imo} {best.name} steers best and {control}."
+
+
+def verdict(result: AutopilotResult, found: Verification) -> Html:
+    """The box on top: ship, data, quality of the fit, IMO criteria, best autopilot."""
+    best = found.pilots[0]
+    spreads = found.manoeuvres.criteria.values()
+    doubts = any(spread.probability < SURE for spread in spreads) or bool(found.manoeuvres.unstable.any())
+    lost = bool(np.any(best.flights.terminated))
+    cards = [
+        ship_card(result),
+        data_card(result),
+        quality_card(result),
+        imo_card(found),
+        card(
+            "Best autopilot",
+            best.name,
+            Html(
+                f"mean cost {number(float(np.mean(best.flights.cost)), 3)}; phase margin "
+                f"{number(best.controller.margins.phase_margin_deg, 2)}°, heading rmse "
+                f"{number(float(np.mean(best.flights.heading_rmse_deg)), 2)}°"
+            ),
+        ),
+    ]
+    return Html(
+        f'<div class="verdict {"warn" if doubts or lost else "good"}" id="verdict">'
+        f'<div class="headline">{html(headline(found))}</div>'
+        f'<div class="cards">{join(cards)}</div>{concerns_list(result)}</div>'
+    )
+
+
+def concerns_list(result: AutopilotResult) -> Html:
+    """What has to be known before the model is used."""
+    items = join(
+        Html(f"<li>{html(text[0].upper() + text[1:])}.</li>") for text in concerns(result.identification)
+    )
+    return Html(f'<ul class="concerns">{items}</ul>' if items else "")
+
+
+def ship_card(result: AutopilotResult) -> Html:
+    """Size and speed."""
+    ship = result.model.particulars
+    return card(
+        "Ship",
+        f"L = {ship['length']:.4g} m",
+        Html(f"service speed {number(ship['speed'], 3)} m/s, mass {number(ship['mass'] / 1000.0, 3)} t"),
+    )
+
+
+def data_card(result: AutopilotResult) -> Html:
+    """How many trials."""
+    uses = [trial.use for trial in result.trials]
+    samples = sum(len(trial) for trial in result.trials)
+    minutes = sum(trial.duration for trial in result.trials) / 60.0
+    return card(
+        "Data",
+        f"{uses.count('fit')} trials to fit",
+        Html(f"{uses.count('validate')} to validate; {samples} samples, {number(minutes, 2)} min"),
+    )
+
+
+def quality_card(result: AutopilotResult) -> Html:
+    """Heading error on the trials that were not fitted, else on those that were."""
+    trials = result.identification.metrics["trials"]
+    unseen = {name: metrics for name, metrics in trials.items() if metrics["use"] == "validate"}
+    errors = {
+        name: float(np.degrees(metrics["rmse"]["psi"]))
+        for name, metrics in (unseen or trials).items()
+        if metrics["rmse"]["psi"] is not None
+    }
+    if not errors:
+        return card("Prediction", NONE, "no heading was measured")
+    worst = max(errors, key=lambda name: errors[name])
+    which = "trials not fitted" if unseen else "fitted trials, none to validate"
+    return card(
+        "Prediction",
+        f"{np.median(list(errors.values())):.1f}°",
+        f"heading rmse, median of {which}; largest {errors[worst]:.1f}° ({PurePath(worst).name})",
+    )
+
+
+def imo_card(found: Verification) -> Html:
+    """The criteria that pass, and the least certain one."""
+    spreads = found.manoeuvres.criteria
+    sure = sum(spread.probability >= SURE for spread in spreads.values())
+    least = min(spreads, key=lambda name: spreads[name].probability)
+    detail = Html(
+        f"pass with at least 95 %; lowest: {CRITERIA[least].lower()}, {percent(spreads[least].probability)}"
+    )
+    return card("IMO criteria", f"{sure} of {len(spreads)}", detail)
+
+
+def origin_section(result: AutopilotResult) -> Html:
+    """Software, settings and hashes, so that it can be done again."""
+    provenance = result.model.provenance or {}
+    settings = ("structure", "method", "samples")
+    facts = [
+        ["software", provenance.get("software", f"shipgym {shipgym.__version__}")],
+        ["ship file", result.ship.path.name],
+        [
+            "structure, method, samples",
+            ", ".join(str(provenance.get(key, NONE)) for key in settings),
+        ],
+    ]
+    if result.verification is not None:
+        facts.append(["models drawn, seed", f"{result.verification.draws}, {result.verification.seed}"])
+    hashes = [[trial.name, Html(f"<code>{trial.sha256[:16]}</code>")] for trial in result.trials]
+    return section(
+        "origin",
+        "How this was made",
+        table(["", ""], facts, text_columns=2),
+        table(["trial", "SHA-256 of its contents (first 16 digits)"], hashes, text_columns=2),
+        note("The numbers of this page are in metrics.json beside it."),
+    )

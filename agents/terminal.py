@@ -1,0 +1,175 @@
+"""What the commands print: results to standard output, progress and messages to standard error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from agents.autopilot import Progress
+    from agents.autopilot_result import AutopilotResult
+    from identification import IdentificationResult
+    from shipgym.manoeuvres import Criterion
+
+WIDTH_WITHOUT_TERMINAL = 110
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
+err = Console(stderr=True, highlight=False)
+
+
+def _table(title: str) -> Table:
+    """A table without lines, its title to the left."""
+    return Table(
+        title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
+        padding=(0, 2, 0, 0),
+    )  # fmt: skip
+
+
+def print_json(fields: Mapping[str, Any]) -> None:
+    """One JSON object and nothing else, for programs to read."""
+    print(json.dumps(fields, indent=1, allow_nan=False))
+
+
+def warn(message: str) -> None:
+    """A warning on standard error."""
+    err.print(Text.assemble(("warning: ", "bold yellow"), message), soft_wrap=True)
+
+
+def fail(message: str) -> None:
+    """The one message of an error on standard error, as it is."""
+    err.print(Text.assemble(("error: ", "bold red"), message), soft_wrap=True)
+
+
+@contextmanager
+def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
+    """Bars on standard error, one for each stage.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether to show any.
+
+    Yields
+    ------
+    callable or None
+        To be told stage, units done and total.
+    """
+    if not shown or not err.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    described = TextColumn("{task.description:<30}")
+    with Progress(described, BarColumn(bar_width=32), TimeElapsedColumn(), console=err) as bars:
+        tasks: dict[str, Any] = {}
+
+        def tell(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        yield tell
+
+
+def prediction_table(result: IdentificationResult) -> Table:
+    """Errors of the open-loop simulation of each trial, and its indices."""
+    table = _table("Open-loop simulation of the trials: root mean square errors")
+    table.add_column("trial", overflow="fold")
+    table.add_column("use")
+    for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
+        table.add_column(heading, justify="right")
+    table.add_column("measured -> predicted", no_wrap=True)
+    for name, metrics in result.metrics["trials"].items():
+        rmse = metrics["rmse"]
+        angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
+        errors = [_number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
+        found = "[bold red]ran away[/]" if metrics["diverged"] else _indices(metrics)
+        table.add_row(PurePath(name).name, metrics["use"], *errors, found)
+    return table
+
+
+def _indices(metrics: Mapping[str, Any]) -> str:
+    names = {
+        "overshoot_1_deg": "1st",
+        "overshoot_2_deg": "2nd",
+        "advance_lengths": "advance",
+        "tactical_diameter_lengths": "diameter",
+    }
+    return "\n".join(
+        f"{text} {_number(metrics[name]['measured'], 2)} -> {_number(metrics[name]['predicted'], 2)}"
+        for name, text in names.items()
+        if metrics.get(name) is not None
+    )
+
+
+def manoeuvre_table(rows: Mapping[str, Mapping[str, float | None]]) -> Table:
+    """Indices of manoeuvres, one line each."""
+    table = _table("Manoeuvres from service speed in deep water")
+    table.add_column("manoeuvre")
+    table.add_column("index")
+    table.add_column("value", justify="right")
+    for manoeuvre, indices in rows.items():
+        for k, (name, value) in enumerate(indices.items()):
+            table.add_row(manoeuvre if k == 0 else "", name, _number(value, 2))
+    return table
+
+
+def criteria_table(
+    criteria: Mapping[str, Criterion], probabilities: Mapping[str, float] | None = None
+) -> Table:
+    """IMO criteria, with the probability of passing where it is known."""
+    table = _table("IMO criteria, resolution MSC.137(76)")
+    table.add_column("criterion")
+    for heading in ("value", "limit"):
+        table.add_column(heading, justify="right")
+    for heading in ("unit", "verdict"):
+        table.add_column(heading)
+    if probabilities is not None:
+        table.add_column("probability of passing", justify="right")
+    for name, criterion in criteria.items():
+        verdict = "[green]passes[/]" if criterion.passed else "[red]fails[/]"
+        cells = [name, _number(criterion.value, 2), _number(criterion.limit, 2), criterion.unit, verdict]
+        if probabilities is not None:
+            cells.append(f"{100.0 * probabilities[name]:.1f} %")
+        table.add_row(*cells)
+    return table
+
+
+def ranking_table(result: AutopilotResult) -> Table:
+    """Autopilots over the models drawn, the best first."""
+    metrics = result.metrics
+    table = _table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
+    table.add_column("autopilot")
+    headings = (
+        "cost, mean", "cost, 95 %", "heading rmse, deg", "rudder, deg/min", "gain margin",
+        "phase margin, deg", "lost control",
+    )  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for name in metrics["ranking"]:
+        found = metrics["controllers"][name]
+        margins = found["margins"]
+        table.add_row(
+            name.upper(),
+            _number(found["cost_mean"], 2),
+            _number(found["cost_quantile_95"], 2),
+            _number(found["heading_rmse_deg_mean"], 2),
+            _number(found["rudder_travel_deg_min_mean"], 1),
+            "inf" if margins["gain_margin"] is None else _number(margins["gain_margin"], 2),
+            "inf" if margins["phase_margin_deg"] is None else _number(margins["phase_margin_deg"], 1),
+            str(found["lost_control"]),
+        )
+    return table
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return "-" if value is None else f"{value:.{decimals}f}"

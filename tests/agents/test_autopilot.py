@@ -1,0 +1,114 @@
+import json
+
+import numpy as np
+import pytest
+
+from agents.autopilot import build_autopilot, verify
+from agents.concerns import concerns
+from agents.spread import CriterionSpread, manoeuvre_spread
+from identification import identify
+from shipgym import InputError, ShipFile, load_model
+from shipgym.manoeuvres import Criterion
+
+
+def test_the_folder_holds_report_model_metrics_and_both_autopilots(chain):
+    folder, _, _ = chain
+    found = sorted(path.name for path in folder.iterdir())
+    assert found == ["lq.json", "metrics.json", "model.json", "pid.json", "report.html"]
+    assert list(folder.parent.iterdir()) == [folder]
+
+
+def test_the_model_predicts_the_trials_that_were_not_fitted(chain):
+    trials = chain[1].metrics["trials"]
+    zigzag, circle = trials["zigzag_15_15.csv"], trials["turning_circle_35.csv"]
+    assert zigzag["use"] == circle["use"] == "validate"
+    assert np.degrees(zigzag["rmse"]["psi"]) < 2.0
+    diameter = circle["tactical_diameter_lengths"]
+    assert diameter["predicted"] == pytest.approx(diameter["measured"], rel=0.03)
+
+
+def test_metrics_tell_probabilities_margins_and_ranking(chain):
+    folder, result, _ = chain
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["draws"]["count"] == 24
+    assert metrics["draws"]["unstable"] == int(result.verification.manoeuvres.unstable.sum())
+    assert metrics["imo"]["advance"]["probability"] == 1.0
+    assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
+    assert sorted(metrics["ranking"]) == ["lq", "pid"]
+    best, worst = (metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"])
+    assert 0.0 < best <= worst
+    for name in ("pid", "lq"):
+        assert metrics["controllers"][name]["lost_control"] == 0
+        assert metrics["controllers"][name]["margins"]["phase_margin_deg"] > 30.0
+
+
+def test_the_saved_model_is_the_identified_one(chain):
+    folder, result, _ = chain
+    assert load_model(folder / "model.json").coefficients == result.model.coefficients
+
+
+def test_progress_is_told_to_the_end(chain):
+    stages = chain[2]
+    assert ("manoeuvres of the models drawn", 24, 24) in stages
+    assert stages[-1] == ("writing the report", 1, 1)
+
+
+def test_the_same_seed_gives_the_same_numbers(chain):
+    result = chain[1]
+    again = verify(result.model, 24, 1)
+    for first, second in zip(result.verification.pilots, again.pilots, strict=True):
+        assert np.array_equal(first.flights.cost, second.flights.cost)
+
+
+def test_every_autopilot_ends_on_the_new_course(chain):
+    for pilot in chain[1].verification.pilots:
+        _, headings, rudders = pilot.step
+        assert len(headings) == len(rudders) == 25
+        assert np.degrees(headings[:, -1]) == pytest.approx(20.0, abs=1.5)
+
+
+def test_an_unstable_model_gives_a_report_that_says_so_and_no_model(unstable_ship, tmp_path):
+    result = build_autopilot(unstable_ship, tmp_path / "report", draws=10)
+    assert not result.stable
+    assert sorted(path.name for path in (tmp_path / "report").iterdir()) == ["metrics.json", "report.html"]
+    assert "runs away" in json.loads((tmp_path / "report" / "metrics.json").read_text())["instability"]
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "The identified model is unstable" in page
+    assert "N_vvr" not in page
+
+
+def test_too_few_draws_are_refused(demo, tmp_path):
+    with pytest.raises(InputError, match="draws: 1 found"):
+        build_autopilot(demo, tmp_path / "report", draws=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_rudder_of_the_wrong_sign_is_noticed(demo, tmp_path):
+    text = demo.read_text().replace('"starboard"', '"port"').replace('file = "', f'file = "{demo.parent}/')
+    (tmp_path / "ship.toml").write_text(text)
+    ship = ShipFile.load(tmp_path / "ship.toml")
+    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    assert "likely a wrong rudder_positive" in concerns(result)[0]
+
+
+def test_unstable_draws_count_as_failed_and_are_never_dropped():
+    model = load_model("mariner")
+    backwards = dict(model.coefficients) | {"N_r": 5e-3}  # yaw that feeds itself
+    wild = type(model)(**{**_fields(model), "coefficients": backwards})
+    spread = manoeuvre_spread(model, [model, wild, model, wild])
+    assert spread.unstable.tolist() == [False, True, False, True]
+    assert spread.criteria["advance"].probability == 0.5
+    assert len(spread.zigzag_headings) == 2
+
+
+def _fields(model):
+    names = ("name", "structure", "particulars", "steering", "coefficients")
+    return {name: getattr(model, name) for name in names}
+
+
+def test_a_criterion_without_value_has_no_quantile_and_does_not_pass():
+    nominal = Criterion(3.0, 4.5, True, "ship lengths", "5.3.1")
+    spread = CriterionSpread(nominal, np.array([3.0, np.nan]), np.array([True, False]))
+    assert spread.probability == 0.5
+    assert spread.quantiles(0.05, 0.95) == (3.0, 3.0)
+    assert spread.to_dict()["without_value"] == 1

@@ -1,0 +1,215 @@
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from agents.cli import app
+from shipgym import load_model
+
+ROOT = Path(__file__).parents[2]
+
+
+def shipgym(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def broken(demo, tmp_path):
+    """Writes the demo's ship file with one thing replaced."""
+
+    def write(old, new, file="ship.toml"):
+        for path in demo.parent.iterdir():
+            text = path.read_text()
+            if path.name == file:
+                assert old in text
+                text = text.replace(old, new, 1)
+            (tmp_path / path.name).write_text(text)
+        return tmp_path / "ship.toml"
+
+    return write
+
+
+def test_version():
+    answer = shipgym("--version")
+    assert answer.exit_code == 0
+    assert answer.stdout == "shipgym 0.1.0\n"
+
+
+def test_help_is_fast():
+    start = time.perf_counter()
+    answer = subprocess.run(
+        [sys.executable, "-m", "agents.cli", "--help"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert time.perf_counter() - start < 1.5
+    for command in ("identify", "trials", "autopilot", "doctor"):
+        assert command in answer.stdout
+
+
+def test_help_imports_nothing_heavy():
+    code = (
+        "import sys, agents.cli; sys.exit(any(m in sys.modules for m in ('numpy', 'scipy', 'numba', 'rich')))"
+    )
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("command", [["sail"], ["identify"], ["doctor", "--loud"], ["autopilot", "x.toml"]])
+def test_wrong_usage_exits_with_2_and_says_why(command):
+    answer = shipgym(*command)
+    assert answer.exit_code == 2
+    assert answer.stdout == ""
+    assert "Error:" in answer.stderr
+
+
+def test_identify_writes_model_and_metrics(demo, tmp_path):
+    answer = shipgym("identify", demo, "--out", tmp_path / "ship")
+    assert answer.exit_code == 0
+    assert "N_vvr" in answer.stdout
+    assert "zigzag_15_15.csv" in answer.stdout
+    assert "estimated, not given in the ship file: N_rdot" in answer.stderr
+    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == ["metrics.json", "model.json"]
+    assert load_model(tmp_path / "ship" / "model.json").coefficients["N_d"] > 0.0
+    metrics = json.loads((tmp_path / "ship" / "metrics.json").read_text())
+    assert metrics["trials"]["zigzag_15_15.csv"]["use"] == "validate"
+
+
+def test_identify_prints_nothing_but_json_when_asked(demo, tmp_path):
+    answer = shipgym("identify", demo, "--out", tmp_path / "ship", "--samples", "integral", "--json")
+    assert json.loads(answer.stdout)["stable"] is True
+
+
+def test_an_unstable_model_exits_with_1_and_prints_no_coefficients(unstable_ship, tmp_path):
+    answer = shipgym("identify", unstable_ship, "--out", tmp_path / "ship")
+    assert answer.exit_code == 1
+    assert "the identified model is unstable" in answer.stderr
+    assert "N_vvr" not in answer.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("beam =", "beem =", "Did you mean 'beam'"),
+        ("length = 160.93", "length = -160.93", "length"),
+        ('unit = "knots"', 'unit = "furlongs"', "furlongs"),
+        ('"starboard"', '"left"', "left"),
+        ("[ship]", "[ship", "TOML"),
+        ('file = "zigzag_10_10.csv"', 'file = "zigzag.csv"', "zigzag.csv"),
+        ('method = "tls-svm"', 'method = "svm"', "tls-svm"),
+        ('structure = "abkowitz"', 'structure = "abkovitz"', "abkowitz"),
+    ],
+)
+@pytest.mark.parametrize("command", ["identify", "autopilot"])
+def test_a_wrong_ship_file_exits_with_2_one_message_and_nothing_written(broken, command, old, new, said):
+    ship = broken(old, new)
+    answer = shipgym(command, ship, "--out", ship.parent / "out")
+    assert answer.exit_code == 2
+    assert answer.stderr.startswith("error: ")
+    assert answer.stderr.count("\n") == 1
+    assert said in answer.stderr
+    assert answer.stdout == ""
+    assert not (ship.parent / "out").exists()
+
+
+def test_a_wrong_sample_is_told_with_file_line_and_column(broken):
+    ship = broken("\n20.0,", "\n20.0,north", "zigzag_20_20.csv")
+    answer = shipgym("identify", ship, "--out", ship.parent / "out")
+    assert answer.exit_code == 2
+    assert "zigzag_20_20.csv" in answer.stderr
+    assert "gnss_north_m" in answer.stderr
+
+
+def test_a_folder_with_other_files_is_refused_before_any_work(demo, tmp_path):
+    (tmp_path / "thesis.tex").write_text("")
+    answer = shipgym("autopilot", demo, "--out", tmp_path)
+    assert answer.exit_code == 2
+    assert "holds 'thesis.tex'" in answer.stderr
+
+
+def test_an_interruption_leaves_nothing_and_exits_with_130(demo, tmp_path, monkeypatch):
+    def interrupted(*_args, **_settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.report.write_report", interrupted)
+    monkeypatch.setattr("agents.autopilot.why_unstable", lambda _: "for the test")
+    answer = shipgym("autopilot", demo, "--out", tmp_path / "report")
+    assert answer.exit_code == 130
+    assert "interrupted, nothing was written" in answer.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_trials_tells_indices_and_criteria():
+    answer = shipgym("trials", "mariner", "--json")
+    told = json.loads(answer.stdout)
+    assert told["manoeuvres"]["zigzag 20/20, starboard first"]["overshoot_1_deg"] == pytest.approx(
+        7.78, abs=0.02
+    )
+    assert told["imo"]["tactical_diameter"]["passed"] is False
+    assert told["imo"]["advance"]["value"] < 4.5
+
+
+def test_trials_writes_figures_that_work_offline(tmp_path):
+    answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.html")
+    assert answer.exit_code == 0
+    page = (tmp_path / "plots.html").read_text()
+    assert page.count('Plotly.newPlot("plot-') == 5
+    assert 'src="http' not in page
+
+
+@pytest.mark.parametrize("model", ["marinr", "no_such.json"])
+def test_an_unknown_model_exits_with_2(model):
+    answer = shipgym("trials", model)
+    assert answer.exit_code == 2
+    assert model in answer.stderr
+
+
+def test_a_model_file_cut_in_half_exits_with_2(tmp_path):
+    load_model("mariner").save(tmp_path / "model.json")
+    text = (tmp_path / "model.json").read_text()
+    (tmp_path / "model.json").write_text(text[: len(text) // 2])
+    answer = shipgym("trials", tmp_path / "model.json")
+    assert answer.exit_code == 2
+    assert "cut short" in answer.stderr
+
+
+def test_figures_go_to_html_files_only(tmp_path):
+    answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.png")
+    assert answer.exit_code == 2
+    assert ".html" in answer.stderr
+
+
+def test_doctor_finds_this_installation_fit():
+    answer = shipgym("doctor", "--json")
+    states = {finding["what"]: finding["state"] for finding in json.loads(answer.stdout)["findings"]}
+    assert states["numba"] == states["cache"] == states["import agents"] == "fine"
+    assert states["extra report"] == "fine"
+
+
+def test_doctor_tells_of_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
+    answer = shipgym("doctor")
+    assert answer.exit_code == 1
+    assert "compiles its ships anew" in answer.stdout
+
+
+def test_doctor_tells_of_another_distribution_called_agents(monkeypatch):
+    monkeypatch.setattr(
+        "importlib.metadata.packages_distributions", lambda: {"agents": ["shipgym", "openai-agents"]}
+    )
+    answer = shipgym("doctor")
+    assert answer.exit_code == 1
+    assert "also a package of openai-agents" in answer.stdout
+
+
+def test_a_wrong_file_gives_no_traceback_from_the_shell(tmp_path):
+    answer = subprocess.run(
+        [sys.executable, "-m", "agents.cli", "identify", "absent.toml", "--out", str(tmp_path / "out")],
+        cwd=ROOT, capture_output=True, text=True, check=False, env=os.environ | {"COLUMNS": "80"},
+    )  # fmt: skip
+    assert answer.returncode == 2
+    assert "Traceback" not in answer.stderr
+    assert answer.stderr.count("\n") == 1

@@ -1,0 +1,73 @@
+import json
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, Trial, load_model
+from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.plots import history_figure, path_figure, zigzag_figure
+
+
+def values(figure, axis, trace=0):
+    return np.asarray(figure.data[trace][axis], dtype=float)
+
+
+@pytest.fixture(scope="module")
+def circle():
+    return turning_circle(load_model("mariner"), duration=300.0, dt=1.0)
+
+
+def test_angles_are_drawn_in_degrees_and_speeds_in_metres_per_second(circle):
+    figure = history_figure({"predicted": circle}, ["psi", "u"])
+    assert values(figure, "y", 0) == pytest.approx(np.degrees(circle["psi"]), rel=1e-6)
+    assert values(figure, "y", 1) == pytest.approx(circle["u"], rel=1e-6)
+    assert figure.layout.yaxis.title.text == "heading, deg"
+    assert figure.layout.yaxis2.title.text == "surge, m/s"
+    assert figure.layout.xaxis2.title.text == "time, s"
+
+
+def test_measured_lines_are_dark_and_lines_share_one_entry_of_the_legend(circle):
+    figure = history_figure({"measured": circle, "predicted": circle}, ["psi", "r", "u"])
+    assert [trace.showlegend for trace in figure.data] == [True, True, False, False, False, False]
+    assert {trace.line.color for trace in figure.data if trace.name == "measured"} == {"#1f2a37"}
+
+
+def test_a_channel_that_no_trial_has_is_left_out(circle):
+    figure = history_figure({"predicted": circle}, ["psi", "n"])
+    assert len(figure.data) == 1
+
+
+def test_without_any_of_the_channels_there_is_no_figure(circle):
+    with pytest.raises(InputError, match="no trial with any of the channels n, phi"):
+        history_figure({"predicted": circle}, ["n", "phi"])
+
+
+def test_a_path_has_north_up_and_one_scale(circle):
+    figure = path_figure({"turn": circle})
+    assert values(figure, "x") == pytest.approx(circle["y"], abs=1e-3)
+    assert values(figure, "y") == pytest.approx(circle["x"], abs=1e-3)
+    assert figure.layout.yaxis.scaleanchor == "x"
+
+
+def test_a_trial_without_position_has_no_path():
+    trial = Trial([0.0, 1.0, 2.0], {"psi": [0.0, 0.1, 0.2]})
+    with pytest.raises(InputError, match="channels x and y"):
+        path_figure({"run": trial})
+
+
+def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
+    run = zigzag(load_model("mariner"), 20.0, 20.0, duration=200.0, dt=1.0)
+    figure = zigzag_figure(run)
+    assert values(figure, "y", 0)[0] == 0.0
+    assert values(figure, "y", 1).max() == pytest.approx(20.0, abs=0.1)
+
+
+def test_figures_hold_single_precision(circle):
+    field = json.loads(path_figure({"turn": circle}).to_json())["data"][0]["x"]
+    assert field["dtype"] == "f4"
+
+
+def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
+    monkeypatch.setitem(__import__("sys").modules, "plotly.graph_objects", None)
+    with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
+        path_figure({"turn": circle})
