@@ -49,6 +49,7 @@ def zigzag(
     dt: float = 0.1,
     switch: Literal["inside", "step"] = "inside",
     water_depth: float = np.inf,
+    must_reverse: bool = True,
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
@@ -67,6 +68,8 @@ def zigzag(
         first sample at which it has been reached.
     water_depth : float
         m, for ships that know shallow water.
+    must_reverse : bool
+        Whether a ship that never reaches the heading of the first reversal is an error.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def zigzag(
     InputError
         For an angle, a duration or a step that is not above 0.
     ManoeuvreError
-        If the heading at which the rudder is first reversed is never reached; with the trial so far.
+        If the heading of the first reversal is never reached; with the trial so far.
     UnstableModelError
         If the ship runs away.
     """
@@ -100,7 +103,7 @@ def zigzag(
     orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
     orders[:, 0] = commands
     trial = as_trial(model, times, states, orders, kind="zigzag")
-    if turns == 0:
+    if must_reverse and turns == 0:
         raise ManoeuvreError(
             f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by "
             f"{np.degrees(np.ptp(trial['psi'])):.3g} deg in {duration:g} s, expected {heading_deg:g} deg, "

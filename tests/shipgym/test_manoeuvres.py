@@ -122,6 +122,7 @@ def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner)
     assert trial.kind == "zigzag"
     assert 0.0 < trial["psi"].max() < np.radians(40)
     assert manoeuvres.zigzag_indices(trial).overshoot_1_deg is None
+    assert manoeuvres.zigzag(mariner, 5, 40, duration=60, must_reverse=False).sha256 == trial.sha256
 
 
 def test_a_ship_that_does_not_answer_its_rudder_fails_the_zigzag_criteria(mariner):
