@@ -168,7 +168,7 @@ def _check_stays(model: ShipModel, criteria: dict[str, Criterion]) -> None:
     for side in (1.0, -1.0):
         turning_circle(model, side * _full_rudder(model), duration, dt)
         for angle in (10.0, 20.0):
-            zigzag(model, angle, angle, side < 0.0, duration, dt)
+            zigzag(model, angle, angle, side < 0.0, duration, dt, must_reverse=False)
 
 
 def _full_rudder(model: ShipModel) -> float:
@@ -181,7 +181,9 @@ def _sampling(model: ShipModel) -> float:
 
 def _zigzag(model: ShipModel) -> Trial:
     dt = _sampling(model)
-    return zigzag(model, *ZIGZAG_DEG, duration=ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH * dt, dt=dt)
+    return zigzag(
+        model, *ZIGZAG_DEG, duration=ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH * dt, dt=dt, must_reverse=False
+    )
 
 
 def _circle(model: ShipModel) -> Trial:

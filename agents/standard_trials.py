@@ -66,7 +66,7 @@ def standard_trials(model: ShipModel) -> dict[str, Run]:
     runs = {}
     for angle in ZIGZAGS_DEG:
         for side, port_first in (("starboard", False), ("port", True)):
-            trial = zigzag(model, angle, angle, port_first, duration, dt)
+            trial = zigzag(model, angle, angle, port_first, duration, dt, must_reverse=False)
             runs[f"zigzag {angle:.0f}/{angle:.0f}, {side} first"] = Run(trial, asdict(zigzag_indices(trial)))
     for side, sign in (("starboard", 1.0), ("port", -1.0)):
         trial = turning_circle(model, sign * full, duration, dt)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from shipgym import manoeuvres, plots
-    from shipgym.errors import InputError, UnstableModelError
+    from shipgym import manoeuvres, plots, towing_tank
+    from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
     from shipgym.models.scaling import scale_model
@@ -25,6 +25,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "InputError": "shipgym.errors",
+    "ManoeuvreError": "shipgym.errors",
     "ModelCheck": "shipgym.models.checker",
     "Particulars": "shipgym.particulars",
     "ShipFile": "shipgym.ship_file",
@@ -40,10 +41,11 @@ _HOME = {
     "scale_model": "shipgym.models.scaling",
 }
 
-_SUBPACKAGES = ("manoeuvres", "plots")
+_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank")
 
 __all__ = [
     "InputError",
+    "ManoeuvreError",
     "ModelCheck",
     "Particulars",
     "ShipFile",
@@ -59,6 +61,7 @@ __all__ = [
     "plots",
     "register_structure",
     "scale_model",
+    "towing_tank",
 ]
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from shipgym.trial import Trial
+
 
 class InputError(ValueError):
     """Something the user gave is wrong: a file, a row, a field or an argument.
@@ -26,3 +31,17 @@ class UnstableModelError(RuntimeError):
         super().__init__(message)
         self.time_s = time_s
         self.state = state
+
+
+class ManoeuvreError(RuntimeError):
+    """A manoeuvre never got where it had to: to its switch heading, or to the speed at which it ends.
+
+    Attributes
+    ----------
+    trial : Trial
+        The manoeuvre so far.
+    """
+
+    def __init__(self, message: str, trial: Trial) -> None:
+        super().__init__(message)
+        self.trial = trial

@@ -20,7 +20,7 @@ from shipgym.units import CHANNELS, check_channel
 Array = npt.NDArray[np.float64]
 
 #: Kinds of manoeuvre that have indices or a meaning of their own.
-KINDS = ("zigzag", "turning-circle", "straight", "random")
+KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random")
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
@@ -32,7 +32,8 @@ class Trial:
     Channels, all in SI units: ``x`` north and ``y`` east of midship (m), heading ``psi`` (rad, clockwise,
     without jumps), surge ``u`` and sway ``v`` of midship (m/s; forward, to starboard), yaw rate ``r`` and
     roll rate ``p`` (rad/s), heel ``phi`` (rad), rudder ``delta`` (rad, positive steers to starboard) and
-    shaft speed ``n`` (rev/s), with the orders ``delta_command`` and ``n_command``.
+    shaft speed ``n`` (rev/s), with the orders ``delta_command`` and ``n_command``; of captive tests the
+    forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship (N m).
 
     Parameters
     ----------
@@ -42,7 +43,7 @@ class Trial:
         Values of each channel.
     name : str, optional
         Name of the trial; for a file its file name.
-    kind : {"zigzag", "turning-circle", "straight", "random"}, optional
+    kind : {"zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"}, optional
         The manoeuvre, where known.
     use : {"fit", "validate", "skip"}, optional
         What the trial is for.

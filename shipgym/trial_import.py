@@ -205,8 +205,8 @@ def _earth_to_body(channels: dict[str, Array], derived: set[str], where: str) ->
 
 
 def _cg_to_midship(channels: dict[str, Array], xg: float, where: str) -> None:
-    """Move position and sway from the centre of gravity to midship: v = v_cg - xg r."""
-    needed = {"v": "r", "x": "psi", "y": "psi"}
+    """Move position, sway and yaw moment from the centre of gravity to midship: v = v_cg - xg r."""
+    needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
     for name, other in needed.items():
         if name in channels and other not in channels:
             raise InputError(
@@ -218,6 +218,8 @@ def _cg_to_midship(channels: dict[str, Array], xg: float, where: str) -> None:
         channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
     if "y" in channels:
         channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+    if "N" in channels:
+        channels["N"] = channels["N"] + xg * channels["Y"]
 
 
 def _antiderivative(t: Array, values: Array) -> Array:

@@ -17,6 +17,8 @@ UNITS: dict[str, dict[str, float]] = {
     "angular rate": {"rad/s": 1.0, "deg/s": _DEGREE, "deg/min": _DEGREE / 60.0},
     "speed": {"m/s": 1.0, "knots": 1852.0 / 3600.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6},
     "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
+    "force": {"N": 1.0, "kN": 1000.0},
+    "moment": {"N m": 1.0, "kN m": 1000.0},
 }
 
 #: The quantity that each channel measures.
@@ -34,6 +36,9 @@ QUANTITIES: dict[str, str] = {
     "n": "shaft speed",
     "delta_command": "angle",
     "n_command": "shaft speed",
+    "X": "force",
+    "Y": "force",
+    "N": "moment",
 }
 
 #: Names of the channels, without time.

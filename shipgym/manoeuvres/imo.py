@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shipgym.errors import UnstableModelError
+from shipgym.errors import ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.turning import TurningIndices, turning_circle, turning_indices
 from shipgym.manoeuvres.zigzags import ZigzagIndices, zigzag, zigzag_indices
 from shipgym.models.ship_model import ShipModel
@@ -93,10 +93,10 @@ def _turn(model: ShipModel, rudder_deg: float, duration: float, dt: float) -> Tu
 def _zigzag(
     model: ShipModel, angle_deg: float, port_first: bool, duration: float, dt: float
 ) -> ZigzagIndices | None:
-    """Indices of a zigzag with rudder and heading of one angle, None where the ship runs away."""
+    """Indices of a zigzag with rudder and heading of one angle, None where it fails or the ship runs away."""
     try:
         return zigzag_indices(zigzag(model, angle_deg, angle_deg, port_first, duration, dt))
-    except UnstableModelError:
+    except (ManoeuvreError, UnstableModelError):
         return None
 
 

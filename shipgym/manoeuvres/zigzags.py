@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
+from shipgym.errors import InputError, ManoeuvreError
 from shipgym.kernels import layout
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
 from shipgym.models.ship_model import ShipModel
@@ -49,6 +49,7 @@ def zigzag(
     dt: float = 0.1,
     switch: Literal["inside", "step"] = "inside",
     water_depth: float = np.inf,
+    must_reverse: bool = True,
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
@@ -67,6 +68,8 @@ def zigzag(
         first sample at which it has been reached.
     water_depth : float
         m, for ships that know shallow water.
+    must_reverse : bool
+        Whether a ship that never reaches the heading of the first reversal is an error.
 
     Returns
     -------
@@ -77,6 +80,8 @@ def zigzag(
     ------
     InputError
         For an angle, a duration or a step that is not above 0.
+    ManoeuvreError
+        If the heading of the first reversal is never reached; with the trial so far.
     UnstableModelError
         If the ship runs away.
     """
@@ -89,7 +94,7 @@ def zigzag(
     commands = np.empty(n_steps + 1)
     first = -angle if port_first else angle
     ship = model.ship_tile(water_depth)
-    reached, _ = model.kernel("trajectories").zigzag(
+    reached, turns = model.kernel("trajectories").zigzag(
         states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside", ship
     )
     times = dt * np.arange(n_steps + 1, dtype=float)
@@ -97,7 +102,15 @@ def zigzag(
         raise unstable(model, times[reached], states[reached])
     orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
     orders[:, 0] = commands
-    return as_trial(model, times, states, orders, kind="zigzag")
+    trial = as_trial(model, times, states, orders, kind="zigzag")
+    if must_reverse and turns == 0:
+        raise ManoeuvreError(
+            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by "
+            f"{np.degrees(np.ptp(trial['psi'])):.3g} deg in {duration:g} s, expected {heading_deg:g} deg, "
+            "where the rudder is reversed; sail longer, or order more rudder or less heading",
+            trial,
+        )
+    return trial
 
 
 def number_of_steps(duration: float, dt: float) -> int:

@@ -34,12 +34,15 @@ class Equations:
         Rudder, and shaft speed where the ship has a propeller.
     shallow_water : bool
         Whether the depth of the water is known to them.
+    astern : bool
+        Whether their propeller holds for a shaft that turns astern.
     """
 
     name: str
     source: str
     command_names: tuple[str, ...]
     shallow_water: bool = False
+    astern: bool = False
 
     @cached_property
     def module(self) -> ModuleType:
@@ -87,7 +90,11 @@ SON_NOMOTO = Equations(
     ("delta", "n"),
 )
 VAN_BERLEKOM = Equations(
-    "tanker", "van Berlekom & Goddard 1972, Maneuvering of large tankers", ("delta", "n"), shallow_water=True
+    "tanker",
+    "van Berlekom & Goddard 1972, Maneuvering of large tankers",
+    ("delta", "n"),
+    shallow_water=True,
+    astern=True,
 )
 MMG_KVLCC2 = Equations(
     "kvlcc2",

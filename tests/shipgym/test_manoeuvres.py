@@ -1,10 +1,12 @@
 """Manoeuvres and their indices."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, Trial, manoeuvres
+from shipgym import InputError, ManoeuvreError, Trial, manoeuvres
 from shipgym.manoeuvres.imo import overshoot_limits_deg
 
 
@@ -111,6 +113,24 @@ def test_imo_assessment_of_mariner(mariner):
     assert criteria["tactical_diameter"].value == pytest.approx(6.65, abs=0.01)
     assert criteria["advance"].value == pytest.approx(3.71, abs=0.01)
     assert all("MSC.137(76)" in criterion.source for criterion in criteria.values())
+
+
+def test_a_zigzag_that_never_reaches_its_heading_says_so_with_its_trial(mariner):
+    with pytest.raises(ManoeuvreError, match=r"heading changed by .* in 60 s, expected 40 deg") as error:
+        manoeuvres.zigzag(mariner, 5, 40, duration=60)
+    trial = error.value.trial
+    assert trial.kind == "zigzag"
+    assert 0.0 < trial["psi"].max() < np.radians(40)
+    assert manoeuvres.zigzag_indices(trial).overshoot_1_deg is None
+    assert manoeuvres.zigzag(mariner, 5, 40, duration=60, must_reverse=False).sha256 == trial.sha256
+
+
+def test_a_ship_that_does_not_answer_its_rudder_fails_the_zigzag_criteria(mariner):
+    """With rudder derivatives of nothing it turns neither 10 nor 90 degrees: every criterion fails."""
+    numb = {name: 0.0 if "d" in name.split("_")[1] else value for name, value in mariner.coefficients.items()}
+    numb |= {"Y_0": 0.0, "N_0": 0.0, "Y_0u": 0.0, "N_0u": 0.0, "Y_0uu": 0.0, "N_0uu": 0.0}
+    criteria = manoeuvres.imo_assessment(replace(mariner, coefficients=numb))
+    assert all(criterion.value is None and not criterion.passed for criterion in criteria.values())
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,297 @@
+"""Rudder and shaft sequences that excite a ship for identification, each replayed by its seed.
+
+Signals: Ljung 1999, System Identification, 13.3 (pseudo-random binary and multi-sine signals).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.models.ship_model import ShipModel
+from shipgym.simulation.simulate import simulate
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+Seed = int | np.random.Generator
+
+CLOCK = 0.5  # of the binary sequence, L / U0
+LONGEST_PERIOD, SHORTEST_PERIOD = 20.0, 2.0  # of the multi-sine, L / U0
+REGISTER = 10  # bits of the shift register: the sequence repeats after 1023 clock periods
+TRIES = 32  # draws of phases from which the multi-sine of least crest is taken
+SHORTEST_HOLD, LONGEST_HOLD = 0.5, 4.0  # of random rudder steps, L / U0
+SHORTEST_SHAFT_HOLD, LONGEST_SHAFT_HOLD = 5.0, 15.0  # of shaft-speed steps, L / U0
+
+
+def prbs_rudder(
+    model: ShipModel,
+    amplitude_deg: float = 10.0,
+    seed: Seed = 0,
+    clock_s: float | None = None,
+    duration: float = 600.0,
+    dt: float = 0.1,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a pseudo-random binary rudder: from one side to the other at multiples of a clock period.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship, straight ahead at service speed.
+    amplitude_deg : float
+        Rudder angle to either side, degrees.
+    seed : int or Generator
+        Where in the sequence of maximal length (10 bits, 1023 clock periods) to start.
+    clock_s : float, optional
+        Clock period, s; by default half the time to travel one ship length.
+    duration, dt : float
+        s. The samples are dt apart.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For an amplitude beyond the rudder's limit, or a time that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    from scipy.signal import max_len_seq
+
+    amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
+    times = _times(duration, dt)
+    clock = _length_times(model, CLOCK) if clock_s is None else check_number(clock_s, "clock_s", at_least=dt)
+    register = np.zeros(REGISTER, dtype=np.int8)
+    while not register.any():
+        register = np.random.default_rng(seed).integers(0, 2, REGISTER, dtype=np.int8)
+    bits, _ = max_len_seq(REGISTER, state=register)
+    tick = np.floor(times / clock * (1.0 + 1e-12)).astype(int)
+    rudder = amplitude * (2.0 * bits[tick % len(bits)] - 1.0)
+    return _sail(model, rudder, None, dt, water_depth)
+
+
+def multi_sine_rudder(
+    model: ShipModel,
+    amplitude_deg: float = 10.0,
+    seed: Seed = 0,
+    longest_period_s: float | None = None,
+    shortest_period_s: float | None = None,
+    duration: float = 600.0,
+    dt: float = 0.1,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a multi-sine rudder: all harmonics of 1 / duration in a band, of equal amplitude.
+
+    The phases are the draw with the smallest crest among 32.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship, straight ahead at service speed.
+    amplitude_deg : float
+        Largest rudder angle, degrees.
+    seed : int or Generator
+        Of the phases.
+    longest_period_s, shortest_period_s : float, optional
+        The band, s; by default 20 and 2 times the time to travel one ship length.
+    duration, dt : float
+        s. The samples are dt apart.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For an amplitude beyond the rudder's limit, a band without a harmonic or beyond the samples, or a
+        time that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
+    times = _times(duration, dt)
+    longest = _length_times(model, LONGEST_PERIOD) if longest_period_s is None else longest_period_s
+    shortest = _length_times(model, SHORTEST_PERIOD) if shortest_period_s is None else shortest_period_s
+    check_number(shortest, "shortest_period_s", at_least=2.0 * dt, hint="two samples")
+    check_number(longest, "longest_period_s", above=shortest, hint="the band goes from long to short")
+    period = len(times) * dt
+    slack = 1e-9
+    harmonics = np.arange(np.ceil(period / longest - slack), np.floor(period / shortest + slack) + 1.0)
+    harmonics = harmonics[harmonics >= 1.0]
+    if len(harmonics) == 0:
+        raise InputError(
+            f"duration: {duration:g} s found, expected at least one whole period in the band of "
+            f"{shortest:g} to {longest:g} s; sail longer or widen the band"
+        )
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (TRIES, len(harmonics)))
+    angle = 2.0 * np.pi * np.outer(harmonics, times / period)
+    waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
+    crests = np.abs(waves).max(axis=1)
+    best = int(np.argmin(crests))
+    return _sail(model, amplitude * waves[best] / crests[best], None, dt, water_depth)
+
+
+def random_rudder_steps(
+    model: ShipModel,
+    largest_deg: float = 20.0,
+    seed: Seed = 0,
+    shortest_s: float | None = None,
+    longest_s: float | None = None,
+    duration: float = 600.0,
+    dt: float = 0.1,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate rudder steps of random angle and length, both evenly distributed.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship, straight ahead at service speed.
+    largest_deg : float
+        Largest rudder angle to either side, degrees.
+    seed : int or Generator
+        Of the steps.
+    shortest_s, longest_s : float, optional
+        How long an angle is held, s; by default 0.5 to 4 times the time to travel one ship length.
+    duration, dt : float
+        s. The samples are dt apart.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For an angle beyond the rudder's limit, or a time that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    largest = _rudder_angle(model, largest_deg, "largest_deg")
+    times = _times(duration, dt)
+    shortest = _length_times(model, SHORTEST_HOLD) if shortest_s is None else shortest_s
+    longest = _length_times(model, LONGEST_HOLD) if longest_s is None else longest_s
+    rudder = _steps(times, -largest, largest, shortest, longest, seed)
+    return _sail(model, rudder, None, dt, water_depth)
+
+
+def shaft_speed_steps(
+    model: ShipModel,
+    lowest_ratio: float = 0.5,
+    highest_ratio: float = 1.1,
+    seed: Seed = 0,
+    shortest_s: float | None = None,
+    longest_s: float | None = None,
+    rudder_deg: float = 0.0,
+    duration: float = 1200.0,
+    dt: float = 0.1,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate steps of the ordered shaft speed, of random speed and length, both evenly distributed.
+
+    Parameters
+    ----------
+    model : ShipModel
+        A ship whose propeller is in its equations, straight ahead at service speed.
+    lowest_ratio, highest_ratio : float
+        Range of the orders, in parts of the shaft speed at service speed; ahead only.
+    seed : int or Generator
+        Of the steps.
+    shortest_s, longest_s : float, optional
+        How long a speed is held, s; by default 5 to 15 times the time to travel one ship length.
+    rudder_deg : float
+        Rudder held meanwhile, degrees.
+    duration, dt : float
+        s. The samples are dt apart.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For a ship without a shaft, a range that is not ahead or beyond 1.5, a rudder beyond its limit, or a
+        time that is not above 0.
+    UnstableModelError
+        If the ship runs away.
+    """
+    service = shaft_of(model)
+    check_number(lowest_ratio, "lowest_ratio", above=0.0, at_most=1.5, hint="part of the service shaft speed")
+    check_number(highest_ratio, "highest_ratio", above=lowest_ratio, at_most=1.5)
+    limit = model.steering.rudder_limit_deg
+    check_number(rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit")
+    times = _times(duration, dt)
+    shortest = _length_times(model, SHORTEST_SHAFT_HOLD) if shortest_s is None else shortest_s
+    longest = _length_times(model, LONGEST_SHAFT_HOLD) if longest_s is None else longest_s
+    shaft = service * _steps(times, lowest_ratio, highest_ratio, shortest, longest, seed)
+    rudder = np.full(len(times), np.radians(rudder_deg))
+    return _sail(model, rudder, shaft, dt, water_depth)
+
+
+def shaft_of(model: ShipModel) -> float:
+    """Shaft speed at service speed, 1/s, of a ship that has a shaft.
+
+    Raises
+    ------
+    InputError
+        If its thrust is part of the hull's coefficients.
+    """
+    if "n" not in model.command_names:
+        raise InputError(
+            f"model {model.name!r}: no shaft speed among its commands ({', '.join(model.command_names)}), "
+            "its thrust is inside its surge coefficients; use a ship with a propeller, such as "
+            "'container' or 'tanker'"
+        )
+    return model.service_shaft_speed
+
+
+def _steps(times: Floats, low: float, high: float, shortest: float, longest: float, seed: Seed) -> Floats:
+    """Random levels, each held for a random time; shape of the times."""
+    check_number(shortest, "shortest_s", above=0.0)
+    check_number(longest, "longest_s", at_least=shortest, hint="shortest_s or more")
+    rng = np.random.default_rng(seed)
+    most = int((times[-1] - times[0]) / shortest) + 2
+    ends = np.cumsum(rng.uniform(shortest, longest, most))
+    levels: Floats = rng.uniform(low, high, most)
+    return levels[np.searchsorted(ends, times, side="right")]
+
+
+def _rudder_angle(model: ShipModel, angle_deg: float, argument: str) -> float:
+    """An angle within the rudder's limit, rad."""
+    limit = model.steering.rudder_limit_deg
+    angle = check_number(angle_deg, argument, above=0.0, at_most=limit, hint="the rudder's limit")
+    return float(np.radians(angle))
+
+
+def _length_times(model: ShipModel, count: float) -> float:
+    """So many times the time to travel one ship length, s."""
+    return float(count * model.particulars["length"] / model.particulars["speed"])
+
+
+def _times(duration: float, dt: float) -> Floats:
+    """Start of each step, s."""
+    return dt * np.arange(number_of_steps(duration, dt), dtype=float)
+
+
+def _sail(model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, water_depth: float) -> Trial:
+    """The trial with a rudder, rad, and a shaft speed, 1/s, for each step."""
+    commands = np.repeat(model.service_command[None], len(rudder), axis=0)
+    commands[:, 0] = rudder
+    if shaft is not None:
+        commands[:, 1] = shaft
+    return simulate(model, commands, dt, None, water_depth, kind="random")

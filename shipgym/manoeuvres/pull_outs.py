@@ -1,0 +1,108 @@
+"""The pull-out, which shows whether a ship is stable on a straight course.
+
+As described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.settling import Voyage
+from shipgym.models.ship_model import ShipModel
+from shipgym.trial import Trial
+
+
+@dataclass(frozen=True)
+class PullOutIndices:
+    """What a pull-out tells of a ship.
+
+    Attributes
+    ----------
+    turning_rate_deg_s : float
+        Yaw rate of the turn when the rudder was put amidships, degrees per second.
+    residual_rate_deg_s : float
+        Yaw rate that is left at the end, degrees per second. After turns to either side it is the same for
+        a ship that is stable on a straight course (0 where propeller and hull pull it to no side), and
+        differs for an unstable one, unless its loop leaves out the rudder amidships.
+    """
+
+    turning_rate_deg_s: float
+    residual_rate_deg_s: float
+
+
+def pull_out(
+    model: ShipModel,
+    rudder_deg: float = 20.0,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship, at service speed and the matching shaft speed.
+    rudder_deg : float
+        Rudder of the turn, degrees; negative turns to port.
+    dt : float, optional
+        Time between samples, s; by default a fortieth of the time to travel one ship length.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For a rudder of 0 or beyond the rudder's limit.
+    UnstableModelError
+        If the ship runs away.
+    """
+    limit = model.steering.rudder_limit_deg
+    check_number(rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit")
+    if rudder_deg == 0.0:
+        raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
+    voyage = Voyage(model, dt, water_depth)
+    for angle in (np.radians(rudder_deg), 0.0):
+        voyage.settle(voyage.hold(angle, model.service_shaft_speed))
+    return voyage.trial("pull-out")
+
+
+def pull_out_indices(trial: Trial) -> PullOutIndices:
+    """Yaw rate of the turn and the yaw rate left at the end of a measured or simulated pull-out.
+
+    Parameters
+    ----------
+    trial : Trial
+        With r and delta (or delta_command), the rudder held in a turn and then put amidships to the end.
+
+    Returns
+    -------
+    PullOutIndices
+        Means over the last tenth of the turn and of the time amidships.
+
+    Raises
+    ------
+    InputError
+        If a channel is missing, or the rudder was never put amidships.
+    """
+    if "r" not in trial.channels:
+        raise InputError(f"trial {trial.name!r}: channel 'r' is missing, a pull-out needs the yaw rate")
+    delta = np.abs(rudder(trial))
+    over = np.flatnonzero(delta > 0.5 * delta.max())
+    release = int(over[-1]) + 1 if len(over) else 0
+    if release < 10 or len(trial) - release < 10:
+        raise InputError(
+            f"trial {trial.name!r}: no pull-out found, expected a turn and then the rudder amidships, "
+            "each for at least 10 samples"
+        )
+    turn, rest = np.degrees(trial["r"][int(over[0]) : release]), np.degrees(trial["r"][release:])
+    last = [float(part[-max(len(part) // 10, 1) :].mean()) for part in (turn, rest)]
+    return PullOutIndices(*last)

@@ -1,0 +1,158 @@
+"""Legs of a manoeuvre that last until the motion is steady."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.kernels import layout
+from shipgym.models.ship_model import ShipModel
+from shipgym.simulation.simulate import as_trial, unstable
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
+STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged
+MOST_STRETCHES = 60  # after which a leg ends, steady or not
+HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
+HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
+STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
+
+#: Sails on: kernel states of shape (n_steps + 1, 10) with the start in row 0 and commands (n_steps, 2)
+#: to be filled; returns the last row before the ship ran away.
+Sail = Callable[[Floats, Floats], int]
+
+
+@dataclass(frozen=True, eq=False)
+class Steady:
+    """Means over the last stretch of a leg: rudder ordered, rad, and yaw rate, rad/s."""
+
+    rudder: float
+    yaw_rate: float
+
+
+class Voyage:
+    """A manoeuvre in the making: one leg after the other, from straight ahead at service speed.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    dt : float or None
+        Time between samples, s; by default a fortieth of the time to travel one ship length.
+    water_depth : float
+        m.
+    state : array of shape (n_state,), optional
+        Where to start.
+    """
+
+    def __init__(
+        self, model: ShipModel, dt: float | None, water_depth: float, state: Floats | None = None
+    ) -> None:
+        self.model = model
+        self.length_time = model.particulars["length"] / model.particulars["speed"]
+        default = self.length_time / STEPS_PER_LENGTH
+        self.dt = default if dt is None else check_number(dt, "dt", above=0.0, at_most=self.length_time)
+        self.water_depth = water_depth
+        self.ship = model.ship_tile(water_depth)
+        start = model.service_state if state is None else state
+        self._states = [model.kernel_states(start[None])]
+        self._commands: list[Floats] = []
+
+    @property
+    def state(self) -> Floats:
+        """The state of the kernels now, shape (10,)."""
+        state: Floats = self._states[-1][-1]
+        return state
+
+    def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
+        """Sail some steps; states of shape (n_steps, 10) and commands of shape (n_steps, 2)."""
+        states, commands = np.empty((n_steps + 1, layout.N_STATE)), np.empty((n_steps, 2))
+        states[0] = self.state
+        reached = sail(states, commands)
+        if reached < n_steps:
+            sailed = sum(map(len, self._commands)) + reached
+            raise unstable(self.model, sailed * self.dt, states[reached])
+        self._states.append(states[1:])
+        self._commands.append(commands)
+        return states[1:], commands
+
+    def hold(self, rudder: float, shaft: float) -> Sail:
+        """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
+        kernel = self.model.kernel("trajectories").simulate
+
+        def sail(states: Floats, commands: Floats) -> int:
+            commands[:] = rudder, shaft
+            reached: int = kernel(states, commands, self.dt, self.ship)
+            return reached
+
+        return sail
+
+    def rate_helmsman(self) -> Callable[[float], Sail]:
+        """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
+
+        He is designed from the rudder's effect at service speed, and remembers his integral part.
+        """
+        model, memory = self.model, np.zeros(1)
+        steer, shaft = model.kernel("rate_steering").steer_rate, model.service_shaft_speed
+        gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
+        reset_time = HELMSMAN_RESET * self.length_time
+
+        def held(rate: float) -> Sail:
+            def sail(states: Floats, commands: Floats) -> int:
+                orders = np.empty(len(commands))
+                reached: int = steer(
+                    states, orders, memory, rate, shaft, self.dt, gain, reset_time, self.ship
+                )
+                commands[:, 0], commands[:, 1] = orders, shaft
+                return reached
+
+            return sail
+
+        return held
+
+    def settle(self, sail: Sail) -> Steady:
+        """Sail until the motion no longer changes, 300 ship lengths at most."""
+        n_steps = max(round(STRETCH * self.length_time / self.dt), 2)
+        speed, length = self.model.particulars["speed"], self.model.particulars["length"]
+        columns = [layout.STATE_NAMES.index(name) for name in "uvr"]
+        before: Floats | None = None
+        for _ in range(MOST_STRETCHES):
+            states, commands = self.go(sail, n_steps)
+            u, v, r = states[:, columns].mean(axis=0)
+            rudder = commands[:, 0].mean()
+            now = np.array([u / speed, v / speed, r * length / speed, rudder])
+            if before is not None and np.abs(now - before).max() < STEADY:
+                break
+            before = now
+        return Steady(float(rudder), float(r))
+
+    def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
+        """What was sailed so far, up to the sample number `last`."""
+        states = np.concatenate(self._states)
+        commands = np.concatenate([*self._commands, self._commands[-1][-1:]])
+        orders = commands[:, : len(self.model.command_names)]
+        times = self.dt * np.arange(len(states), dtype=float)
+        kept = slice(None if last is None else last + 1)
+        return as_trial(self.model, times[kept], states[kept], orders[kept], kind)
+
+
+def _rudder_effect(model: ShipModel, water_depth: float) -> float:
+    """Yaw acceleration per rudder angle at service speed, 1/s^2."""
+    angle = float(np.radians(5.0))
+    states = np.repeat(model.service_state[None], 2, axis=0)
+    states[:, model.state_names.index("delta")] = angle, -angle
+    rates = model.derivatives(states, model.service_command, water_depth)[:, model.state_names.index("r")]
+    effect = float(rates[0] - rates[1]) / (2.0 * angle)
+    if not effect > 0.0:
+        raise InputError(
+            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed, expected a "
+            "rudder that turns the ship to its side; check the signs of its coefficients"
+        )
+    return effect

@@ -1,0 +1,286 @@
+"""Straight-line acceleration and stopping, and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError, ManoeuvreError
+from shipgym.manoeuvres.excitation import shaft_of
+from shipgym.manoeuvres.execution import distance_sailed, ship_length
+from shipgym.manoeuvres.settling import Voyage
+from shipgym.models.equations import Equations
+from shipgym.models.ship_model import ShipModel
+from shipgym.trial import Trial
+
+CREEP = 1e-3  # of the service shaft speed: a stopped shaft where the equations divide by its speed
+LONGEST = 300.0  # of a stopping trial, L / U0
+ACCELERATION = 40.0  # duration of an acceleration, L / U0
+
+
+@dataclass(frozen=True)
+class StoppingIndices:
+    """What a stopping trial tells of a ship.
+
+    Attributes
+    ----------
+    track_reach_lengths : float
+        Distance sailed along the track until the speed is reached, ship lengths: the stopping distance.
+    head_reach_lengths, side_reach_lengths : float
+        The same along and across the heading at the order, ship lengths; to starboard positive.
+    heading_change_deg : float
+        Degrees, positive to starboard.
+    time_s : float
+        s.
+    """
+
+    track_reach_lengths: float
+    head_reach_lengths: float
+    side_reach_lengths: float
+    heading_change_deg: float
+    time_s: float
+
+
+@dataclass(frozen=True)
+class AccelerationIndices:
+    """What an acceleration tells of a ship.
+
+    Attributes
+    ----------
+    time_s : float
+        Until the given part of the change of speed is done, s.
+    distance_lengths : float
+        Sailed by then, ship lengths.
+    final_speed : float
+        Surge speed at the end, m/s.
+    """
+
+    time_s: float
+    distance_lengths: float
+    final_speed: float
+
+
+def stopping(
+    model: ShipModel,
+    shaft_speed: float = 0.0,
+    speed_ratio: float = 0.1,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
+
+    A shaft ordered astern needs equations that hold there: of the reference ships only those of `tanker`
+    do. The propellers of `container` and `kvlcc2` are open-water curves of a shaft turning ahead; with the
+    shaft stopped they are used beyond the advance ratios they were measured at, where the container
+    ship's has no drag and KVLCC2's that of a propeller dragged along.
+
+    Parameters
+    ----------
+    model : ShipModel
+        A ship whose propeller is in its equations.
+    shaft_speed : float
+        Ordered shaft speed, 1/s: 0 for stopped, negative for astern.
+    speed_ratio : float
+        Surge speed at which the trial ends, by that at service; 0 for dead in the water, which only a
+        shaft astern brings about.
+    dt : float, optional
+        Time between samples, s; by default a fortieth of the time to travel one ship length.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For a ship without a shaft, an order astern where its equations do not hold, an order that does not
+        slow the ship down, or dead in the water without an order astern.
+    ManoeuvreError
+        If the ship is still faster after 300 times the time to travel one ship length; with the trial so far.
+    UnstableModelError
+        If the ship runs away.
+    """
+    order = _stopping_order(model, shaft_speed)
+    check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0, hint="part of the service speed")
+    if speed_ratio == 0.0 and order >= 0.0:
+        raise InputError(
+            "speed_ratio: 0 found, but a ship without an order astern is never dead in the water; expected "
+            "a number > 0, such as 0.1"
+        )
+    voyage = Voyage(model, dt, water_depth)
+    sail, n_steps = voyage.hold(0.0, order), max(round(voyage.length_time / voyage.dt), 2)
+    target = speed_ratio * model.particulars["speed"]
+    for stretch in range(round(LONGEST)):
+        states, _ = voyage.go(sail, n_steps)
+        slow = np.flatnonzero(states[:, 3] <= target)
+        if len(slow):
+            return voyage.trial("straight", max(stretch * n_steps + int(slow[0]) + 1, 2))
+    trial = voyage.trial("straight")
+    raise ManoeuvreError(
+        f"stopping of {model.name!r}: surge speed {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s, "
+        f"expected {target:.3g} m/s; order the shaft to less, or stop at a larger speed_ratio",
+        trial,
+    )
+
+
+def _stopping_order(model: ShipModel, shaft_speed: float) -> float:
+    """The order for the shaft, 1/s, checked."""
+    service = shaft_of(model)
+    order = check_number(
+        shaft_speed, "shaft_speed", at_least=-1.5 * service, below=service, hint="less than at service speed"
+    )
+    astern = isinstance(model.dynamics, Equations) and model.dynamics.astern
+    if order < 0.0 and not astern:
+        raise InputError(
+            f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r} holds for a "
+            "shaft turning ahead only; expected a number >= 0, or a ship like 'tanker'"
+        )
+    return order if "n" in model.state_names or order != 0.0 else CREEP * service
+
+
+def stopping_indices(
+    trial: Trial, speed_ratio: float | None = None, length: float | None = None
+) -> StoppingIndices:
+    """Stopping distance of a measured or simulated stop, from the first sample on.
+
+    Parameters
+    ----------
+    trial : Trial
+        With u, v, x, y and psi, beginning with the order.
+    speed_ratio : float, optional
+        Surge speed at which the ship counts as stopped, by that at the start; by default the end of the
+        trial.
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+
+    Returns
+    -------
+    StoppingIndices
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing.
+    ManoeuvreError
+        If the speed is never reached.
+    """
+    for name in ("u", "v", "x", "y", "psi"):
+        if name not in trial.channels:
+            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, a stopping trial needs it")
+    lpp, u = ship_length(trial, length), trial["u"]
+    end = float(trial.t[-1])
+    if speed_ratio is not None:
+        check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0)
+        end = _when(trial, -u, -speed_ratio * u[0])
+    x, y, psi, sailed = (
+        float(np.interp(end, trial.t, values - values[0]))
+        for values in (trial["x"], trial["y"], trial["psi"], distance_sailed(trial))
+    )
+    course = trial["psi"][0]
+    return StoppingIndices(
+        track_reach_lengths=sailed / lpp,
+        head_reach_lengths=float(x * np.cos(course) + y * np.sin(course)) / lpp,
+        side_reach_lengths=float(y * np.cos(course) - x * np.sin(course)) / lpp,
+        heading_change_deg=float(np.degrees(psi)),
+        time_s=end - float(trial.t[0]),
+    )
+
+
+def acceleration(
+    model: ShipModel,
+    start_ratio: float = 0.25,
+    duration: float | None = None,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+) -> Trial:
+    """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
+
+    A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
+
+    Parameters
+    ----------
+    model : ShipModel
+        A ship whose propeller is in its equations.
+    start_ratio : float
+        Speed and shaft speed at the start, by those at service.
+    duration : float, optional
+        s; by default 40 times the time to travel one ship length.
+    dt : float, optional
+        Time between samples, s; by default a fortieth of the time to travel one ship length.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    Trial
+
+    Raises
+    ------
+    InputError
+        For a ship without a shaft, or a number out of range.
+    UnstableModelError
+        If the ship runs away.
+    """
+    shaft_of(model)
+    check_number(start_ratio, "start_ratio", above=0.0, below=1.0, hint="part of the service speed")
+    start = model.service_state.copy()
+    for name in ("u", "n"):
+        if name in model.state_names:
+            start[model.state_names.index(name)] *= start_ratio
+    voyage = Voyage(model, dt, water_depth, start)
+    seconds = ACCELERATION * voyage.length_time if duration is None else duration
+    check_number(seconds, "duration", at_least=2.0 * voyage.dt, hint="two samples")
+    voyage.go(voyage.rate_helmsman()(0.0), round(seconds / voyage.dt))
+    return voyage.trial("straight")
+
+
+def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None = None) -> AccelerationIndices:
+    """Time and distance in which a ship makes a part of a change of speed.
+
+    Parameters
+    ----------
+    trial : Trial
+        With u and v, beginning with the order and ending at steady speed.
+    part : float
+        Of the change of surge speed from the first sample to the last.
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+
+    Returns
+    -------
+    AccelerationIndices
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing, or the ship does not become faster.
+    """
+    for name in ("u", "v"):
+        if name not in trial.channels:
+            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, an acceleration needs it")
+    check_number(part, "part", above=0.0, below=1.0)
+    u = trial["u"]
+    if not u[-1] > u[0]:
+        raise InputError(
+            f"trial {trial.name!r}: u goes from {u[0]:.3g} to {u[-1]:.3g} m/s, expected an acceleration"
+        )
+    end = _when(trial, u, u[0] + part * (u[-1] - u[0]))
+    sailed = float(np.interp(end, trial.t, distance_sailed(trial)))
+    return AccelerationIndices(end - float(trial.t[0]), sailed / ship_length(trial, length), float(u[-1]))
+
+
+def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
+    """Time at which values first reach a threshold, between samples by straight lines, s."""
+    reached = np.flatnonzero(values >= threshold)
+    if len(reached) == 0:
+        raise ManoeuvreError(
+            f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end, expected it to reach "
+            f"{abs(threshold):.3g} m/s; give a larger speed_ratio",
+            trial,
+        )
+    k = max(int(reached[0]), 1)
+    return float(np.interp(threshold, values[k - 1 : k + 1], trial.t[k - 1 : k + 1]))

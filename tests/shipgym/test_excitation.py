@@ -1,0 +1,101 @@
+"""Rudder and shaft sequences for identification."""
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, load_model
+from shipgym.manoeuvres import multi_sine_rudder, prbs_rudder, random_rudder_steps, shaft_speed_steps
+
+SEQUENCES = [prbs_rudder, multi_sine_rudder, random_rudder_steps, shaft_speed_steps]
+
+
+@pytest.fixture(scope="module")
+def tanker():
+    return load_model("tanker")
+
+
+@pytest.mark.parametrize("sequence", SEQUENCES)
+def test_a_seed_replays_its_trial_and_another_gives_another(tanker, sequence):
+    first, again, other = (sequence(tanker, seed=seed, duration=500.0) for seed in (1, 1, 2))
+    assert first.sha256 == again.sha256 != other.sha256
+    assert first.kind == "random"
+
+
+def test_a_binary_rudder_has_two_angles_and_no_long_memory(tanker):
+    """Over the whole sequence of 1023 clock periods: mean 1/1023, autocorrelation -1/1023 at each lag."""
+    trial = prbs_rudder(tanker, 5.0, seed=3, clock_s=2.0, duration=2046.0, dt=2.0)
+    bits = trial["delta_command"][:-1] / np.radians(5.0)
+    np.testing.assert_allclose(np.abs(bits), 1.0)
+    assert bits.mean() == pytest.approx(1 / 1023)
+    spectrum = np.abs(np.fft.fft(bits)) ** 2
+    correlation = np.fft.ifft(spectrum).real / 1023
+    np.testing.assert_allclose(correlation[1:], -1 / 1023, atol=1e-12)
+
+
+def test_a_binary_rudder_changes_at_its_clock_only(tanker):
+    trial = prbs_rudder(tanker, clock_s=7.0, duration=400.0)
+    changes = trial.t[np.flatnonzero(np.diff(trial["delta_command"])) + 1]
+    np.testing.assert_allclose(np.remainder(changes + 1e-6, 7.0), 1e-6, atol=1e-7)
+    assert len(changes) > 15
+
+
+def test_a_multi_sine_has_power_in_its_band_alone(tanker):
+    """Periods of 20 to 100 s in 600 s: harmonics 6 to 30, of one amplitude, 10 deg at the most."""
+    trial = multi_sine_rudder(tanker, 10.0, 5, 100.0, 20.0, duration=600.0, dt=0.5)
+    rudder = trial["delta_command"][:-1]
+    assert np.abs(rudder).max() == pytest.approx(np.radians(10.0))
+    amplitude = np.abs(np.fft.rfft(rudder))
+    inside = np.zeros(len(amplitude), dtype=bool)
+    inside[6:31] = True
+    np.testing.assert_allclose(amplitude[inside], amplitude[6], rtol=1e-9)
+    assert amplitude[~inside].max() < 1e-9 * amplitude[6]
+
+
+def test_random_steps_stay_within_angle_and_time(tanker):
+    trial = random_rudder_steps(tanker, 15.0, 0, 10.0, 30.0, duration=3000.0)
+    orders = np.degrees(trial["delta_command"])
+    held = np.diff(trial.t[np.flatnonzero(np.diff(orders)) + 1])
+    assert 10.0 - 0.1 < held.min() < held.max() < 30.0 + 0.1
+    assert held.mean() == pytest.approx(20.0, abs=2.0)
+    assert -15.0 <= orders.min() < -10.0
+    assert 10.0 < orders.max() <= 15.0
+
+
+@pytest.mark.parametrize("name", ["container", "kvlcc2"])
+def test_half_the_shaft_speed_gives_half_the_ship_s_speed(name):
+    """Resistance and thrust both grow with the square of speed at a given advance ratio."""
+    model = load_model(name)
+    trial = shaft_speed_steps(model, 0.5, 0.5 + 1e-9, duration=15000.0, dt=1.0)
+    assert trial["u"][-1] == pytest.approx(0.5 * model.particulars["speed"], rel=1e-3)
+
+
+def test_shaft_orders_cover_their_range(tanker):
+    trial = shaft_speed_steps(tanker, 0.4, 1.0, seed=4, duration=4000.0, dt=0.5)
+    orders = trial["n_command"] / tanker.service_shaft_speed
+    assert 0.4 <= orders.min() < 0.6
+    assert 0.8 < orders.max() <= 1.0
+    assert 0.4 < trial["n"].min() / tanker.service_shaft_speed < 0.7
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: prbs_rudder(m, 50.0), "amplitude_deg: 50 found.*the rudder's limit"),
+        (lambda m: prbs_rudder(m, clock_s=0.01), "clock_s: 0.01 found"),
+        (lambda m: multi_sine_rudder(m, longest_period_s=5.0, shortest_period_s=10.0), "longest_period_s: 5"),
+        (lambda m: multi_sine_rudder(m, duration=10.0), "at least one whole period"),
+        (lambda m: random_rudder_steps(m, shortest_s=20.0, longest_s=10.0), "longest_s: 10 found"),
+        (lambda m: random_rudder_steps(m, duration=-1.0), "duration: -1 found"),
+        (lambda m: shaft_speed_steps(m, -0.5), "lowest_ratio: -0.5 found"),
+        (lambda m: shaft_speed_steps(m, 0.9, 0.8), "highest_ratio: 0.8 found"),
+        (lambda m: shaft_speed_steps(m, rudder_deg=99.0), "rudder_deg: 99 found"),
+    ],
+)
+def test_wrong_arguments(tanker, call, message):
+    with pytest.raises(InputError, match=message):
+        call(tanker)
+
+
+def test_a_ship_without_shaft_is_refused():
+    with pytest.raises(InputError, match="'mariner': no shaft speed among its commands"):
+        shaft_speed_steps(load_model("mariner"))

@@ -1,0 +1,111 @@
+"""Sensor models."""
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, Trial, load_model, manoeuvres
+from shipgym.simulation import SEA_TRIAL, Sensor, Sensors
+
+N = 40_000
+
+
+@pytest.fixture(scope="module")
+def still() -> Trial:
+    """A ship that lies still for 40 000 s."""
+    names = ("x", "y", "psi", "u", "v", "r", "delta")
+    return Trial(np.arange(float(N)), {name: np.zeros(N) for name in names})
+
+
+@pytest.fixture(scope="module")
+def zigzag() -> Trial:
+    return manoeuvres.zigzag(load_model("mariner"), 20, 20)
+
+
+def test_white_noise_has_its_standard_deviation_and_no_memory(still):
+    reading = Sensors({"r": Sensor(noise=0.01)}).measure(still)["r"]
+    assert reading.std() == pytest.approx(0.01, rel=0.02)
+    assert abs(np.corrcoef(reading[1:], reading[:-1])[0, 1]) < 0.02
+
+
+def test_drift_is_a_gauss_markov_process(still):
+    """Variance as given, correlation exp(-lag / T); position errors of GNSS are white plus drift."""
+    sensor = Sensor(drift=2.0, drift_time_s=10.0)
+    reading = np.concatenate([Sensors({"x": sensor}).measure(still, seed)["x"] for seed in range(3)])
+    assert reading.std() == pytest.approx(2.0, rel=0.05)
+    for lag in (1, 5, 20):
+        correlation = np.corrcoef(reading[lag:], reading[:-lag])[0, 1]
+        assert correlation == pytest.approx(np.exp(-lag / 10.0), abs=0.05)
+
+
+def test_outliers_come_as_often_as_told(still):
+    reading = Sensors({"v": Sensor(outlier_probability=0.02, outlier_size=5.0)}).measure(still)["v"]
+    wrong = reading != 0.0
+    assert wrong.mean() == pytest.approx(0.02, rel=0.15)
+    assert reading[wrong].std() == pytest.approx(5.0, rel=0.1)
+
+
+def test_readings_are_multiples_of_the_resolution(zigzag):
+    step = np.radians(0.1)
+    reading = Sensors({"delta": Sensor(resolution=step)}).measure(zigzag)["delta"]
+    np.testing.assert_allclose(reading / step, np.round(reading / step), atol=1e-9)
+    assert np.abs(reading - zigzag["delta"]).max() <= 0.5 * step * (1.0 + 1e-9)
+
+
+def test_a_late_sensor_shows_the_past(zigzag):
+    reading = Sensors({"psi": Sensor(latency_s=1.5)}).measure(zigzag)["psi"]
+    np.testing.assert_allclose(reading[15:], zigzag["psi"][:-15], atol=1e-12)
+    np.testing.assert_array_equal(reading[:15], zigzag["psi"][0])
+
+
+def test_gaps_leave_samples_out(still):
+    """A gap begins at a sample with 1 %, is 4 samples long in the mean, so about 3.9 % are lost."""
+    measured = Sensors({}, dropout_probability=0.01, dropout_samples=4.0).measure(still)
+    assert 1.0 - len(measured) / N == pytest.approx(0.039, abs=0.004)
+    gaps = np.diff(measured.t) - 1.0
+    assert gaps[gaps > 0].mean() == pytest.approx(4.0, abs=0.4)
+
+
+def test_a_seed_replays_and_sensors_do_not_disturb_each_other(zigzag):
+    first, again, other = (Sensors().measure(zigzag, seed) for seed in (7, 7, 8))
+    assert first.sha256 == again.sha256 != other.sha256
+    gyro_alone = Sensors({"r": SEA_TRIAL["r"]}).measure(zigzag, 7)
+    np.testing.assert_array_equal(gyro_alone["r"], first["r"])
+    assert np.corrcoef(first["x"] - zigzag["x"], first["y"] - zigzag["y"])[0, 1] < 0.9
+
+
+def test_perfect_sensors_change_nothing(zigzag):
+    assert Sensors({}).measure(zigzag).sha256 == zigzag.sha256
+
+
+def test_the_logger_samples_the_trial_and_orders_stay_orders(zigzag):
+    measured = Sensors({}, sampling_s=0.25).measure(zigzag)
+    np.testing.assert_allclose(np.diff(measured.t), 0.25)
+    assert set(np.unique(measured["delta_command"])) == set(np.unique(zigzag["delta_command"]))
+    assert (measured.kind, measured.length) == ("zigzag", zigzag.length)
+
+
+def test_a_sea_trial_still_tells_the_overshoot(zigzag):
+    """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are right to a few tenths."""
+    measured = Sensors(sampling_s=0.5, dropout_probability=0.01).measure(zigzag, 1)
+    seen = manoeuvres.zigzag_indices(measured).overshoot_1_deg
+    assert seen == pytest.approx(manoeuvres.zigzag_indices(zigzag).overshoot_1_deg, abs=0.4)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda t: Sensor(noise=-1.0), "sensor noise: -1 found"),
+        (lambda t: Sensor(outlier_probability=2.0), "outlier_probability: 2 found"),
+        (lambda t: Sensor(drift=1.0, drift_time_s=0.0), "drift_time_s: 0 found"),
+        (lambda t: Sensors({"speed": Sensor()}), "unknown channel 'speed'"),
+        (lambda t: Sensors({"u": 0.1}), "u: 0.1 found, expected a Sensor"),
+        (lambda t: Sensors(sampling_s=-1.0), "sampling_s: -1 found"),
+        (lambda t: Sensors(sampling_s=500.0).measure(t), "sampling_s: 500 s found, expected at most half"),
+        (lambda t: Sensors(dropout_probability=1.0), "dropout_probability: 1 found"),
+        (lambda t: Sensors(dropout_probability=0.999, dropout_samples=1e5).measure(t), "outside the gaps"),
+        (lambda t: Sensors().measure(t, -1), "seed: -1 found"),
+    ],
+)
+def test_wrong_arguments(zigzag, make, message):
+    with pytest.raises(InputError, match=message):
+        make(zigzag)

@@ -1,0 +1,130 @@
+"""Spirals and pull-outs: which ships keep a straight course by themselves."""
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, Trial, load_model, manoeuvres
+from shipgym.manoeuvres import Spiral
+
+
+@pytest.mark.parametrize(
+    ("name", "width_deg", "height_deg_s"),
+    [("mariner", 0.0, 0.0), ("container", 0.0, 0.0), ("tanker", 0.78, 0.314), ("kvlcc2", 0.39, 0.184)],
+)
+def test_both_spirals_find_the_loop(name, width_deg, height_deg_s):
+    """The tankers are unstable; the direct spiral knows the loop to within its steps of 0.25 deg."""
+    model = load_model(name)
+    direct = manoeuvres.spiral_indices(manoeuvres.direct_spiral(model))
+    reverse = manoeuvres.spiral_indices(manoeuvres.reverse_spiral(model))
+    assert reverse.loop_width_deg == pytest.approx(width_deg, abs=0.01)
+    assert reverse.loop_height_deg_s == pytest.approx(height_deg_s, abs=0.002)
+    assert direct.loop_width_deg == pytest.approx(reverse.loop_width_deg, abs=0.25 if width_deg else 1e-3)
+    assert direct.loop_height_deg_s == pytest.approx(reverse.loop_height_deg_s, abs=0.005)
+
+
+def test_both_spirals_are_the_same_curve_for_a_stable_ship():
+    model = load_model("mariner")
+    direct, reverse = manoeuvres.direct_spiral(model), manoeuvres.reverse_spiral(model)
+    order = np.argsort(reverse.yaw_rate_deg_s)
+    there = np.abs(direct.rudder_deg) <= 2.0
+    rudder = np.interp(direct.yaw_rate_deg_s[there], reverse.yaw_rate_deg_s[order], reverse.rudder_deg[order])
+    np.testing.assert_allclose(rudder, direct.rudder_deg[there], atol=0.02)
+
+
+def test_a_point_of_the_reverse_spiral_is_an_equilibrium():
+    """Also where the tanker would not stay by itself: at r = 0 it needs 0.5 deg against its propeller."""
+    model = load_model("tanker")
+    spiral = manoeuvres.reverse_spiral(model)
+    straight = spiral.rudder_deg[np.argmin(np.abs(spiral.yaw_rate_deg_s))]
+    assert straight == pytest.approx(0.50, abs=0.01)
+    state, command = model.service_state.copy(), model.service_command
+    state[model.state_names.index("delta")] = np.radians(straight)
+    thrust_and_rudder = model.derivatives(state, command)[model.state_names.index("r")]
+    amidships = model.derivatives(model.service_state, command)[model.state_names.index("r")]
+    assert abs(thrust_and_rudder) < abs(amidships)
+
+
+def test_a_measured_spiral_gives_the_same_points():
+    """Without orders, the plateaus are found in the rudder itself."""
+    spiral = manoeuvres.direct_spiral(load_model("tanker"), [10, 5, 1, 0, -1, -5, -10])
+    orders = manoeuvres.spiral_from_trial(spiral.trial)
+    np.testing.assert_allclose(orders.rudder_deg, spiral.rudder_deg)
+    np.testing.assert_allclose(orders.yaw_rate_deg_s, spiral.yaw_rate_deg_s, atol=2e-3)
+    channels = {name: spiral.trial[name] for name in ("delta", "r")}
+    seen = manoeuvres.spiral_from_trial(Trial(spiral.trial.t, channels))
+    np.testing.assert_allclose(seen.rudder_deg, spiral.rudder_deg, atol=0.01)
+    np.testing.assert_allclose(seen.yaw_rate_deg_s, spiral.yaw_rate_deg_s, atol=2e-3)
+    seen_width = manoeuvres.spiral_indices(seen).loop_width_deg
+    assert seen_width == pytest.approx(manoeuvres.spiral_indices(spiral).loop_width_deg, abs=0.02)
+
+
+def test_a_loop_drawn_by_hand():
+    """Jumps between 2 and 4 deg either side: 6 deg wide; 2 * 0.5 deg/s high at rudder 0."""
+    angles = np.array([10, 4, 0, -2, -4, -10, -4, 0, 2, 4, 10], dtype=float)
+    rates = np.array([1, 0.7, 0.5, 0.4, -0.4, -1, -0.7, -0.5, -0.4, 0.4, 1])
+    trial = Trial([0, 1, 2], {"r": [0, 0, 0]})
+    indices = manoeuvres.spiral_indices(Spiral(trial, angles, rates, "direct"))
+    assert indices.loop_width_deg == pytest.approx(6.0)
+    assert indices.loop_height_deg_s == pytest.approx(1.0)
+    mirrored = manoeuvres.spiral_indices(Spiral(trial, -angles, -rates, "direct"))
+    assert mirrored == indices
+
+
+def test_a_fold_drawn_by_hand():
+    """delta = r^3 - 3 r folds at r = -1 and 1, delta = 2 and -2; it meets 0 at r = -sqrt(3) and sqrt(3)."""
+    rates = np.linspace(-3.0, 3.0, 61)
+    trial = Trial([0, 1, 2], {"r": [0, 0, 0]})
+    indices = manoeuvres.spiral_indices(Spiral(trial, rates**3 - 3.0 * rates, rates, "reverse"))
+    assert indices.loop_width_deg == pytest.approx(4.0, rel=1e-3)
+    assert indices.loop_height_deg_s == pytest.approx(2.0 * np.sqrt(3.0), rel=1e-3)
+
+
+def test_pull_outs_end_alike_only_for_a_stable_ship():
+    """Mariner is left with 0.17 deg/s to starboard from either side; KVLCC2 stays in its turn to port."""
+    ends = {
+        name: [
+            manoeuvres.pull_out_indices(manoeuvres.pull_out(load_model(name), side)).residual_rate_deg_s
+            for side in (20, -20)
+        ]
+        for name in ("mariner", "container", "kvlcc2")
+    }
+    assert ends["mariner"] == pytest.approx([0.170, 0.170], abs=1e-3)
+    assert ends["container"] == pytest.approx([0.0, 0.0], abs=1e-3)
+    assert ends["kvlcc2"] == pytest.approx([0.0, -0.173], abs=1e-3)
+
+
+def test_the_turn_of_a_pull_out_is_that_of_the_spiral():
+    model = load_model("mariner")
+    spiral = manoeuvres.direct_spiral(model, [20, 0, -20])
+    indices = manoeuvres.pull_out_indices(manoeuvres.pull_out(model, 20))
+    assert indices.turning_rate_deg_s == pytest.approx(spiral.yaw_rate_deg_s[0], abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda m: manoeuvres.direct_spiral(m, [10, 5, 0]), "rudder_deg: .* from one side to the other"),
+        (lambda m: manoeuvres.direct_spiral(m, [10, 12, -10]), "rise or fall"),
+        (lambda m: manoeuvres.direct_spiral(m, [50, 0, -50]), r"rudder_deg\[0\]: 50 found"),
+        (lambda m: manoeuvres.direct_spiral(m, dt=-1.0), "dt: -1 found"),
+        (lambda m: manoeuvres.reverse_spiral(m, [1, 0.5]), "yaw_rate_deg_s: "),
+        (lambda m: manoeuvres.pull_out(m, 0.0), "expected an angle that turns the ship"),
+        (lambda m: manoeuvres.pull_out(m, 60.0), "rudder_deg: 60 found"),
+    ],
+)
+def test_wrong_arguments(call, message):
+    with pytest.raises(InputError, match=message):
+        call(load_model("mariner"))
+
+
+def test_what_a_trial_lacks_is_named():
+    t = np.arange(50.0)
+    still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})
+    with pytest.raises(InputError, match="'r' is missing"):
+        manoeuvres.spiral_from_trial(Trial(t, {"delta": np.zeros(50)}))
+    with pytest.raises(InputError, match="1 steady turns found"):
+        manoeuvres.spiral_from_trial(still)
+    with pytest.raises(InputError, match="no pull-out found"):
+        manoeuvres.pull_out_indices(still)
+    with pytest.raises(InputError, match="turns to both sides"):
+        manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.5, 0.1]), "direct"))

@@ -1,0 +1,114 @@
+"""Straight-line acceleration and stopping."""
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, ManoeuvreError, Trial, load_model
+from shipgym.manoeuvres import acceleration, acceleration_indices, stopping, stopping_indices
+
+FULL_ASTERN = -80.0 / 60.0  # 1/s
+
+
+def test_the_tanker_stops_full_astern_in_9_lengths():
+    """Within the 15 lengths of MSC.137(76) 5.3.4; it swings 33 deg to starboard meanwhile."""
+    trial = stopping(load_model("tanker"), FULL_ASTERN, speed_ratio=0.0)
+    indices = stopping_indices(trial)
+    assert trial["u"][-2] > 0.0 >= trial["u"][-1]
+    assert indices.track_reach_lengths == pytest.approx(8.95, abs=0.01)
+    assert indices.head_reach_lengths == pytest.approx(8.93, abs=0.01)
+    assert indices.heading_change_deg == pytest.approx(32.6, abs=0.5)
+    assert indices.time_s == pytest.approx(619.0, abs=2.0)
+
+
+def test_a_weaker_order_astern_takes_longer():
+    tanker = load_model("tanker")
+    reach = [
+        stopping_indices(stopping(tanker, order), 0.2).track_reach_lengths
+        for order in (0.0, -0.7, FULL_ASTERN)
+    ]
+    assert reach[0] > 1.5 * reach[1] > 2.0 * reach[2]
+
+
+def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
+    """udot = X_uu u^2 / L / (m + mx), so each halving takes ln 2 (m + mx) / -X_uu ship lengths."""
+    model = load_model("container")
+    trial, numbers = stopping(model), model.coefficients
+    quarter, eighth = (stopping_indices(trial, ratio).track_reach_lengths for ratio in (0.25, 0.125))
+    halving = np.log(2.0) * (numbers["m"] + numbers["mx"]) / -numbers["X_uu"]
+    assert eighth - quarter == pytest.approx(halving, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["container", "kvlcc2"])
+def test_coasting_straight_needs_no_sideways_room(name):
+    indices = stopping_indices(stopping(load_model(name)))
+    assert indices.side_reach_lengths == pytest.approx(0.0, abs=1e-9)
+    assert indices.head_reach_lengths == pytest.approx(indices.track_reach_lengths, rel=1e-5)
+
+
+def test_full_scale_and_model_coast_alike():
+    """By Froude's law the same in ship lengths, but for the wake fraction, 0.35 against 0.40."""
+    full, small = (
+        stopping_indices(stopping(load_model(name))).track_reach_lengths for name in ("kvlcc2", "kvlcc2-l7")
+    )
+    assert small == pytest.approx(full, rel=0.01)
+
+
+def test_stopping_distance_of_a_stop_drawn_by_hand():
+    """From 10 m/s at 0.1 m/s2 to the east: 500 m to standstill, 375 m to half the speed."""
+    t = np.arange(101.0)
+    ahead = 10.0 * t - 0.05 * t**2
+    still = np.zeros(101)
+    channels = {"x": still, "y": ahead, "psi": still + np.pi / 2, "u": 10.0 - 0.1 * t, "v": still}
+    trial = Trial(t, channels, length=50.0)
+    assert stopping_indices(trial).track_reach_lengths == pytest.approx(10.0)
+    half = stopping_indices(trial, 0.5)
+    assert half.head_reach_lengths == pytest.approx(7.5)
+    assert half.side_reach_lengths == pytest.approx(0.0, abs=1e-12)
+    assert half.time_s == pytest.approx(50.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "lengths"), [("container", 8.27), ("tanker", 15.86), ("kvlcc2", 10.28), ("kvlcc2-l7", 10.43)]
+)
+def test_acceleration_to_service_speed(name, lengths):
+    """Ship lengths from a quarter of service speed until nine tenths of the rest are gained."""
+    model = load_model(name)
+    trial = acceleration(model)
+    indices = acceleration_indices(trial)
+    assert indices.distance_lengths == pytest.approx(lengths, abs=0.02)
+    assert indices.final_speed == pytest.approx(model.particulars["speed"], rel=0.02)
+    assert np.ptp(trial["psi"]) < np.radians(1.5)
+
+
+def test_a_ship_without_shaft_neither_stops_nor_accelerates():
+    for call in (stopping, acceleration):
+        with pytest.raises(InputError, match="'mariner': no shaft speed among its commands"):
+            call(load_model("mariner"))
+
+
+def test_a_ship_that_does_not_stop_says_so_with_its_trial():
+    tanker = load_model("tanker")
+    with pytest.raises(ManoeuvreError, match=r"expected 0\.0823 m/s") as error:
+        stopping(tanker, speed_ratio=0.01)
+    assert 0.0823 < error.value.trial["u"][-1] < 0.5
+    with pytest.raises(ManoeuvreError, match="expected it to reach") as error:
+        stopping_indices(stopping(tanker), 0.05)
+    assert isinstance(error.value.trial, Trial)
+
+
+@pytest.mark.parametrize(
+    ("name", "call", "message"),
+    [
+        ("container", lambda m: stopping(m, -0.5), "'container' holds for a shaft turning ahead only"),
+        ("kvlcc2", lambda m: stopping(m, -0.5), "'kvlcc2' holds for a shaft turning ahead only"),
+        ("tanker", lambda m: stopping(m, 5.0), "shaft_speed: 5 found"),
+        ("tanker", lambda m: stopping(m, speed_ratio=0.0), "never dead in the water"),
+        ("tanker", lambda m: stopping(m, speed_ratio=1.5), "speed_ratio: 1.5 found"),
+        ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: 0 found"),
+        ("tanker", lambda m: acceleration(m, duration=-5.0), "duration: -5 found"),
+        ("tanker", lambda m: acceleration_indices(stopping(m)), "expected an acceleration"),
+    ],
+)
+def test_wrong_arguments(name, call, message):
+    with pytest.raises(InputError, match=message):
+        call(load_model(name))
