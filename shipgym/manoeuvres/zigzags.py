@@ -104,9 +104,10 @@ def zigzag(
     orders[:, 0] = commands
     trial = as_trial(model, times, states, orders, kind="zigzag")
     if must_reverse and turns == 0:
+        gained = np.degrees(np.sign(first) * (trial["psi"] - trial["psi"][0])).max()
         raise ManoeuvreError(
-            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by "
-            f"{np.degrees(np.ptp(trial['psi'])):.3g} deg in {duration:g} s, expected {heading_deg:g} deg, "
+            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by at most "
+            f"{gained:.3g} deg to the side of the rudder in {duration:g} s, expected {heading_deg:g} deg, "
             "where the rudder is reversed; sail longer, or order more rudder or less heading",
             trial,
         )

@@ -59,7 +59,9 @@ def recorded(run: Trial, name: str, every: int = 5, use: str = "fit") -> Trial:
 def zigzags(ship: ShipModel, limit_deg: float = 35.0, use: str = "fit") -> list[Trial]:
     """To both sides."""
     plan = [(angle, port_first) for angle, port_first in ((10, False), (20, True), (35, False))]
-    runs = {a: zigzag(ship, a, a, duration=600, dt=0.1, port_first=p) for a, p in plan if a <= limit_deg}
+    runs = {
+        a: zigzag(ship, a, a, p, duration=600, dt=0.1, must_reverse=False) for a, p in plan if a <= limit_deg
+    }
     return [recorded(run, f"zigzag_{angle}", use=use) for angle, run in runs.items()]
 
 
