@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verificati
 from agents.concerns import why_unstable
 from agents.output import check_folder, whole_folder
 from agents.spread import manoeuvre_spread
-from identification import identify
+from identification import IdentificationResult, identify
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
@@ -21,6 +21,7 @@ from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable, nomoto
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
+from shipgym.trial import Trial
 
 if TYPE_CHECKING:
     from agents.controller import Controller
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
+LARGEST_SEED = 2**32
+
 #: Told the stage of the work, the units of it done and their total.
 Progress = Callable[[str, int, int], None]
 
@@ -76,7 +79,7 @@ def build_autopilot(
 
     folder = Path(out)
     check_number(draws, "draws", at_least=2)
-    check_number(seed, "seed", at_least=0)
+    check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
     result = examine(
@@ -112,7 +115,7 @@ def examine(
     _tell(progress, "reading trials", 1, 1)
     _tell(progress, "identifying", 0, 1)
     chosen = identification_settings(ship, structure, method, samples)
-    identification = identify(trials, particulars=ship.particulars, steering=ship.steering, **chosen)
+    identification = identify_ship(ship, trials, chosen)
     _tell(progress, "identifying", 1, 1)
     instability = why_unstable(identification)
     verification = None
@@ -122,6 +125,16 @@ def examine(
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     return AutopilotResult(ship, trials, identification, instability, verification)
+
+
+def identify_ship(
+    ship: ShipFile, trials: Sequence[Trial], settings: Mapping[str, Any]
+) -> IdentificationResult:
+    """`identify` on a ship file, which its errors name."""
+    try:
+        return identify(trials, particulars=ship.particulars, steering=ship.steering, **settings)
+    except InputError as error:
+        raise InputError(f"{ship.path}: {error}") from None
 
 
 def identification_settings(
@@ -153,6 +166,8 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
     ------
     UnstableModelError
         If the model itself runs away.
+    InputError
+        If no autopilot can be designed on it.
     """
     from agents.lq import LQ
     from agents.pid import PID
@@ -162,11 +177,18 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
     _tell(progress, stage, 0, draws)
     manoeuvres = manoeuvre_spread(model, drawn, lambda done: _tell(progress, stage, done, draws))
     stable = [draw for draw, lost in zip(drawn, manoeuvres.unstable, strict=True) if not lost]
-    pilots = []
+    pilots, refused = [], {}
     designs: tuple[Any, ...] = (PID, LQ)
     for k, design in enumerate(designs):
         _tell(progress, "flying the autopilots", k, len(designs))
-        pilots.append(_fly(design.from_model(model), model, drawn, stable, seed))
+        try:
+            controller = design.from_model(model)
+        except InputError as error:  # this design does not suit the ship; another may
+            refused[design.kind] = str(error)
+            continue
+        pilots.append(_fly(controller, model, drawn, stable, seed))
+    if not pilots:
+        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
     _tell(progress, "flying the autopilots", len(designs), len(designs))
     return Verification(
         draws=draws,
@@ -175,6 +197,7 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
         course_unstable=np.array([not _holds_course(draw) for draw in drawn]),
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
+        refused=refused,
     )
 
 

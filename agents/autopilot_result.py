@@ -66,6 +66,8 @@ class Verification:
         Of the identified model.
     pilots : tuple of Pilot
         Ranked: the lowest mean cost first.
+    refused : dict of str to str
+        Autopilots that could not be designed on the model, and why.
     """
 
     draws: int
@@ -74,6 +76,7 @@ class Verification:
     course_unstable: NDArray[np.bool_]
     nomoto: Nomoto
     pilots: tuple[Pilot, ...]
+    refused: dict[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +124,12 @@ class AutopilotResult:
             "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
         }
         if self.verification is not None:
-            metrics |= _verification_metrics(self.verification)
+            metrics |= verification_metrics(self.verification)
         return metrics
 
 
-def _verification_metrics(found: Verification) -> dict[str, Any]:
+def verification_metrics(found: Verification) -> dict[str, Any]:
+    """What metrics.json tells of a verification."""
     return {
         "draws": {
             "count": found.draws,
@@ -133,10 +137,11 @@ def _verification_metrics(found: Verification) -> dict[str, Any]:
             "unstable": int(found.manoeuvres.unstable.sum()),
             "course_unstable": int(found.course_unstable.sum()),
         },
-        "nomoto": asdict(found.nomoto),
+        "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
         "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
         "controllers": {pilot.controller.name: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.controller.name for pilot in found.pilots],
+        "refused": found.refused,
     }
 
 

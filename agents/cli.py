@@ -101,19 +101,18 @@ def identify_command(
 
     Exits with 1 if the identified model is unstable.
     """
-    from agents.autopilot import identification_settings
+    from agents.autopilot import identification_settings, identify_ship
     from agents.concerns import concerns, why_unstable
     from agents.output import check_folder, whole_folder
     from agents.terminal import err, prediction_table, print_json, warn
     from agents.terminal import out as console
-    from identification import identify
     from shipgym.ship_file import ShipFile
 
     check_folder(out, MODEL_FILES)
     read = ShipFile.load(ship)
     chosen = identification_settings(read, structure, method, samples)
     with err.status("identifying"):
-        result = identify(read.trials(), particulars=read.particulars, steering=read.steering, **chosen)
+        result = identify_ship(read, read.trials(), chosen)
     with whole_folder(out, MODEL_FILES) as draft:
         result.save(draft)
     instability = why_unstable(result)
@@ -223,6 +222,8 @@ def autopilot_command(
         _fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
     for concern in concerns(result.identification):
         warn(concern)
+    for name, reason in (result.verification.refused if result.verification else {}).items():
+        warn(f"no {name.upper()} autopilot: {reason}")
     if not as_json:
         console.print(f"report: {report}", soft_wrap=True)
 

@@ -9,7 +9,7 @@ import numpy as np
 from identification import IdentificationResult
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
-from shipgym.models.linear import nomoto
+from shipgym.models.linear import is_course_stable, steering_state_space
 
 LOST_HEADING = np.radians(10.0)  # rms error beyond which a prediction is not one
 
@@ -62,8 +62,7 @@ def concerns(identification: IdentificationResult) -> list[str]:
         worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in lost.items())
         found.append(
             "the predicted heading drifts from the measured one by more than "
-            f"{np.degrees(LOST_HEADING):.0f} deg rms on {worst}: "
-            "a ship that hardly holds a course magnifies small errors"
+            f"{np.degrees(LOST_HEADING):.0f} deg rms on {worst}: {_why_lost(model)}"
         )
     if not any(metrics["use"] == "validate" for metrics in identification.metrics["trials"].values()):
         found.append(
@@ -75,8 +74,20 @@ def concerns(identification: IdentificationResult) -> list[str]:
     return found
 
 
+def _why_lost(model: ShipModel) -> str:
+    """The likely cause of a prediction that lost the heading."""
+    try:
+        stable = is_course_stable(model)
+    except InputError:
+        stable = False
+    if stable:
+        return "likely the model is taken beyond the manoeuvres that it was fitted to"
+    return "a ship that does not hold a course by itself magnifies small errors"
+
+
 def _steers_to_port(model: ShipModel) -> bool:
     try:
-        return nomoto(model).rudder_effect < 0.0
+        _, rudder = steering_state_space(model)
+        return bool(rudder[1, 0] < 0.0)  # the yaw acceleration at once: K / T is none in every ship
     except InputError:  # no straight course to tell it from
         return False

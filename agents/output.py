@@ -31,7 +31,11 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
     if target.is_symlink() or (target.exists() and not target.is_dir()):
         raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
     if target.is_dir():
-        foreign = sorted(entry.name for entry in target.iterdir() if entry.name not in names)
+        foreign = sorted(
+            entry.name
+            for entry in target.iterdir()
+            if entry.name not in names or entry.is_symlink() or not entry.is_file()
+        )
         if foreign:
             raise InputError(
                 f"{folder}: holds '{foreign[0]}', which is not a result of this command, and would be "

@@ -217,6 +217,7 @@ def ranking_section(found: Verification) -> Html:
             "better.",
         ),
         paragraph(Html(comparison + ".") if comparison else ""),
+        *(paragraph(f"No {name.upper()}: {reason}.") for name, reason in found.refused.items()),
         ranking_table(found),
         figure(
             costs_figure({pilot.name: pilot.flights.cost for pilot in _by_name(found)}),

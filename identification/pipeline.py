@@ -210,7 +210,10 @@ def identify(
     return IdentificationResult(
         model=model,
         stable=fit.stable,
-        metrics={"trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in predictable}},
+        metrics={
+            "stable": fit.stable,
+            "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in predictable},
+        },
         diagnostics=diagnose(fit.machines, regression, table),
         predictions=predictions,
     )

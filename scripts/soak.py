@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping import CourseKeepingEngine, episode_keys
 from shipgym.envs.course_keeping_task import OBSERVATION_HIGH, OBSERVATION_LOW, CourseKeepingTask
 
 LANES = 1024
@@ -44,8 +44,8 @@ def sail(model: str, kind: str, steps: int, advance: Callable[[int], None]) -> N
     task = CourseKeepingTask(max_heading_error_deg=180.0, max_envelope_distance=1e3)
     engine = CourseKeepingEngine(shipgym.load_model(model), LANES, task)
     random = np.random.default_rng(0)
-    seeds, episodes = np.arange(LANES), np.zeros(LANES, dtype=np.int64)
-    observations = engine.reset(seeds)
+    keys, episodes = episode_keys(np.arange(LANES)), np.zeros(LANES, dtype=np.int64)
+    observations = engine.begin(keys)
     for step in range(max(steps // LANES, 1)):
         observations, rewards, terminated, truncated = engine.step(actions(kind, observations, random))
         if not np.all(np.isfinite(rewards)):
@@ -55,7 +55,7 @@ def sail(model: str, kind: str, steps: int, advance: Callable[[int], None]) -> N
         over = terminated | truncated
         if over.any():
             episodes += over
-            observations = engine.reset(seeds, episodes, over)
+            observations = engine.begin(keys, episodes, over)
         if step % CHECK_EVERY == 0:
             advance(LANES * CHECK_EVERY)
     if not all(np.all(np.isfinite(values)) for values in engine.physical_state().values()):

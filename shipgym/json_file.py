@@ -39,11 +39,8 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
         raise InputError(f"{path}: binary content found, expected a {what} (JSON)") from None
     try:
         content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path}: broken JSON at line {error.lineno}, column {error.colno} ({error.msg}); "
-            f"the file may be cut short: {remedy}"
-        ) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: broken JSON ({error}); the file may be cut short: {remedy}") from None
     return check_table(content, f"{path}:")
 
 

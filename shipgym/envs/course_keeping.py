@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
@@ -58,6 +59,12 @@ class CourseKeepingEngine:
         if len(fleet) not in (1, num_envs):
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
         self.model = fleet[0]
+        if (self.model.provenance or {}).get("stable") is False:
+            warnings.warn(
+                f"model {self.model.name!r} was found unstable when it was identified: it runs away in hard "
+                "turns, do not trust what is learned or tuned on it",
+                stacklevel=3,
+            )
         if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
         self.num_envs = num_envs
@@ -73,15 +80,30 @@ class CourseKeepingEngine:
         self._observations = np.zeros((tiles, layout.LANES, rows.N_OBSERVATIONS), dtype=np.float32)
         self.reset(np.arange(num_envs))
 
-    def reset(self, seeds: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
-        """Begin an episode in each lane.
+    def reset(self, seeds: ArrayLike) -> Observation:
+        """Begin in each lane the episode of `CourseKeepingEnv.reset(seed=...)`.
 
         Parameters
         ----------
         seeds : array-like of int, shape (num_envs,)
-            Seed of each lane; an episode is a function of its seed and number alone.
+            Seed of each lane.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, n_observations)
+        """
+        return self.begin(episode_keys(seeds))
+
+    def begin(self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
+        """Begin an episode in each lane.
+
+        Parameters
+        ----------
+        keys : array-like of uint64, shape (num_envs,)
+            Of the random numbers of each lane (`episode_keys`); an episode is a function of its key and
+            number alone.
         episodes : array-like of int, shape (num_envs,)
-            Number of the episode under that seed.
+            Number of the episode under that key.
         mask : array-like of bool, shape (num_envs,)
             Lanes to begin anew; the others go on.
 
@@ -91,7 +113,7 @@ class CourseKeepingEngine:
         """
         which = np.zeros((len(self._states), layout.LANES), dtype=np.bool_)
         which.reshape(-1)[: self.num_envs] = mask
-        flat = np.broadcast_to(np.asarray(seeds).astype(np.uint64), (self.num_envs,))
+        flat = np.broadcast_to(np.asarray(keys).astype(np.uint64), (self.num_envs,))
         numbers = np.broadcast_to(np.asarray(episodes).astype(np.uint64), (self.num_envs,))
         for row, words in enumerate((flat, numbers)):
             lanes = np.zeros(which.size, dtype=np.uint64)
@@ -166,6 +188,18 @@ class CourseKeepingEngine:
         offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
         state = {name: self.outcome(offsets[name]) for name in self.model.state_names}
         return {**state, "set_point": self.outcome(rows.SET_POINT)}
+
+
+def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
+    """Keys of the kernels' random numbers for seeds of environments, of the same shape."""
+    array = np.asarray(seeds)
+    keys = [_key(gymnasium.utils.seeding.np_random(int(seed))[0]) for seed in array.ravel()]
+    return np.array(keys, dtype=np.uint64).reshape(array.shape)
+
+
+def _key(random: np.random.Generator) -> int:
+    """All that an environment's generator is asked for."""
+    return int(random.integers(2**63))
 
 
 def _ship_tiles(fleet: list[ShipModel], tiles: int) -> Floats:
@@ -265,10 +299,10 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if options:
             raise InputError(f"options: {options!r} found, expected none")
         if seed is not None or self._episode < 0:
-            self._key = int(self.np_random.integers(2**63))
+            self._key = _key(self.np_random)
             self._episode = -1
         self._episode += 1
-        observations = self._engine.reset([self._key], [self._episode])
+        observations = self._engine.begin([self._key], [self._episode])
         error = float(np.arctan2(observations[0, 0], observations[0, 1]))
         return observations[0], {"heading_error": error, "extrapolating": False}
 

@@ -27,7 +27,8 @@ def execute_time(trial: Trial) -> float:
     """Time at which the first rudder order of a manoeuvre was given, s."""
     delta = rudder(trial)
     if "delta_command" in trial.channels:
-        return float(trial.t[np.argmax(delta != 0.0)])
+        usual = np.percentile(np.abs(delta), 75)  # a little helm on the approach is no order yet
+        return float(trial.t[np.argmax(np.abs(delta) > 0.5 * usual)])
     return departure(trial.t, delta)
 
 

@@ -90,7 +90,7 @@ def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
     coefficients = _coefficients(fields["coefficients"], dynamics, f"{where}: coefficients")
     covariance = fields.get("covariance")
     provenance = fields.get("provenance")
-    return ShipModel(
+    model = ShipModel(
         name=check_text(fields["name"], f"{where}: name"),
         structure=dynamics.name,
         particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
@@ -104,6 +104,10 @@ def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
             fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
         ),
     )
+    if model.particulars.speed is None:
+        raise InputError(f"{where}: particulars.speed: missing, expected the service speed in m/s")
+    model.ship_column()  # refuses particulars that the structure cannot do with
+    return model
 
 
 def _normalisation(dynamics: Structure | Equations) -> str:

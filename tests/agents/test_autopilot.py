@@ -1,9 +1,11 @@
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from agents.autopilot import build_autopilot, verify
+from agents.autopilot_result import verification_metrics
 from agents.concerns import concerns
 from agents.spread import CriterionSpread, manoeuvre_spread
 from identification import identify
@@ -112,3 +114,27 @@ def test_a_criterion_without_value_has_no_quantile_and_does_not_pass():
     assert spread.probability == 0.5
     assert spread.quantiles(0.05, 0.95) == (3.0, 3.0)
     assert spread.to_dict()["without_value"] == 1
+
+
+def verified(**changes: float) -> dict:
+    """Metrics of the Mariner with other coefficients, hardly uncertain."""
+    mariner = load_model("mariner")
+    coefficients = {**mariner.coefficients, **changes}
+    spread = np.diag([(1e-4 * value) ** 2 for value in coefficients.values()])
+    found = verify(replace(mariner, coefficients=coefficients, covariance=spread), draws=4, seed=0)
+    metrics = verification_metrics(found)
+    json.dumps(metrics, allow_nan=False)
+    return metrics
+
+
+def test_a_ship_with_complex_steering_poles_has_no_nomoto_time_constants():
+    metrics = verified(N_v=1.2e-3, Y_r=-1e-2, Y_d=-1e-3)
+    assert metrics["nomoto"]["T1"] is None
+    assert metrics["nomoto"]["K"] > 0.0
+
+
+def test_an_autopilot_that_cannot_be_designed_is_said_and_the_others_fly():
+    """With T3 > T1 + T2 the first-order form that the PID is placed on has no meaning."""
+    metrics = verified(N_v=2e-3)
+    assert metrics["ranking"] == ["lq"]
+    assert "closed loop is unstable" in metrics["refused"]["pid"]

@@ -195,19 +195,22 @@ def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
     assert np.all(np.isfinite(list(env.physical_state().values())))
 
 
-def test_each_lane_of_a_batch_is_the_single_ship(mariner):
+def test_each_lane_of_a_batch_is_the_single_environment(mariner):
     engine = CourseKeepingEngine(mariner, 70)
-    keys = [int(np.random.default_rng(0).integers(2**63, endpoint=False)) + k for k in range(70)]
-    observations = engine.reset(keys)
-    alone = CourseKeepingEngine(mariner, 1)
-    lane = 66
-    single = alone.reset([keys[lane]])
+    observations = engine.reset(np.arange(70))
+    lane, env = 66, make()
+    single, _ = env.reset(seed=66)
     for _ in range(300):
-        np.testing.assert_array_equal(observations[lane], single[0])
+        np.testing.assert_array_equal(observations[lane], single)
         actions = np.stack([pd(observation) for observation in observations])
         observations, rewards, *_ = engine.step(actions)
-        single, reward, *_ = alone.step(actions[lane : lane + 1])
-        assert rewards[lane] == reward[0]
+        single, reward, *_ = env.step(actions[lane])
+        assert rewards[lane] == reward
+
+
+def test_a_model_found_unstable_is_said_to_be(mariner):
+    with pytest.warns(UserWarning, match="found unstable when it was identified"):
+        make(model=replace(mariner, provenance={"stable": False}))
 
 
 def test_a_finished_lane_stays_and_earns_nothing(mariner):

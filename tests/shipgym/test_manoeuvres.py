@@ -155,3 +155,11 @@ def test_what_a_trial_lacks_is_named():
         manoeuvres.zigzag_indices(trial)
     with pytest.raises(InputError, match="'x' is missing"):
         manoeuvres.turning_indices(trial)
+
+
+def test_a_little_helm_on_the_approach_is_no_order(mariner):
+    """Steady running at the neutral rudder for 30 s, then the turn: the same advance as without approach."""
+    approach, turn = np.full((300, 1), -0.0193), np.full((6000, 1), np.radians(35.0))
+    trial = mariner.simulate(np.vstack([approach, turn]), 0.1).with_(kind="turning-circle")
+    indices = manoeuvres.turning_indices(trial)
+    assert indices.advance_lengths == pytest.approx(3.54, abs=0.03)

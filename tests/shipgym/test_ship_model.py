@@ -119,7 +119,7 @@ def broken(change):
 
 
 CASES = [
-    (lambda fields: json.dumps(fields)[:5000], "broken JSON at line"),
+    (lambda fields: json.dumps(fields)[:5000], "broken JSON"),
     (broken(lambda f: f["coefficients"].pop("Y_v")), r"39 found, expected 40.*missing: 'Y_v'"),
     (broken(lambda f: f["coefficients"].update(Y_w=f["coefficients"].pop("Y_v"))), "unknown key 'Y_w'"),
     (broken(lambda f: f["coefficients"].update(Y_v="much")), r"coefficients\.Y_v: 'much'"),
@@ -139,6 +139,12 @@ CASES = [
     (broken(lambda f: f["structure"]["equations"].update(w=[])), "unknown key 'w'"),
     (broken(lambda f: f["structure"]["equations"]["r"].reverse()), "'v' and 'r' differ"),
     (lambda _: "[1, 2]", "expected a table"),
+    (lambda _: "[" * 100_000, "broken JSON"),
+    (lambda _: "9" * 5000, "broken JSON"),
+    (broken(lambda f: f["particulars"].pop("speed")), "speed"),
+    (broken(lambda f: f["particulars"].pop("mass")), "mass"),
+    (broken(lambda f: f["particulars"].update(estimated=5)), "estimated"),
+    (broken(lambda f: f["particulars"].update(N_vdot=0.9, Y_rdot=0.9)), "inertia"),
 ]
 
 
