@@ -64,6 +64,12 @@ def concerns(identification: IdentificationResult) -> list[str]:
             "the predicted heading drifts from the measured one by more than "
             f"{np.degrees(LOST_HEADING):.0f} deg rms on {worst}: {_why_lost(model)}"
         )
+    derived = {name for trial in (model.provenance or {}).get("trials", []) for name in trial["derived"]}
+    if derived:
+        found.append(
+            f"not measured but derived from other channels: {', '.join(sorted(derived))}; their noise is larger, "
+            "and predictions can be much worse than with measured ones"
+        )
     if not any(metrics["use"] == "validate" for metrics in identification.metrics["trials"].values()):
         found.append(
             'no trial is marked use = "validate": nothing tells how the model predicts what it has not seen'

@@ -198,7 +198,9 @@ def identify(
         "guard": fit.report,
         "stable": fit.stable,
         "steering": "estimated" if steering is None else "given",
-        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in used],
+        "trials": [
+            {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
+        ],
     }
     memory = MEMORY * ship["length"] / ship["speed"]
     covariance = coefficient_covariance(

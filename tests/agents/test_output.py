@@ -67,5 +67,5 @@ def test_a_folder_below_a_file_is_refused(tmp_path):
 def test_a_folder_by_the_name_of_a_result_is_not_a_result(tmp_path):
     (tmp_path / "out" / "model.json").mkdir(parents=True)
     (tmp_path / "out" / "model.json" / "precious.txt").write_text("mine")
-    with pytest.raises(InputError, match="holds 'model.json', which is not a result"):
+    with pytest.raises(InputError, match=r"holds 'model.json', which is not a result"):
         check_folder(tmp_path / "out", ["model.json"])

@@ -102,7 +102,9 @@ def test_provenance_tells_where_the_model_came_from(
     assert provenance is not None
     assert provenance["software"] == f"shipgym {shipgym.__version__}"
     assert (provenance["method"], provenance["samples"]) == ("tls-svm", "spline")
-    assert provenance["trials"] == [{"name": t.name, "sha256": t.sha256} for t in noisy_trials[:3]]
+    assert provenance["trials"] == [
+        {"name": t.name, "sha256": t.sha256, "derived": []} for t in noisy_trials[:3]
+    ]
     assert provenance["steering"] == "given"
 
 
