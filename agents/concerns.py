@@ -67,8 +67,8 @@ def concerns(identification: IdentificationResult) -> list[str]:
     derived = {name for trial in (model.provenance or {}).get("trials", []) for name in trial["derived"]}
     if derived:
         found.append(
-            f"not measured but derived from other channels: {', '.join(sorted(derived))}; their noise is larger, "
-            "and predictions can be much worse than with measured ones"
+            f"not measured but derived from other channels: {', '.join(sorted(derived))}; their noise is "
+            "larger, and predictions can be much worse than with measured ones"
         )
     if not any(metrics["use"] == "validate" for metrics in identification.metrics["trials"].values()):
         found.append(
