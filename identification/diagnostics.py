@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification import preprocess
 from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.samples import Samples
 from identification.uncertainty import residuals
@@ -19,6 +20,9 @@ from shipgym.trial import Trial
 Floats = NDArray[np.float64]
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
+RUDDER_NOISE = 6.0  # neither does one that moves less than so many times its noise,
+MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
+MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
 
 
@@ -86,14 +90,22 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
                 )
     if not structure.has_rudder:
         return
-    still = [trial for trial in trials if np.ptp(trial["delta"]) < LEAST_RUDDER]
+    still = [trial for trial in trials if _is_still(trial.t, trial["delta"])]
     if len(still) == len(trials):
-        angle = np.degrees(np.mean(still[0]["delta"]))
+        angle = np.degrees(np.median(still[0]["delta"]))
         raise InputError(
             f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout, expected it to move: "
             "nothing is excited and these coefficients cannot be identified; add a trial in which the "
             "rudder moves, such as a zigzag"
         )
+
+
+def _is_still(t: Floats, delta: Floats) -> bool:
+    """Whether a rudder does nothing but scatter: its running median moves no more than noise would."""
+    width = min(MEDIAN_WIDTH, len(delta))
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(delta, width), axis=1)
+    scatter = min(RUDDER_NOISE * preprocess.noise_level(t, delta), MOST_RUDDER)
+    return bool(np.ptp(medians) < max(LEAST_RUDDER, scatter))
 
 
 def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:

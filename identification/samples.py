@@ -10,10 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
+from scipy.ndimage import median_filter
 
 from identification import preprocess
 from identification.rudder import Rudder, rebuild, straight
@@ -30,6 +32,10 @@ SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 DEGREE = 3
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
+LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
+SHORTEST_GAP = 0.15  # unless it is shorter than this part of the time to sail one ship length
+NEIGHBOURS = 11  # steps that tell which is usual
+FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +81,9 @@ def build_samples(
 ) -> Samples:
     """Stack the regressions of all trials.
 
+    A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
+    a gap.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -102,7 +111,7 @@ def build_samples(
     Raises
     ------
     InputError
-        For a window or sample structure that does not exist.
+        For a window or sample structure that does not exist, and for a trial of which gaps leave nothing.
     """
     if samples not in SAMPLE_STRUCTURES:
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
@@ -110,17 +119,22 @@ def build_samples(
         raise InputError(f"window: {window} found, expected a number of sampling steps, at least 1")
     parts = []
     for index, trial in enumerate(trials):
-        steps = default_window(trial, particulars) if window is None else window
-        if steps >= len(trial):
+        if window is not None and window >= len(trial):
             raise InputError(
-                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of {steps} "
-                "steps; give a smaller window"
+                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
+                f"{window} steps; give a smaller window"
             )
 
         def terms(equation: str, channels: Channels) -> Floats:
             return structure.features(equation, channels, particulars, shaft_speed)
 
-        parts.append(_one_trial(trial, index, structure, terms, samples, steps, gear, smooth))
+        pieces = between_gaps(trial, particulars, FEWEST_SAMPLES if window is None else window + 1)
+        steps = default_window(max(pieces, key=len), particulars) if window is None else window
+        parts += [
+            _one_trial(piece, index, structure, terms, samples, steps, gear, smooth)
+            for piece in pieces
+            if len(piece) > steps
+        ]
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.equations},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.equations},
@@ -129,6 +143,54 @@ def build_samples(
         np.concatenate([part.trial for part in parts]),
         max(part.window for part in parts),
     )
+
+
+def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
+    """Cut a trial where samples are missing.
+
+    A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
+    0.15 of the time to sail one ship length. Where samples are closer than that no row of the regression
+    spans more than a quarter of the time to sail one ship length without a sample.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record.
+    particulars : Particulars
+        Length and service speed.
+    fewest : int
+        Shorter pieces, and those of fewer than 10 samples, are left out.
+
+    Returns
+    -------
+    list of Trial
+        The trial itself if it has no gap.
+
+    Raises
+    ------
+    InputError
+        Where no piece is left.
+    """
+    steps = np.diff(trial.t)
+    usual = np.maximum(np.median(steps), median_filter(steps, NEIGHBOURS, mode="mirror"))
+    shortest = SHORTEST_GAP * particulars["length"] / particulars["speed"]
+    gaps = np.flatnonzero(steps > (1.0 + 1e-6) * np.maximum(LARGEST_STEPS * usual, shortest)) + 1
+    if not gaps.size:
+        return [trial]
+    fewest = max(fewest, FEWEST_SAMPLES)
+    edges = [0, *gaps.tolist(), len(trial)]
+    rows = [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]
+    if not rows:
+        longest = int(np.argmax(steps))
+        raise InputError(
+            f"trial {trial.name!r}: {gaps.size} gaps in time found (the longest from {trial.t[longest]:g} to "
+            f"{trial.t[longest + 1]:g} s) and nowhere {fewest} samples between them, expected longer "
+            'stretches without a gap; export it with every sample, or leave it out (use = "skip")'
+        )
+    return [
+        Trial(trial.t[piece], {c: v[piece] for c, v in trial.channels.items()}, name=trial.name)
+        for piece in rows
+    ]
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:

@@ -1,12 +1,15 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from identification import IdentificationResult
-from identification.diagnostics import autocorrelation, variance_inflation
+from identification.diagnostics import autocorrelation, check_trials, variance_inflation
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import zigzag
 
 
 def test_variance_inflation_of_two_correlated_features() -> None:
@@ -40,3 +43,45 @@ def test_collinear_terms_of_a_zigzag_are_named(cao_fit: IdentificationResult) ->
 def test_diagnostics_are_plain_values(noisy_fit: IdentificationResult) -> None:
     text = json.dumps({q: fit.to_dict() for q, fit in noisy_fit.diagnostics.items()}, allow_nan=False)
     assert json.loads(text)["r"]["terms"] == 15
+
+
+def with_rudder(delta_deg: np.ndarray, step: float = 0.5) -> Trial:
+    channels = {name: np.zeros(len(delta_deg)) for name in "uvr"} | {"delta": np.radians(delta_deg)}
+    return Trial(step * np.arange(len(delta_deg)), channels, name="straight.csv")
+
+
+@pytest.mark.parametrize("samples", [40, 400, 20000])
+@pytest.mark.parametrize("noise", [0.05, 0.15, 0.4])
+def test_noise_on_a_constant_rudder_moves_nothing(mariner: ShipModel, samples: int, noise: float) -> None:
+    for seed in range(5):
+        delta = 10.0 + noise * np.random.default_rng(seed).standard_normal(samples)
+        with pytest.raises(InputError, match=r"straight\.csv.*stays at (9\.[789]|10\.[0123]).*zigzag"):
+            check_trials([with_rudder(delta)], mariner.table)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.15])
+@pytest.mark.parametrize("row", [0, 150, 399])
+def test_an_outlier_on_a_constant_rudder_moves_nothing(mariner: ShipModel, row: int, noise: float) -> None:
+    delta = -5.0 + noise * np.random.default_rng(0).standard_normal(400)
+    delta[row] = 30.0
+    with pytest.raises(InputError, match=r"stays at -(4\.9|5\.0)\d deg throughout"):
+        check_trials([with_rudder(delta)], mariner.table)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("every", [1, 10, 50])
+def test_small_zigzags_and_coarse_ones_move(
+    mariner: ShipModel, record: Callable[..., Trial], every: int, noise: float
+) -> None:
+    run = zigzag(mariner, 5, 1, duration=300, dt=0.1)
+    check_trials([record(run, every=every, noise=noise)], mariner.table)
+
+
+def test_a_short_zigzag_in_a_long_record_moves(mariner: ShipModel) -> None:
+    delta = 0.15 * np.random.default_rng(0).standard_normal(20000)
+    delta[9000:9150] += zigzag(mariner, 10, 10, duration=150, dt=1.0)["delta"][:150] * 180.0 / np.pi
+    check_trials([with_rudder(delta)], mariner.table)
+
+
+def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
+    check_trials([with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))], mariner.table)

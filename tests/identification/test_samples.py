@@ -5,9 +5,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from identification import Samples, build_samples
+from identification import IdentificationResult, Samples, build_samples, identify
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.simulation import open_loop
 
 
 def mismatch(model: ShipModel, samples: Samples) -> float:
@@ -73,3 +74,64 @@ def test_wrong_arguments_are_named(mariner: ShipModel, cao_zigzag: Trial) -> Non
         build(window=0)
     with pytest.raises(InputError, match="'zigzag_15_15': 1001 samples found, expected more than the window"):
         build(window=1001)
+
+
+def without(trial: Trial, *holes: tuple[float, float]) -> Trial:
+    """The trial without its samples in some intervals of time."""
+    kept = np.all([(trial.t < start) | (trial.t >= end) for start, end in holes], axis=0)
+    return Trial(trial.t[kept], {c: v[kept] for c, v in trial.channels.items()}, name="holes.csv")
+
+
+@pytest.mark.parametrize("hole", [(100.0, 150.0), (203.0, 253.0), (120.3, 220.0), (496.0, 499.9)])
+def test_a_hole_in_the_record_spoils_nothing(
+    mariner: ShipModel, cao_zigzag: Trial, cao_fit: IdentificationResult, hole: tuple[float, float]
+) -> None:
+    broken = without(cao_zigzag, hole)
+    fit = identify([broken], particulars=mariner.particulars)
+    for name, value in fit.coefficients.items():
+        assert value == pytest.approx(cao_fit.coefficients[name], rel=0.01), name
+    truth = zigzag(mariner, 20, 20, duration=400)
+    predicted = open_loop(fit.model, truth)
+    assert np.abs(predicted["psi"] - truth["psi"]).max() < np.radians(0.01)
+
+
+@pytest.mark.parametrize("structure", ["euler", "integral", "spline"])
+@pytest.mark.parametrize("window", [1, 4])
+def test_no_row_spans_a_gap(mariner: ShipModel, cao_zigzag: Trial, structure: str, window: int) -> None:
+    p = mariner.particulars
+    broken = without(cao_zigzag, (100.0, 104.0), (105.0, 150.0), (300.0, 302.0))
+    samples = build_samples([broken], mariner.table, p, structure, window=window)
+    assert samples.duration.max() <= (window - 1) * 0.5 + 2.5 + 1e-9  # 2 s are no gap
+    for start, end in ((100.0, 104.0), (105.0, 150.0)):
+        assert not np.any((samples.start < start) & (samples.start + samples.duration > end))
+    assert not np.any((samples.start > 99.9) & (samples.start < 150.0))  # too few samples to tell
+
+
+def test_noisy_pieces_are_smoothed_each_by_itself(mariner: ShipModel, record: Callable[..., Trial]) -> None:
+    run = record(zigzag(mariner, 20, 20, duration=500, dt=0.1), every=5, noise=1.0, name="noisy")
+    fit = identify([without(run, (150.0, 250.0))], particulars=mariner.particulars)
+    truth = zigzag(mariner, 20, 20, duration=400)
+    error = open_loop(fit.model, truth)["psi"] - truth["psi"]
+    assert np.sqrt(np.mean(error**2)) < np.radians(1.0)
+
+
+def test_a_change_of_the_time_step_is_no_gap(mariner: ShipModel, record: Callable[..., Trial]) -> None:
+    fine = record(zigzag(mariner, 15, 15, duration=300, dt=0.1), name="fine")
+    rows = np.concatenate([np.arange(2000), np.arange(2000, 3000, 20)])
+    mixed = Trial(fine.t[rows], {c: v[rows] for c, v in fine.channels.items()})
+    assert len(build_samples([mixed], mariner.table, mariner.particulars)) == len(mixed) - 1
+
+
+def test_irregular_samples_lose_next_to_nothing(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    rows = np.random.default_rng(1).random(len(cao_zigzag)) < 0.6
+    sparse = Trial(cao_zigzag.t[rows], {c: v[rows] for c, v in cao_zigzag.channels.items()})
+    samples = build_samples([sparse], mariner.table, mariner.particulars)
+    assert len(samples) > 0.97 * len(sparse)
+    assert mismatch(mariner, samples) < 2e-3
+
+
+def test_a_record_of_nothing_but_gaps_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    holes = [(start + 4.0, start + 20.0) for start in np.arange(0.0, 500.0, 20.0)]
+    message = r"holes\.csv': 2[45] gaps in time found \(the longest from .*nowhere 10 samples"
+    with pytest.raises(InputError, match=message):
+        build_samples([without(cao_zigzag, *holes)], mariner.table, mariner.particulars)
