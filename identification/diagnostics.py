@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
 RUDDER_NOISE = 6.0  # neither does one that moves less than so many times its noise,
 MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
+SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
 
@@ -74,7 +75,7 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     Raises
     ------
     InputError
-        For no trial, a missing channel, or rudders that never move.
+        For no trial, a missing channel, times that nearly coincide, or rudders that never move.
     """
     if not trials:
         raise InputError(
@@ -88,6 +89,7 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
                     f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
                     'out (use = "skip")'
                 )
+        _check_steps(trial)
     if not structure.has_rudder:
         return
     still = [trial for trial in trials if _is_still(trial.t, trial["delta"])]
@@ -97,6 +99,16 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
             f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout, expected it to move: "
             "nothing is excited and these coefficients cannot be identified; add a trial in which the "
             "rudder moves, such as a zigzag"
+        )
+
+
+def _check_steps(trial: Trial) -> None:
+    steps = np.diff(trial.t)
+    k, usual = int(np.argmin(steps)), float(np.median(steps))
+    if steps[k] < SHORTEST_STEP * usual:
+        raise InputError(
+            f"trial {trial.name!r}: samples at {trial.t[k]:.12g} and {trial.t[k + 1]:.12g} s are only "
+            f"{steps[k]:.2g} s apart, expected a step near the usual {usual:.3g} s; remove the repeated row"
         )
 
 

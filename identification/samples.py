@@ -149,8 +149,8 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
     """Cut a trial where samples are missing.
 
     A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
-    0.15 of the time to sail one ship length. Where samples are closer than that no row of the regression
-    spans more than a quarter of the time to sail one ship length without a sample.
+    0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
+    the regression is longer than a quarter of it.
 
     Parameters
     ----------

@@ -25,6 +25,10 @@ VELOCITY_FRAMES = ("body", "earth")
 ORIGINS = ("midship", "cg")
 REPAIRS = ("interpolate",)
 
+#: A run of more rows without a value that lasts more median time steps is too long to fill.
+LONGEST_HOLE_ROWS = 10
+LONGEST_HOLE_STEPS = 20.0
+
 
 @dataclass(frozen=True)
 class Conventions:
@@ -41,7 +45,8 @@ class Conventions:
     xg : float, optional
         Centre of gravity forward of midship, m; needed with origin "cg".
     repair : {"interpolate"}, optional
-        How missing values are filled; None: they are refused.
+        How missing values are filled; None: they are refused. Holes of more than 10 rows and 20 time
+        steps are refused in any case.
     where : str, optional
         Start of the messages, such as ``"ship.toml: [conventions]"``.
 
@@ -269,9 +274,28 @@ def _repaired(values: Array, source: Source, repair: str | None) -> tuple[Array,
         )
     kept = slice(int(whole[0]), int(whole[-1]) + 1)
     filled = values[kept].copy()
+    repaired = Source(source.table, source.columns, source.rows[kept])
     for k in range(1, len(names)):
+        _check_holes(filled[:, 0], missing[kept, k], names[k], repaired)
         _fill(filled[:, 0], filled[:, k], unwrap=names[k] == "psi", unit=source.columns[names[k]].unit)
-    return filled, Source(source.table, source.columns, source.rows[kept])
+    return filled, repaired
+
+
+def _check_holes(t: Array, missing: npt.NDArray[np.bool_], channel: str, source: Source) -> None:
+    """Refuse to fill a hole of many rows; the first and the last row are whole."""
+    edges = np.flatnonzero(np.diff(missing))
+    first, after = edges[::2] + 1, edges[1::2] + 1
+    long = (after - first > LONGEST_HOLE_ROWS) & (
+        t[after] - t[first - 1] > LONGEST_HOLE_STEPS * np.median(np.diff(t))
+    )
+    if long.any():
+        i = int(np.argmax(long))
+        unit = source.columns["t"].unit
+        raise InputError(
+            f"{source.at(int(first[i]), channel)}: {after[i] - first[i]} rows without a value, over "
+            f"{t[after[i]] - t[first[i] - 1]:g} {unit}, expected at most {LONGEST_HOLE_STEPS:g} time steps "
+            "to interpolate over; split the file there, or leave out the rows or the column"
+        )
 
 
 def _fill(t: Array, column: Array, *, unwrap: bool, unit: str) -> None:

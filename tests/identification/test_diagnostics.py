@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from identification import IdentificationResult
+from identification import IdentificationResult, identify
 from identification.diagnostics import autocorrelation, check_trials, variance_inflation
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -85,3 +85,15 @@ def test_a_short_zigzag_in_a_long_record_moves(mariner: ShipModel) -> None:
 
 def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
     check_trials([with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))], mariner.table)
+
+
+@pytest.mark.parametrize("apart", [1e-9, 1e-6, 4e-5])
+def test_times_that_nearly_coincide_are_refused(
+    mariner: ShipModel, noisy_trials: list[Trial], apart: float
+) -> None:
+    run = noisy_trials[0]
+    t = np.insert(run.t, 101, run.t[100] + apart)
+    twice = Trial(t, {c: np.insert(v, 101, v[100]) for c, v in run.channels.items()}, name="twice.csv")
+    message = r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the repeated row"
+    with pytest.raises(InputError, match=message):
+        identify([twice], particulars=mariner.particulars)

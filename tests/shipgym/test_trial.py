@@ -394,6 +394,31 @@ def test_time_cannot_be_repaired_nor_a_column_that_is_mostly_empty(tmp_path):
     assert "repair: 'drop' found, expected one of 'interpolate'" in refusal(path, repair="drop")
 
 
+@pytest.mark.parametrize("rows", [10, 15, 60])
+def test_a_hole_too_long_to_interpolate_is_refused_with_its_line_and_length(tmp_path, rows):
+    channels, _ = manoeuvre()
+    r = channels["r"].copy()
+    r[5] = np.nan
+    r[100 : 100 + rows] = np.nan
+    path = write(tmp_path / "run.csv", {"t": T, **channels, "r": r})
+    if rows < 20:
+        assert len(Trial.from_csv(path, repair="interpolate")) == T.size
+        return
+    message = refusal(path, repair="interpolate")
+    length = T[100 + rows] - T[99]
+    assert f"line 102 (data row 101), column 'r': {rows} rows without a value, over {length:g} s" in message
+    assert "split the file there" in message
+
+
+def test_a_few_rows_over_a_long_time_are_no_hole(tmp_path):
+    channels, _ = manoeuvre()
+    kept = np.r_[0:102, 150 : T.size]
+    r = channels["r"][kept]
+    r[100:104] = np.nan
+    path = write(tmp_path / "run.csv", {"t": T[kept], "r": r})
+    assert np.isfinite(Trial.from_csv(path, repair="interpolate")["r"]).all()
+
+
 # --- files that are refused
 
 
