@@ -13,10 +13,10 @@ import numpy as np
 import shipgym
 from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
 from identification.gear import estimated_gear
-from identification.guarded_fit import guarded_fit
+from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
-from identification.samples import build_samples
+from identification.samples import Samples, build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
 from shipgym.checks import check_number
@@ -186,27 +186,41 @@ def identify(
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
     )
     fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
+    asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
     provenance = {
-        "software": f"shipgym {shipgym.__version__}",
         "structure": structure,
         "method": method,
         "samples": samples,
-        "settings": {"window": window, "smooth": smooth, "guarded": guarded}
-        | {key: _plain(value) for key, value in settings.items()},
-        "steps_per_window": regression.window,
-        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
-        "guard": fit.report,
-        "stable": fit.stable,
+        "settings": {key: _plain(value) for key, value in asked.items()},
         "steering": "estimated" if steering is None else "given",
-        "trials": [
-            {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
-        ],
+        **_origin(fit, regression, used),
     }
     memory = MEMORY * ship["length"] / ship["speed"]
     covariance = coefficient_covariance(
         joint_covariance(fit.machines, regression, memory), table.acceleration_matrix(ship, shaft)
     )
     model = replace(fit.model, covariance=covariance, provenance=provenance)
+    return _judged(model, fit, regression, trials)
+
+
+def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
+    """What a fit came from and what became of it, for the model's provenance."""
+    return {
+        "software": f"shipgym {shipgym.__version__}",
+        "steps_per_window": regression.window,
+        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
+        "guard": fit.report,
+        "stable": fit.stable,
+        "trials": [
+            {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
+        ],
+    }
+
+
+def _judged(
+    model: ShipModel, fit: GuardedFit, regression: Samples, trials: Sequence[Trial]
+) -> IdentificationResult:
+    """The model with its predictions of all trials that are not skipped, and its diagnostics."""
     predictable = [trial for trial in trials if trial.use != "skip"]
     predictions = {trial.name: predict(model, trial) for trial in predictable}
     return IdentificationResult(
@@ -216,7 +230,7 @@ def identify(
             "stable": fit.stable,
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in predictable},
         },
-        diagnostics=diagnose(fit.machines, regression, table),
+        diagnostics=diagnose(fit.machines, regression, model.table),
         predictions=predictions,
     )
 
