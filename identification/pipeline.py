@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import shipgym
 from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
@@ -28,6 +29,8 @@ from shipgym.steering import SteeringGear
 from shipgym.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
+Floats = NDArray[np.float64]
+
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
@@ -176,15 +179,8 @@ def identify(
     shaft = _shaft_speed(service_shaft_speed, used, table)
     regression = build_samples(used, table, ship, samples, window, steering, smooth, shaft)
     check_samples(regression, used, table)
-    blank = ShipModel(
-        name=ship["name"] if name is None else name,
-        structure=structure,
-        particulars=ship,
-        steering=_gear(used, table) if steering is None else steering,
-        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
-        service_shaft_speed=shaft,
-        envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
-    )
+    gear = _gear(used, table) if steering is None else steering
+    blank = _blank(ship["name"] if name is None else name, structure, ship, gear, shaft, used)
     fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
     asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
     provenance = {
@@ -195,12 +191,34 @@ def identify(
         "steering": "estimated" if steering is None else "given",
         **_origin(fit, regression, used),
     }
-    memory = MEMORY * ship["length"] / ship["speed"]
-    covariance = coefficient_covariance(
-        joint_covariance(fit.machines, regression, memory), table.acceleration_matrix(ship, shaft)
-    )
+    covariance = _covariance(fit, regression, blank)
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _judged(model, fit, regression, trials)
+
+
+def _blank(
+    name: str, structure: str, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
+) -> ShipModel:
+    """The model but for its coefficients, with the envelope of the trials behind it."""
+    return ShipModel(
+        name=name,
+        structure=structure,
+        particulars=ship,
+        steering=gear,
+        coefficients=dict.fromkeys(get_structure(structure).coefficient_names, 0.0),
+        service_shaft_speed=shaft,
+        envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
+    )
+
+
+def _covariance(fit: GuardedFit, regression: Samples, blank: ShipModel) -> Floats:
+    """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
+    ship = blank.particulars
+    memory = MEMORY * ship["length"] / ship["speed"]
+    return coefficient_covariance(
+        joint_covariance(fit.machines, regression, memory),
+        blank.table.acceleration_matrix(ship, blank.service_shaft_speed),
+    )
 
 
 def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
