@@ -228,6 +228,44 @@ def autopilot_command(
         console.print(f"report: {report}", soft_wrap=True)
 
 
+@app.command("reproduce")
+@answered
+def reproduce_command(
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020 or all.")
+    ],
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
+
+    Exits with 1 if an aim is missed.
+    """
+    from agents.reproduction import missed, page, papers_of, reproduce, terminal_table
+    from agents.terminal import err, print_json
+    from agents.terminal import out as console
+    from shipgym.whole_file import write_text
+
+    names = papers_of(paper)
+    with err.status("starting") as status:
+        results = reproduce(names, tell=status.update)
+    if markdown is not None:
+        write_text(page(results), markdown)
+    if as_json:
+        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
+    else:
+        for name, rows in results.items():
+            console.print(terminal_table(name, rows))
+            console.print()
+        if markdown is not None:
+            console.print(f"written: {markdown}", soft_wrap=True)
+    late = missed(results)
+    if late:
+        _fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
+
+
 @app.command("doctor")
 @answered
 def doctor_command(as_json: Json = False) -> None:

@@ -19,6 +19,7 @@ from shipgym.manoeuvres import (
 from shipgym.models import ShipModel
 from shipgym.plots import graph_objects, path_figure, zigzag_figure
 from shipgym.trial import Trial
+from shipgym.whole_file import write_text
 
 ZIGZAGS_DEG = (10.0, 20.0)
 TURN_DEG = 35.0
@@ -137,12 +138,4 @@ def write_page(
             figure(path_figure(circles), "circle-paths", "Paths from above, north up, in metres."),
         ),
     }  # fmt: skip
-    text = page(f"{model.name}: standard manoeuvres", body)
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    try:
-        draft.write_text(text, encoding="utf-8")
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    finally:
-        draft.unlink(missing_ok=True)
+    write_text(page(f"{model.name}: standard manoeuvres", body), path)

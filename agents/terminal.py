@@ -26,7 +26,7 @@ out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITH
 err = Console(stderr=True, highlight=False)
 
 
-def _table(title: str) -> Table:
+def plain_table(title: str) -> Table:
     """A table without lines, its title to the left."""
     return Table(
         title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
@@ -82,7 +82,7 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
 
 def prediction_table(result: IdentificationResult) -> Table:
     """Errors of the open-loop simulation of each trial, and its indices."""
-    table = _table("Open-loop simulation of the trials: root mean square errors")
+    table = plain_table("Open-loop simulation of the trials: root mean square errors")
     table.add_column("trial", overflow="fold")
     table.add_column("use")
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
@@ -113,7 +113,7 @@ def _indices(metrics: Mapping[str, Any]) -> str:
 
 def manoeuvre_table(rows: Mapping[str, Mapping[str, float | None]]) -> Table:
     """Indices of manoeuvres, one line each."""
-    table = _table("Manoeuvres from service speed in deep water")
+    table = plain_table("Manoeuvres from service speed in deep water")
     table.add_column("manoeuvre")
     table.add_column("index")
     table.add_column("value", justify="right")
@@ -127,7 +127,7 @@ def criteria_table(
     criteria: Mapping[str, Criterion], probabilities: Mapping[str, float] | None = None
 ) -> Table:
     """IMO criteria, with the probability of passing where it is known."""
-    table = _table("IMO criteria, resolution MSC.137(76)")
+    table = plain_table("IMO criteria, resolution MSC.137(76)")
     table.add_column("criterion")
     for heading in ("value", "limit"):
         table.add_column(heading, justify="right")
@@ -147,7 +147,7 @@ def criteria_table(
 def ranking_table(result: AutopilotResult) -> Table:
     """Autopilots over the models drawn, the best first."""
     metrics = result.metrics
-    table = _table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
+    table = plain_table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
     table.add_column("autopilot")
     headings = (
         "cost, mean", "cost, 95 %", "heading rmse, deg", "rudder, deg/min", "gain margin",
