@@ -22,7 +22,7 @@ from rich.table import Table
 
 import shipgym
 from identification import TruncatedLSSVM
-from identification.lssvm import dense_dual_solution
+from identification.dense_dual import dense_dual_solution
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 

@@ -8,7 +8,7 @@ from scipy.linalg import solve
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, TruncatedLSSVM
-from identification.lssvm import dense_dual_solution, dense_truncated_solution
+from identification.dense_dual import dense_dual_solution, dense_truncated_solution
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
