@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +19,9 @@ from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
 from identification.samples import Samples, build_samples
 from identification.threads import on_one_thread
+from identification.tuning import SearchResult
 from identification.uncertainty import coefficient_covariance, joint_covariance
-from shipgym.checks import check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
 from shipgym.models import Envelope, ShipModel, Structure, get_structure
@@ -50,6 +51,8 @@ class IdentificationResult:
         Of each equation: those of `u`, `v`, `r` that the structure has.
     predictions : dict of str to Trial or None
         The open-loop predictions by trial; None where the model ran away.
+    searches : dict of str to SearchResult
+        How the settings of each equation were found, for methods that search; the variable is log10 C.
     """
 
     model: ShipModel
@@ -57,6 +60,7 @@ class IdentificationResult:
     metrics: dict[str, Any]
     diagnostics: dict[str, EquationDiagnostics]
     predictions: dict[str, Trial | None]
+    searches: dict[str, SearchResult] = field(default_factory=dict)
 
     @property
     def coefficients(self) -> dict[str, float]:
@@ -125,6 +129,7 @@ def identify(
     window: int | None = None,
     smooth: bool = True,
     guarded: bool = True,
+    hold_out: Sequence[str] = (),
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -138,8 +143,11 @@ def identify(
         that know the shaft speed.
     structure : str
         Terms of the model: a name of `shipgym.list_structures`.
-    method : {"tls-svm", "ls-svm", "ls"}
-        Truncated LS-SVM, LS-SVM, or least squares.
+    method : str
+        A name of `identification.methods.METHODS`: truncated LS-SVM (`tls-svm`), LS-SVM of given C (`ls-svm`)
+        or of one found by grid, particle swarm, bee colony or differential evolution (`cv-lssvr`,
+        `pso-lssvr`, `abc-lssvr`, `de-lssvr`), or scikit-learn's least squares, ridge and support
+        vector regression (`ls`, `ridge`, `svr`).
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
@@ -160,8 +168,11 @@ def identify(
     guarded : bool
         Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
         is large in a hard turn and invisible in the data. The provenance tells what was done.
+    hold_out : sequence of str
+        Names of trials that are predicted only, as if they were marked `validate`.
     **settings
-        Of the machine: `rank`, `selection`, `C`, `scale`.
+        Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
+        `optimiser` of a search.
 
     Returns
     -------
@@ -173,6 +184,7 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     chosen, table = get_method(method), get_structure(structure)
+    trials = _held_out(trials, hold_out)
     used = _used(trials)
     check_trials(used, table)
     ship = _ship(particulars, used, table)
@@ -227,12 +239,19 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": regression.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
+        **_searched(fit),
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
             {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
         ],
     }
+
+
+def _searched(fit: GuardedFit) -> dict[str, Any]:
+    """What a search chose for each equation; nothing for methods that do not search."""
+    chosen = {q: m.chosen_ for q, m in fit.machines.items() if hasattr(m, "chosen_")}
+    return {"search": chosen} if chosen else {}
 
 
 def _judged(
@@ -250,7 +269,17 @@ def _judged(
         },
         diagnostics=diagnose(fit.machines, regression, model.table),
         predictions=predictions,
+        searches={q: m.search_ for q, m in fit.machines.items() if hasattr(m, "search_")},
     )
+
+
+def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only."""
+    known = [trial.name for trial in trials]
+    wanted = [names] if isinstance(names, str) else list(names)
+    for name in wanted:
+        check_choice(name, known, "hold_out")
+    return [trial.with_(use="validate") if trial.name in wanted else trial for trial in trials]
 
 
 def _used(trials: Sequence[Trial]) -> list[Trial]:
@@ -312,4 +341,6 @@ def _plain(value: Any) -> Any:
     """A setting as JSON knows it."""
     if isinstance(value, float) and not np.isfinite(value):
         return None
+    if is_dataclass(value) and not isinstance(value, type):
+        return {"kind": type(value).__name__, **asdict(value)}
     return np.asarray(value).tolist() if isinstance(value, np.ndarray | list | tuple) else value
