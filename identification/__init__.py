@@ -6,20 +6,56 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from identification.cross_validation import cross_validate
     from identification.lssvm import LSSVM, TruncatedLSSVM
     from identification.pipeline import IdentificationResult, identify
+    from identification.polynomial import polynomial_coefficients
     from identification.samples import Samples, build_samples
+    from identification.tuning import (
+        ArtificialBeeColony,
+        DifferentialEvolution,
+        GridSearch,
+        ParticleSwarm,
+        SearchResult,
+        TunedLSSVM,
+        minimise,
+    )
 
 _HOME = {
+    "ArtificialBeeColony": "identification.tuning",
+    "DifferentialEvolution": "identification.tuning",
+    "GridSearch": "identification.tuning",
     "LSSVM": "identification.lssvm",
     "IdentificationResult": "identification.pipeline",
+    "ParticleSwarm": "identification.tuning",
     "Samples": "identification.samples",
+    "SearchResult": "identification.tuning",
     "TruncatedLSSVM": "identification.lssvm",
+    "TunedLSSVM": "identification.tuning",
     "build_samples": "identification.samples",
+    "cross_validate": "identification.cross_validation",
     "identify": "identification.pipeline",
+    "minimise": "identification.tuning",
+    "polynomial_coefficients": "identification.polynomial",
 }
 
-__all__ = ["LSSVM", "IdentificationResult", "Samples", "TruncatedLSSVM", "build_samples", "identify"]
+__all__ = [
+    "LSSVM",
+    "ArtificialBeeColony",
+    "DifferentialEvolution",
+    "GridSearch",
+    "IdentificationResult",
+    "ParticleSwarm",
+    "Samples",
+    "SearchResult",
+    "TruncatedLSSVM",
+    "TunedLSSVM",
+    "build_samples",
+    "cross_validate",
+    "identify",
+    "minimise",
+    "polynomial_coefficients",
+]
 
 
 def __getattr__(name: str) -> Any:

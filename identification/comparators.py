@@ -12,6 +12,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.decomposition import centre_and_scale
 from identification.lssvm import check_weight, validated
+from identification.robust import MAD
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -40,10 +41,10 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
     coef_, intercept_, n_features_in_
         As of `LSSVM`.
     weights_ : array of shape (n_samples,)
-        Influence of each sample: 1 / error beyond epsilon, 0 within, of mean 1. Least squares with
-        these weights gives nearly the same coefficients.
+        Influence of each sample as Huber's estimator gives it, whose loss is near: that of the samples
+        of which the error exceeds its robust scale falls with their error.
     inverse_moment_, covariance_ : array of shape (n_features, n_features)
-        With these weights. An approximation: it takes the weights as given.
+        Of least squares with these weights; an approximation.
     converged_ : bool
         Whether the solver reached its tolerance.
     """
@@ -88,11 +89,10 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         return self
 
     def _spread(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
-        """Weights, moment and covariance of the least-squares problem with the same solution."""
-        beyond = np.abs(error) >= self.epsilon
-        weights = np.where(beyond, 1.0 / np.maximum(np.abs(error), 1e-6), 0.0)
-        total = float(weights.sum())
-        self.weights_ = weights * len(error) / total if total > 0.0 else np.ones(len(error))
+        """Weights, moment and covariance of Huber's estimator at the errors found."""
+        scale_of_error = MAD * float(np.median(np.abs(error)))
+        large = np.abs(error) > scale_of_error
+        self.weights_ = np.where(large, scale_of_error / np.where(large, np.abs(error), 1.0), 1.0)
         moment = (scaled.T * self.weights_) @ scaled
         inverse = np.linalg.pinv(moment, hermitian=True) / scale / scale[:, None]
         self.inverse_moment_ = inverse

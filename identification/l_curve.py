@@ -88,7 +88,8 @@ def corner_rank(curve: LCurve, n_samples: int) -> int:
     dropped = np.arange(full - 1, -1, -1)
     quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - SIGNIFICANCE)
     allowed = 1.0 + dropped / freedom * quantile
-    adequate = residual**2 <= allowed * max(residual[-1] ** 2, floor**2)
+    squared = residual * residual  # once: as array and as number it may differ in the last bit
+    adequate = squared <= allowed * max(squared[-1], floor**2)
     return int(np.flatnonzero(adequate[corner - 1 :])[0]) + corner
 
 
