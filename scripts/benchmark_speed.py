@@ -17,14 +17,17 @@ from dataclasses import asdict, dataclass
 import gymnasium
 import numpy as np
 import typer
+from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
 import shipgym
-from identification import TruncatedLSSVM
+from identification import ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM
 from identification.dense_dual import dense_dual_solution
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
+
+Floats = NDArray[np.float64]
 
 MODEL = "mariner-tls-svm"
 STEPS_IN_PYTHON = """
@@ -129,19 +132,42 @@ def batched_environment(n_envs: int) -> Row:
     )
 
 
-def truncated_fit(n_samples: int = 6000, n_terms: int = 15) -> Row:
-    """TLS-SVM in primal form against the dense dual system of LS-SVM."""
+def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
+    """Correlated features and noisy targets."""
     random = np.random.default_rng(0)
     X = random.standard_normal((n_samples, n_terms)) @ random.standard_normal((n_terms, n_terms))
-    y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
-    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 20)
-    dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 1)
+    return X, X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
+
+
+def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
+    """TLS-SVM in primal form, its L-curve included, against the dense dual system of LS-SVM."""
+    X, y = made_up_regression(n_samples, n_terms)
+    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 50)
+    dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 3 if n_samples < 3000 else 1)
     return Row(
         f"TLS-SVM fit, {n_samples} samples, {n_terms} terms",
-        f"{primal * 1e3:.1f} ms",
+        f"{primal * 1e3:.2f} ms",
         f"dense dual solve {dense:.2f} s",
         dense / primal,
-        "1000 times",
+        aim,
+    )
+
+
+def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -> Row:
+    """Search for C by the bee colony of Zhu 2018 (20 sources, 30 rounds), against ten times the samples."""
+
+    def least(n: int) -> float:
+        X, y = made_up_regression(n, n_terms)
+        machine = TunedLSSVM(optimiser=ArtificialBeeColony(20, 30, 20), objective=objective)
+        return best_time(lambda: machine.fit(X, y), 50)
+
+    once, tenfold = least(n_samples), least(10 * n_samples)
+    return Row(
+        f"bee colony, {objective} error, {n_samples} samples",
+        f"{once * 1e3:.1f} ms",
+        f"{10 * n_samples} samples {tenfold * 1e3:.1f} ms",
+        tenfold / once,
+        "10 ms, ratio at most 10",
     )
 
 
@@ -166,7 +192,9 @@ def main(as_json: bool = typer.Option(False, "--json", help="Print JSON instead 
     rows = [
         single_environment(),
         *(batched_environment(n) for n in (64, 1024, 4096)),
-        truncated_fit(),
+        truncated_fit(1800, "500 times"),
+        truncated_fit(6000, "5000 times"),
+        *(bee_colony_search(objective) for objective in ("training", "k-fold")),
         *start_up(),
     ]
     if as_json:
