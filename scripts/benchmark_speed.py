@@ -142,7 +142,7 @@ def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
 def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
     """TLS-SVM in primal form, its L-curve included, against the dense dual system of LS-SVM."""
     X, y = made_up_regression(n_samples, n_terms)
-    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 50)
+    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 200)
     dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 3 if n_samples < 3000 else 1)
     return Row(
         f"TLS-SVM fit, {n_samples} samples, {n_terms} terms",
