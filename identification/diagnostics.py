@@ -128,7 +128,7 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
     InputError
         Naming the shortest trial.
     """
-    terms = max(len(structure.terms(q)) for q in structure.equations)
+    terms = max(len(structure.regression_names(q)) for q in structure.regressed)
     if len(samples) <= terms:
         shortest = min(trials, key=len)
         raise InputError(
@@ -161,7 +161,7 @@ def diagnose(
     apart = _without_overlap(samples)
     found = {}
     for q, machine in machines.items():
-        names = structure.names(q)
+        names = structure.regression_names(q)
         features, target, error = samples.features[q], samples.targets[q], errors[q]
         size = np.sqrt(np.mean(features**2, axis=0))
         scaled = features / np.where(size > 0.0, size, 1.0)

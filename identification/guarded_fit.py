@@ -97,5 +97,5 @@ def guarded_fit(
 def with_coefficients(blank: ShipModel, machines: Mapping[str, Machine]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
     matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
-    values = np.linalg.solve(matrix, np.concatenate([machines[q].coef_ for q in blank.table.equations]))
+    values = np.linalg.solve(matrix, np.concatenate([machines[q].coef_ for q in blank.table.regressed]))
     return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))

@@ -4,9 +4,9 @@ Format 1:
 
     format         1
     name           text
-    structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r": [{"name",
-                   "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be absent, or
-                   for a reference ship {"name", "source"}
+    structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r" | "p" | "q":
+                   [{"name", "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be
+                   absent, or for a reference ship {"name", "source"}
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s
@@ -32,7 +32,7 @@ from shipgym.json_file import read_json, write_json
 from shipgym.models.envelope import CHANNELS, Envelope
 from shipgym.models.equations import EQUATIONS, Equations
 from shipgym.models.ship_model import ShipModel
-from shipgym.models.structures import FORCE_OF_EQUATION, SYMBOLS, Structure
+from shipgym.models.structures import EQUATION_NAMES, SYMBOLS, Structure
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 
@@ -125,7 +125,7 @@ def _dynamics(value: Any, where: str) -> Structure | Equations:
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
     equations = check_table(table.get("equations"), f"{where}.equations")
-    check_keys(equations, FORCE_OF_EQUATION, f"{where}.equations")
+    check_keys(equations, EQUATION_NAMES, f"{where}.equations")
     for equation, terms in equations.items():
         if not isinstance(terms, list) or not terms:
             raise InputError(f"{where}.equations.{equation}: expected a list of terms")

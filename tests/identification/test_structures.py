@@ -10,6 +10,7 @@ import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.models.linear import nomoto
 from shipgym.models.structures import STRUCTURES, get_structure
 
 L, U0, N0 = 160.93, 7.7175, 1.2
@@ -34,6 +35,12 @@ def own(name: str) -> dict[str, float]:
     """Coefficients of a ship of about the Mariner's manners."""
     known = {
         "nomoto": {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0},
+        "nomoto2": {  # K = 0.185 1/s, T1 = 118 s, T2 = 7.8 s, T3 = 18.5 s: Mariner, Fossen 2011, table 7.2
+            "c_r": -1 / 118.0 - 1 / 7.8,
+            "c_d": 0.185 * 18.5 / (118.0 * 7.8),
+            "e_r": -1 / (118.0 * 7.8),
+            "e_d": 0.185 / (118.0 * 7.8),
+        },
         "norrbin": {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0},
         "linear-steering": PRIME,
         "cubic": CUBIC,
@@ -124,7 +131,40 @@ def test_cubic_follows_the_speed_loss_of_the_container_ship() -> None:
     assert rmse["r"] < 0.02 * np.ptp(to_validate["r"])
 
 
-@pytest.mark.parametrize("name", ["nomoto", "cubic"])
+def test_nomoto2_is_the_exact_form_of_a_linear_ship() -> None:
+    """Sway taken out of linear steering leaves K, T1, T2, T3 of her transfer function."""
+    ship = ship_of("linear-steering", PRIME)
+    small = (zigzag(ship, 1.0, 1.0, port, duration=600, dt=0.1) for port in (False, True))
+    runs = [with_constant_speed(recorded(run, f"{i}")) for i, run in enumerate(small)]
+    found, expected = nomoto(identify(runs, "nomoto2", particulars=PARTICULARS).model), nomoto(ship)
+    for name in ("K", "T1", "T2", "T3"):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=0.01), name
+
+
+def with_constant_speed(run: Trial) -> Trial:
+    """The run as its yaw alone shows it."""
+    return Trial(
+        run.t, {**run.channels, "u": np.full(len(run.t), U0), "v": np.zeros(len(run.t))}, name=run.name
+    )
+
+
+def test_time_constants_survive_the_noise_of_a_rate_gyro() -> None:
+    """0.02 deg/s: the regression forms no derivative of the yaw rate."""
+    ship = ship_of("nomoto2", own("nomoto2"))
+    random = np.random.default_rng(0)
+    noisy = [
+        Trial(
+            t.t,
+            {**t.channels, "r": t["r"] + np.radians(0.02) * random.standard_normal(len(t.t))},
+            name=t.name,
+        )
+        for t in zigzags(ship)
+    ]
+    found = nomoto(identify(noisy, "nomoto2", particulars=PARTICULARS).model)
+    np.testing.assert_allclose([found.K, found.T], [0.185, 107.3], rtol=0.02)
+
+
+@pytest.mark.parametrize("name", ["nomoto", "nomoto2", "cubic"])
 def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
     ship = ship_of(name, own(name))
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)

@@ -84,8 +84,8 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     random = np.random.default_rng(0)
     model = virtual_ship(name, **{c: random.normal() for c in table.coefficient_names})
     theta = table.kernel_coefficients(model.coefficients, model.particulars, model.service_shaft_speed)
-    state = np.array([0.0, 0.0, 0.3, 6.0, -0.9, -0.01, 0.2])
-    channels = dict(zip(model.state_names, state[:, None], strict=True)) | {"n": [1.1]}
+    state = {"u": 6.0, "v": -0.9, "r": -0.01, "p": 0.02, "phi": -0.1, "q": 1e-3, "delta": 0.2, "n": 1.1}
+    channels = {symbol: [value] for symbol, value in state.items()}
     expected, row = {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93}, 0
     for equation, terms in table.equations.items():
         features = table.features(equation, channels, model.particulars, model.service_shaft_speed)[0]
@@ -96,8 +96,10 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     namespace: dict[str, Any] = {}
     exec(source, namespace)
     plain = getattr(namespace["accelerations"], "py_func", namespace["accelerations"])
-    found = plain(u, v, r, 0.0, 0.0, delta, 1.1, np.inf, model.ship_tile(), 0)
-    np.testing.assert_allclose(found, [*expected.values(), 0.0], rtol=1e-12)
+    fourth = "q" if "q" in table.equations else "p"
+    expected["r"] += state["q"] if fourth == "q" else 0.0
+    found = plain(u, v, r, state[fourth], state["phi"], delta, 1.1, np.inf, model.ship_tile(), 0)
+    np.testing.assert_allclose(found, [*map(expected.get, "uvr"), expected.get(fourth, 0.0)], rtol=1e-12)
 
 
 def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
