@@ -77,6 +77,11 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     InputError
         For no trial, a missing channel, times that nearly coincide, or rudders that never move.
     """
+    if structure.captive:
+        raise InputError(
+            f"structure: '{structure.name}' found, which is identified from captive tests with the channels X, Y, "
+            "N, expected one for free-running trials; use identification.identify_forces"
+        )
     if not trials:
         raise InputError(
             'trials: none is marked use = "fit", expected at least one; mark the trials to identify from'

@@ -8,6 +8,7 @@ from typing import Any
 from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
 from shipgym.models.equations import EQUATIONS
+from shipgym.models.pmm import PMM18, PMM38
 from shipgym.models.term_table import EQUATION_NAMES, FORCE_OF_EQUATION, Structure
 from shipgym.models.terms import SYMBOLS, Term, prime_terms, read_terms
 
@@ -52,7 +53,8 @@ NORRBIN = accelerations(
 )
 NOMOTO2 = accelerations(
     "nomoto2",
-    f"Nomoto 1957, T1 T2 rddot + (T1 + T2) rdot + r = K (delta + T3 deltadot); {ZHU}, equation 4.12 (the dot "
+    "Nomoto 1957, T1 T2 rddot + (T1 + T2) rdot + r = K (delta + T3 deltadot); "
+    f"{ZHU}, equation 4.12 (the dot "
     "of the printed last term is lost); as rdot = c_r r + c_d delta + q, qdot = e_r r + e_d delta, where c_r = "
     "-(1/T1 + 1/T2), c_d = K T3 / (T1 T2), e_r = -1 / (T1 T2), e_d = K / (T1 T2)",
     r="r, delta",
@@ -107,11 +109,25 @@ CUBIC = accelerations(
     r=CUBIC_STEERING,
 )
 
-STRUCTURES = {
+RUDDER_4DOF = "n^2 delta, n u delta, n^2 delta^3"
+MMG_4DOF = accelerations(
+    "mmg4dof",
+    "Song 2020, Identification of ship manoeuvring models by nonlinear innovation, equation 4-2 and Table 4-2: "
+    "surge, sway, roll and yaw with the thrust K_T(J_P) and the rudder's normal force; the unprinted data of "
+    "propeller and rudder are coefficients (n^2, n u; n^2 delta, n u delta, n^2 delta^3), u r of sway and phi "
+    "of roll, taken there for known, too",
+    normalisation="service",
+    u="u^2, u^3, v^2, r^2, v r, u v^2, u v phi^2, n^2, n u, n^2 delta^2",
+    v="u v, u r, u p, u^2 v, r^3, v r^2, v^2 r, u v p^2, u r p^2, |v| v, |r| v, |v| r, |r| r, " + RUDDER_4DOF,
+    r="u v, u p, u phi, u^2 r, u^2 v, v^3, r^3, v r^2, v^2 r, u r p^2, |r| v, |v| v, " + RUDDER_4DOF,
+    p="p, phi, u v, u r, u^2 v, v^3, v^2 r, v r^2, u v phi^2, u r phi^2, |v| v, " + RUDDER_4DOF,
+)
+
+STRUCTURES: dict[str, Structure] = {
     structure.name: structure
     for structure in (
         NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
-        ABKOWITZ, CUBIC,
+        ABKOWITZ, CUBIC, MMG_4DOF, PMM38, PMM18,
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)

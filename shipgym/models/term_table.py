@@ -149,6 +149,11 @@ class Structure:
         return tuple(name for name in SYMBOLS if name in channels - {"U"})
 
     @property
+    def captive(self) -> bool:
+        """Whether it is identified from the forces of captive tests, not from free-running trials."""
+        return False
+
+    @property
     def has_rudder(self) -> bool:
         """Whether the rudder stands in a term."""
         return "delta" in {CHANNEL[symbol] for symbol in self.symbols}
