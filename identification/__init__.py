@@ -6,20 +6,34 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from identification.forces import ForceRegression, force_regression, identify_forces
     from identification.lssvm import LSSVM, TruncatedLSSVM
     from identification.pipeline import IdentificationResult, identify
     from identification.samples import Samples, build_samples
 
 _HOME = {
+    "ForceRegression": "identification.forces",
     "LSSVM": "identification.lssvm",
     "IdentificationResult": "identification.pipeline",
     "Samples": "identification.samples",
     "TruncatedLSSVM": "identification.lssvm",
     "build_samples": "identification.samples",
+    "force_regression": "identification.forces",
     "identify": "identification.pipeline",
+    "identify_forces": "identification.forces",
 }
 
-__all__ = ["LSSVM", "IdentificationResult", "Samples", "TruncatedLSSVM", "build_samples", "identify"]
+__all__ = [
+    "LSSVM",
+    "ForceRegression",
+    "IdentificationResult",
+    "Samples",
+    "TruncatedLSSVM",
+    "build_samples",
+    "force_regression",
+    "identify",
+    "identify_forces",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -79,8 +79,8 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     """
     if structure.captive:
         raise InputError(
-            f"structure: '{structure.name}' found, which is identified from captive tests with the channels X, Y, "
-            "N, expected one for free-running trials; use identification.identify_forces"
+            f"structure: '{structure.name}' found, which is identified from captive tests with the channels "
+            "X, Y, N, expected one for free-running trials; use identification.identify_forces"
         )
     if not trials:
         raise InputError(

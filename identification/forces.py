@@ -1,14 +1,15 @@
 """From captive tests to the coefficients of a table for forces: X, Y and N in one regression.
 
-A coefficient that stands in several equations (`shipgym.models.shared_structure`) has one column; the rows of
-X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares 2020, equations 18 to 22, who fit the equations one
-after the other.
+A coefficient that stands in several equations (`shipgym.models.shared_structure`) has one column; the rows
+of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares 2020, equations 18 to 22, who fit the
+equations one after the other.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +61,7 @@ class ForceRegression:
         return len(self.targets)
 
     def scales(self) -> Floats:
-        """Root mean square of each row's force over all tests, by which the equations count alike, (n_rows,)."""
+        """Root mean square of each row's force over all tests, shape (n_rows,)."""
         sizes = np.array([np.sqrt(np.mean(self.targets[self.equation == i] ** 2)) for i in range(3)])
         return np.where(sizes > 0.0, sizes, 1.0)[self.equation]
 
@@ -109,8 +110,8 @@ def force_regression(
         missing = [name for name in NEEDED if name not in trial]
         if missing:
             raise InputError(
-                f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure {structure.name!r} needs "
-                f"{', '.join(NEEDED)}; give captive tests"
+                f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure {structure.name!r} "
+                f"needs {', '.join(NEEDED)}; give captive tests"
             )
         pieces = [_one_piece(trial, rows, structure, ship, model_inertia) for rows in _between_jumps(trial)]
         parts += [(index, *piece) for piece in pieces]
@@ -136,7 +137,7 @@ def _between_jumps(trial: Trial) -> list[slice]:
         floor = 1e-9 * float(np.abs(trial[name]).max())
         jumps |= change > np.maximum(JUMP * np.median(change), floor) + floor
     edges = [0, *(np.flatnonzero(jumps) + 1).tolist(), len(trial)]
-    return [slice(i, j) for i, j in zip(edges[:-1], edges[1:], strict=True) if j - i >= FEWEST]
+    return [slice(i, j) for i, j in pairwise(edges) if j - i >= FEWEST]
 
 
 def _one_piece(
@@ -147,15 +148,15 @@ def _one_piece(
     u, v, r = (trial[name][rows] for name in "uvr")
     speed = np.hypot(u, v)
     if not np.all(speed > 0.0):
-        raise InputError(f"trial {trial.name!r}: a ship at rest found, expected way on her: U divides the forces")
+        raise InputError(
+            f"trial {trial.name!r}: a ship at rest found, expected way on her: U divides the forces"
+        )
     rates = [CubicSpline(t, values)(t, 1) * length / speed**2 for values in (u, v, r)]
     prime = {"u": u / speed, "v": v / speed, "r": r * length / speed}
     prime |= dict(zip(ACCELERATIONS, (rates[0], rates[1], rates[2] * length), strict=True))
     prime |= {f"|{name}|": np.abs(prime[name]) for name in "uvr"}
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
-    targets = [
-        trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES
-    ]
+    targets = [trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES]
     if model_inertia:
         own = _ship_s_own(prime, ship)
         targets = [target + ours for target, ours in zip(targets, own, strict=True)]

@@ -5,12 +5,12 @@ estimation of a nonlinear manoeuvring model based on PMM tests: equations 19 to 
 
 How the damaged print is read
 -----------------------------
-* Equation 19 prints Y_vdot vdot + Y_rdot rdot in X. Equations 25 and 26 have v r and r r in their place, as the
-  matrix of equation 16 has; so here. Their sign is that printed. Kirchhoff's equations have the other one
-  (-Y_vdot v r - Y_rdot r r); the difference is taken up by X_rvu and X_urr, whose values of Table 11 belong to
-  the sign as printed.
+* Equation 19 prints Y_vdot vdot + Y_rdot rdot in X. Equations 25 and 26 have v r and r r in their place, as
+  the matrix of equation 16 has; so here. Their sign is that printed. Kirchhoff's equations have the other one
+  (-Y_vdot v r - Y_rdot r r); the difference is taken up by X_rvu and X_urr, whose values of Table 11 belong
+  to the sign as printed.
 * Two terms of equations 20 and 21 are printed as Y_rvv and Y_vvr; Table 1's units make the first v r r.
-* Printed absolute values: r |v|, v |v|, v |r|, r |r|, four of each of Y and N (Table 1), 38 coefficients in all.
+* Absolute values: r |v|, v |v|, v |r|, r |r|, four of each of Y and N (Table 1), 38 coefficients in all.
 * Equations 40 and 41 print Y_uvv and Y_urr on u u v and u u r: Y_uuv and Y_uur (equations 28 and 30); so N's.
 * In N of equation 41 and Table 11 the value -1.69e-2 is printed on v |v|, -1.00e-3 on r |v|; equation 38, the
   matrix of equation 42 and Table 2 have v |r|, and equation 41 r |r|: so here.
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from shipgym.particulars import Particulars
 
 XU = (
-    "Xu, Hassani & Guedes Soares 2020, Truncated least square support vector machine for parameter estimation "
-    "of a nonlinear manoeuvring model based on PMM tests"
+    "Xu, Hassani & Guedes Soares 2020, Truncated least square support vector machine for parameter "
+    "estimation of a nonlinear manoeuvring model based on PMM tests"
 )
 
 FULL = "uv ur uur uuv vvv rrr vrr vvr r|v| v|v| v|r| r|r|"

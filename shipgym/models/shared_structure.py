@@ -52,6 +52,11 @@ class Share:
         symbol = self.term.powers[0][0] if self.term.powers else ""
         return symbol if symbol in ACCELERATIONS else None
 
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in a model file."""
+        term = {"name": self.term.name, "powers": dict(self.term.powers)}
+        return {"coefficient": self.coefficient, **term, "sign": self.sign}
+
 
 @dataclass(frozen=True)
 class SharedStructure(Structure):
@@ -78,8 +83,8 @@ class SharedStructure(Structure):
                 across = (axis == "u") != (share.acceleration == "udot")
                 if share.acceleration is not None and across:
                     raise InputError(
-                        f"{where}: '{share.acceleration}' found in the equation of '{axis}', expected 'udot' in "
-                        "that of surge, 'vdot' and 'rdot' in those of sway and yaw"
+                        f"{where}: '{share.acceleration}' found in the equation of '{axis}', expected 'udot' "
+                        "in that of surge, 'vdot' and 'rdot' in those of sway and yaw"
                     )
 
     @property
@@ -119,8 +124,8 @@ class SharedStructure(Structure):
         total: Floats = rigid - self.added_mass(coefficients)
         if total[0, 0] <= 0.0 or np.linalg.det(total[1:, 1:]) <= 0.0:
             raise InputError(
-                f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are not "
-                "positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0"
+                f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are "
+                "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0"
             )
         return total
 
@@ -166,8 +171,8 @@ class SharedStructure(Structure):
             Always.
         """
         raise InputError(
-            f"structure '{self.name}': free-running trials found, expected captive tests with the channels X, Y, "
-            "N: its added masses are among the unknowns; use identification.identify_forces"
+            f"structure '{self.name}': free-running trials found, expected captive tests with the channels "
+            "X, Y, N: its added masses are among the unknowns; use identification.identify_forces"
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -175,21 +180,16 @@ class SharedStructure(Structure):
         return {
             "name": self.name,
             "source": self.source,
-            "shares": {
-                axis: [
-                    {"coefficient": s.coefficient, "name": s.term.name, "powers": dict(s.term.powers), "sign": s.sign}
-                    for s in shares
-                ]
-                for axis, shares in self.shares.items()
-            },
-        }  # fmt: skip
+            "shares": {axis: [share.to_dict() for share in shares] for axis, shares in self.shares.items()},
+        }
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any]) -> SharedStructure:
         """The table from a model file."""
         shares = {
             axis: tuple(
-                Share(s["coefficient"], Term(s["name"], tuple(s["powers"].items())), s["sign"]) for s in listed
+                Share(s["coefficient"], Term(s["name"], tuple(s["powers"].items())), s["sign"])
+                for s in listed
             )
             for axis, listed in table["shares"].items()
         }
@@ -216,7 +216,8 @@ def shared_structure(name: str, source: str, shares: Mapping[str, tuple[Share, .
         For a table that cannot be computed.
     """
     velocity = {
-        axis: [share.term for share in listed if share.acceleration is None] for axis, listed in shares.items()
+        axis: [share.term for share in listed if share.acceleration is None]
+        for axis, listed in shares.items()
     }
     across = _distinct([*velocity.get("v", ()), *velocity.get("r", ()), UR])
     equations = {"u": _distinct([*velocity.get("u", ()), VR, RR]), "v": across, "r": across}

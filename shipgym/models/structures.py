@@ -55,8 +55,8 @@ NOMOTO2 = accelerations(
     "nomoto2",
     "Nomoto 1957, T1 T2 rddot + (T1 + T2) rdot + r = K (delta + T3 deltadot); "
     f"{ZHU}, equation 4.12 (the dot "
-    "of the printed last term is lost); as rdot = c_r r + c_d delta + q, qdot = e_r r + e_d delta, where c_r = "
-    "-(1/T1 + 1/T2), c_d = K T3 / (T1 T2), e_r = -1 / (T1 T2), e_d = K / (T1 T2)",
+    "of the printed last term is lost); as rdot = c_r r + c_d delta + q, qdot = e_r r + e_d delta, where "
+    "c_r = -(1/T1 + 1/T2), c_d = K T3 / (T1 T2), e_r = -1 / (T1 T2), e_d = K / (T1 T2)",
     r="r, delta",
     q="r, delta",
 )
@@ -112,9 +112,9 @@ CUBIC = accelerations(
 RUDDER_4DOF = "n^2 delta, n u delta, n^2 delta^3"
 MMG_4DOF = accelerations(
     "mmg4dof",
-    "Song 2020, Identification of ship manoeuvring models by nonlinear innovation, equation 4-2 and Table 4-2: "
-    "surge, sway, roll and yaw with the thrust K_T(J_P) and the rudder's normal force; the unprinted data of "
-    "propeller and rudder are coefficients (n^2, n u; n^2 delta, n u delta, n^2 delta^3), u r of sway and phi "
+    "Song 2020 (nonlinear innovation identification from full-scale trials), equation 4-2 and Table 4-2: "
+    "surge, sway, roll and yaw with the thrust K_T(J_P) and the rudder's normal force; the unprinted data "
+    "of propeller and rudder are coefficients (n^2, n u; n^2 delta, n u delta, n^2 delta^3), u r of sway and phi "
     "of roll, taken there for known, too",
     normalisation="service",
     u="u^2, u^3, v^2, r^2, v r, u v^2, u v phi^2, n^2, n u, n^2 delta^2",
