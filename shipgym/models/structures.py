@@ -112,10 +112,10 @@ CUBIC = accelerations(
 RUDDER_4DOF = "n^2 delta, n u delta, n^2 delta^3"
 MMG_4DOF = accelerations(
     "mmg4dof",
-    "Song 2020 (nonlinear innovation identification from full-scale trials), equation 4-2 and Table 4-2: "
-    "surge, sway, roll and yaw with the thrust K_T(J_P) and the rudder's normal force; the unprinted data "
-    "of propeller and rudder are coefficients (n^2, n u; n^2 delta, n u delta, n^2 delta^3), u r of sway and phi "
-    "of roll, taken there for known, too",
+    "Song 2020, Nonlinear innovation identification for ship maneuvering modeling via the full-scale trial "
+    "data, equation 4-2 and Table 4-2: surge, sway, yaw and roll; thrust and normal force of the rudder, "
+    "whose data are not printed, as n^2, n u and as n^2 delta, n u delta, n^2 delta^3; u r of sway and phi "
+    "of roll, taken for known there, are terms",
     normalisation="service",
     u="u^2, u^3, v^2, r^2, v r, u v^2, u v phi^2, n^2, n u, n^2 delta^2",
     v="u v, u r, u p, u^2 v, r^3, v r^2, v^2 r, u v p^2, u r p^2, |v| v, |r| v, |v| r, |r| r, " + RUDDER_4DOF,

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import control
+import gymnasium
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -105,6 +106,20 @@ def test_a_nomoto_ship_follows_her_transfer_function_in_any_manoeuvre():
     np.testing.assert_allclose(trial["r"], r, atol=1e-4 * np.abs(r).max())  # lsim: straight between samples
     assert "q" not in trial
     np.testing.assert_array_equal(trial["v"], 0.0)
+
+
+def test_an_environment_sails_the_same_ship_of_second_order():
+    ship = nomoto2_ship(FORM, SHIP)
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship).unwrapped
+    env.reset(seed=1)
+    start = [env.physical_state()[name] for name in ship.state_names]
+    commands = np.sin(np.arange(60.0))[:, None].astype(np.float32) * np.float32(0.5)
+    for command in commands:
+        env.step(command)
+    trial = ship.simulate(commands * ship.steering.limit, env.dt, start)
+    for name in ("psi", "r", "delta"):
+        assert env.physical_state()[name] == pytest.approx(trial[name][-1], rel=1e-5, abs=1e-7)
+    assert env.physical_state()["q"] != 0.0
 
 
 def test_nomoto2_survives_its_file_and_is_sound(tmp_path):
