@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from identification.cross_validation import cross_validate
+    from identification.forces import ForceRegression, force_regression, identify_forces
     from identification.lssvm import LSSVM, TruncatedLSSVM
     from identification.pipeline import IdentificationResult, identify
     from identification.polynomial import polynomial_coefficients
@@ -25,6 +26,7 @@ _HOME = {
     "ArtificialBeeColony": "identification.tuning",
     "DifferentialEvolution": "identification.tuning",
     "GridSearch": "identification.tuning",
+    "ForceRegression": "identification.forces",
     "LSSVM": "identification.lssvm",
     "IdentificationResult": "identification.pipeline",
     "ParticleSwarm": "identification.tuning",
@@ -37,12 +39,15 @@ _HOME = {
     "identify": "identification.pipeline",
     "minimise": "identification.tuning",
     "polynomial_coefficients": "identification.polynomial",
+    "force_regression": "identification.forces",
+    "identify_forces": "identification.forces",
 }
 
 __all__ = [
     "LSSVM",
     "ArtificialBeeColony",
     "DifferentialEvolution",
+    "ForceRegression",
     "GridSearch",
     "IdentificationResult",
     "ParticleSwarm",
@@ -52,7 +57,9 @@ __all__ = [
     "TunedLSSVM",
     "build_samples",
     "cross_validate",
+    "force_regression",
     "identify",
+    "identify_forces",
     "minimise",
     "polynomial_coefficients",
 ]

@@ -28,5 +28,5 @@ def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) ->
     ShipModel
     """
     matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
-    values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.equations]))
+    values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.regressed]))
     return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))

@@ -71,7 +71,7 @@ def fit_free_running(
     dict of str to TunedLSSVM
         By equation; the variables of their common search are log10 C in the order of the equations.
     """
-    equations = blank.table.equations
+    equations = blank.table.regressed
     whitened = {
         q: decompose(samples.features[q], samples.targets[q], settings.scale, settings.fit_intercept)
         for q in equations

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
     from shipgym.models.scaling import scale_model
+    from shipgym.models.stability import StraightLineStability, straight_line_stability
     from shipgym.particulars import Particulars
     from shipgym.ship_file import ShipFile
     from shipgym.steering import SteeringGear
@@ -31,6 +32,7 @@ _HOME = {
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
     "SteeringGear": "shipgym.steering",
+    "StraightLineStability": "shipgym.models.stability",
     "Trial": "shipgym.trial",
     "UnstableModelError": "shipgym.errors",
     "check_ship_model": "shipgym.models.checker",
@@ -39,6 +41,7 @@ _HOME = {
     "load_model": "shipgym.models",
     "register_structure": "shipgym.models",
     "scale_model": "shipgym.models.scaling",
+    "straight_line_stability": "shipgym.models.stability",
 }
 
 _SUBPACKAGES = ("manoeuvres", "plots", "towing_tank")
@@ -51,6 +54,7 @@ __all__ = [
     "ShipFile",
     "ShipModel",
     "SteeringGear",
+    "StraightLineStability",
     "Trial",
     "UnstableModelError",
     "check_ship_model",
@@ -61,6 +65,7 @@ __all__ = [
     "plots",
     "register_structure",
     "scale_model",
+    "straight_line_stability",
     "towing_tank",
 ]
 

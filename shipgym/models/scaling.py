@@ -60,7 +60,8 @@ def scale_model(
     Notes
     -----
     Froude's law: speed as the root of the length, so that gravity and inertia stay in proportion (ITTC
-    Recommended Procedure 7.5-02-06-01).
+    Recommended Procedure 7.5-02-06-01). At another Froude number the righting moment of a table with roll,
+    which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
     if not isinstance(table, Structure):

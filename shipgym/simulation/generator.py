@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shipgym.models.structures import FORCE_OF_EQUATION, Structure, Term
+from shipgym.models.structures import EQUATION_NAMES, Structure, Term
 from shipgym.models.terms import CHANNEL
 
 HEADER = '''"""Accelerations of the structure `{name}`, written from its table of terms."""
@@ -12,8 +12,9 @@ HEADER = '''"""Accelerations of the structure `{name}`, written from its table o
 {library}from .compiling import inlined
 from .layout import {rows}
 
-ROLL = False
+ROLL = {roll}
 SHAFT = False
+MEMORY = {memory}
 
 
 @inlined
@@ -32,6 +33,7 @@ WITHOUT = {
     "v": "    vdot = -v * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
     "r": "    rdot = -r * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
 }
+MEMORY = "p"  # row of the kernels that keeps the memory of yaw, free in a ship without roll
 
 
 def accelerations_source(structure: Structure) -> str:
@@ -39,9 +41,9 @@ def accelerations_source(structure: Structure) -> str:
     variables: dict[str, str] = {}
     sums = []
     row = 0
-    for equation in FORCE_OF_EQUATION:
+    for equation in EQUATION_NAMES:
         if equation not in structure.equations:
-            sums.append(WITHOUT[equation])
+            sums.append(WITHOUT.get(equation, ""))
             continue
         products = []
         for term in structure.terms(equation):
@@ -52,7 +54,9 @@ def accelerations_source(structure: Structure) -> str:
         joined = "\n        + ".join(products)
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
-    body = assignments + "".join(sums) + "    return udot, vdot, rdot, 0.0\n"
+    fourth = "pdot" if "p" in structure.equations else "qdot" if "q" in structure.equations else "0.0"
+    yaw = f"rdot + {MEMORY}" if "q" in structure.equations else "rdot"
+    body = assignments + "".join(sums) + f"    return udot, vdot, {yaw}, {fourth}\n"
     return _header(structure, body) + body
 
 
@@ -85,5 +89,8 @@ def _header(structure: Structure, body: str) -> str:
         "    du = u - ship[SERVICE_SPEED + lane]\n": "du" in words,
         "    dn = n - ship[SERVICE_SHAFT + lane]\n": "dn" in words,
     } | {f"    {symbol_variable(symbol)} = fabs({CHANNEL[symbol]})\n": True for symbol in absolute}
-    header = HEADER.format(name=structure.name, library=library, rows=", ".join(rows))
+    header = HEADER.format(
+        name=structure.name, library=library, rows=", ".join(rows), roll="p" in structure.equations,
+        memory="q" in structure.equations,
+    )  # fmt: skip
     return header + "".join(line for line, used in lines.items() if used)

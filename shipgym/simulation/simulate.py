@@ -9,6 +9,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel, two_commands
 from shipgym.trial import Trial
+from shipgym.units import CHANNELS
 
 Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
@@ -76,17 +77,21 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
     t = np.array(trial.t)
     states = np.empty((len(t), layout.N_STATE))
     first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
-    states[0] = model.kernel_states(np.array([first]))[0]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    states[0] = model.kernel_states(_settled(model, np.array([first]), n[:1]))[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
     reached = model.kernel("trajectories").open_loop(
         states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
     )
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
-    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
     return Trial(
-        t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=model.particulars["length"]
+        t,
+        _channels(model, states),
+        name=trial.name,
+        kind=trial.kind,
+        use=trial.use,
+        length=model.particulars["length"],
     )
 
 
@@ -105,10 +110,25 @@ def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
 
 def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
     """States of the kernels and the commands held from each sample on as a Trial."""
-    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
+    channels = _channels(model, states)
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
+
+
+def _channels(model: ShipModel, states: Floats) -> dict[str, Floats]:
+    """What can be recorded of the kernels' states; a memory of yaw cannot."""
+    columns = zip(model.state_names, model.own_states(states).T, strict=True)
+    return {name: column for name, column in columns if name in CHANNELS}
+
+
+def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
+    """States whose memory of yaw, which no trial records, is that of a steady yaw rate."""
+    if "q" in model.state_names:
+        commands = np.stack([states[:, -1], shaft], axis=-1)[:, : len(model.command_names)]
+        rates = model.derivatives(states, commands)
+        states[:, model.state_names.index("q")] = -rates[:, model.state_names.index("r")]
+    return states
 
 
 def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
