@@ -18,6 +18,8 @@ Floats = NDArray[np.float64]
 
 _PITCH_GYRADIUS = 0.25  # by length
 _WATERLINE_POINTS = 401
+_FASTEST = 0.4  # Froude number up to which the added resistance is taken to depend on speed
+_NARROWEST = 2.0  # beam by draught, likewise
 
 
 @dataclass(frozen=True)
@@ -126,16 +128,16 @@ def waterline(ship: Particulars) -> Waterline:
     return Waterline(0.5 * ship.length * xi, half_beam * (1.0 - np.abs(xi) ** power))
 
 
-def end_angles(ship: Particulars) -> tuple[float, float]:
-    """Half angles of the waterline at bow and stern, rad, estimated.
+def end_angle(ship: Particulars) -> float:
+    """Half angle of the waterline at bow and stern, estimated, rad.
 
-    The entrance is taken as L (0.115 + 0.737 (0.81 - CB)) long, within 0.08 and 0.45 L, and the run a tenth
-    of L longer: 38 and 23 degrees for KVLCC2, 13 and 10 for S175. The formula for the added resistance wants
-    the lengths over which the beam grows to 99 %; this line is an assumption of ours.
+    arctan(0.495 B / (L (1 - CP))): the run of Holtrop & Mennen 1982 (An approximate power prediction method,
+    International Shipbuilding Progress 29) with the centre of buoyancy at midship, and an entrance as long.
+    CP = CB / CM with the midship coefficient CM = 1.006 - 0.0056 CB^(-3.56) of Kerlen 1970.
     """
-    entrance = np.clip(0.115 + 0.737 * (0.81 - ship.require("block_coefficient")), 0.08, 0.45) * ship.length
-    half_beam = 0.495 * ship.require("beam")
-    return float(np.arctan2(half_beam, entrance)), float(np.arctan2(half_beam, entrance + 0.1 * ship.length))
+    CB = ship.require("block_coefficient")
+    CP = min(CB / (1.006 - 0.0056 * CB**-3.56), 0.95)
+    return float(np.arctan(0.495 * ship.require("beam") / (ship.length * (1.0 - CP))))
 
 
 def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, Floats]:
@@ -179,8 +181,9 @@ def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed:
     The sum of what the ship's motions radiate and what its ends reflect: the SNNM formula of ITTC
     Recommended Procedure 7.5-04-01-01.1 (2021), appendix G; Liu & Papanikolaou 2020, Regression analysis of
     experimental data for added resistance in waves of arbitrary heading, Ocean Engineering 206. On even
-    keel, with the angles of :func:`end_angles`. Its stated
-    range is 75 m <= L <= 400 m, L/B 4 to 9, B/T 2 to 9, CB 0.5 to 0.9, Froude number up to 0.3.
+    keel, with the angle of :func:`end_angle`. Its stated
+    range is 75 m <= L <= 400 m, L/B 4 to 9, B/T 2 to 9, CB 0.5 to 0.9, Froude number up to 0.3;
+    the hull's proportion B/T counts as at least 2, the Froude number as at most 0.4.
 
     Parameters
     ----------
@@ -198,6 +201,7 @@ def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed:
     array
         N/m2; negative where waves from astern push.
     """
+    speed = min(speed, _FASTEST * float(np.sqrt(GRAVITY * ship.length)))
     omega, chi = np.broadcast_arrays(np.asarray(omega, dtype=float), np.asarray(chi, dtype=float))
     return _radiated(omega, chi, ship, speed) + _reflected(omega, chi, ship, speed)
 
@@ -205,7 +209,11 @@ def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed:
 def _radiated(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> Floats:
     """Part of the ship's motions, equations G-14 to G-22."""
     L, B, CB = ship.length, ship.require("beam"), ship.require("block_coefficient")
-    slender, Fr, c = np.log(B / ship.require("draught")), speed / np.sqrt(GRAVITY * L), np.cos(chi)
+    slender, Fr, c = (
+        np.log(max(B / ship.require("draught"), _NARROWEST)),
+        speed / np.sqrt(GRAVITY * L),
+        np.cos(chi),
+    )
     w = (
         2.142 * _PITCH_GYRADIUS ** (1 / 3) * np.sqrt(L / (2.0 * np.pi * GRAVITY)) * (CB / 0.65) ** 0.17
         * (1.0 - 0.111 / CB * (slender - np.log(2.75)))
@@ -250,7 +258,7 @@ def _speed_factor(Fr: Floats) -> Floats:
 def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> Floats:
     """Part of the reflection at bow and stern, equations G-23 to G-31."""
     L, T, CB = ship.length, ship.require("draught"), ship.require("block_coefficient")
-    (E1, E2), Fr, c = end_angles(ship), speed / np.sqrt(GRAVITY * L), np.cos(chi)
+    E, Fr, c = end_angle(ship), speed / np.sqrt(GRAVITY * L), np.cos(chi)
     length = 2.0 * np.pi * GRAVITY / omega**2
 
     def depth(T_: Floats) -> Floats:
@@ -259,21 +267,19 @@ def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> F
         )
         return share
 
-    def flat(E: float, angle: Floats) -> Floats:
+    def flat(angle: Floats) -> Floats:
         part: Floats = np.sin(E + angle) ** 2 + 2.0 * omega * speed / GRAVITY * (
             c - np.cos(E) * np.cos(E + angle)
         )
         return part
 
-    blunt = (0.87 / CB) ** ((1.0 + 4.0 * np.sqrt(Fr)) * np.where(chi <= E1, c, 0.0))
+    blunt = (0.87 / CB) ** ((1.0 + 4.0 * np.sqrt(Fr)) * np.where(chi <= E, c, 0.0))
     root = np.sqrt(np.abs(c))
     stern = T * (4.0 + root) / 5.0 if CB <= 0.75 else T * (2.0 + root) / 3.0
     bow = depth(np.asarray(T)) * blunt * (
-        np.where(chi <= np.pi - E1, flat(E1, chi), 0.0) + np.where(chi <= E1, flat(E1, -chi), 0.0)
+        np.where(chi <= np.pi - E, flat(chi), 0.0) + np.where(chi <= E, flat(-chi), 0.0)
     )  # fmt: skip
-    aft = depth(stern) * (
-        np.where(chi >= E2, flat(E2, -chi), 0.0) + np.where(chi >= np.pi - E2, flat(E2, chi), 0.0)
-    )
+    aft = depth(stern) * (np.where(chi >= E, flat(-chi), 0.0) + np.where(chi >= np.pi - E, flat(chi), 0.0))
     scale = 2.25 / 4.0 * ship.require("water_density") * GRAVITY * ship.require("beam")
     resistance: Floats = scale * (bow - aft)
     return resistance

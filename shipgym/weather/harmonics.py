@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 #: Points of the grid over the full circle on which curves are tabulated.
-POINTS = 720
+POINTS = 360
 
 
 class Harmonics(NamedTuple):

@@ -112,8 +112,8 @@ def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
 
 
 def frequencies(waves: Waves, points: int = 400) -> Floats:
-    """Frequencies for integrals over the spectrum, from 0.4 to 6 times that of the peak, rad/s."""
-    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 6.0, points)
+    """Frequencies for integrals over the spectrum, from 0.4 to 12 times that of the peak, rad/s."""
+    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, points)
 
 
 def spread(curve: Floats, waves: Waves) -> Floats:

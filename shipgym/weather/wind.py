@@ -60,7 +60,7 @@ class WindCurves:
         """Fourier series of the curves up to the n-th harmonic, for kernels.
 
         For n = 8 the largest difference from the curve is below 1.5 % of its largest value for Blendermann's
-        coefficients and below 6 % for Isherwood's, whose tables have kinks (`tests/shipgym/test_wind.py`).
+        coefficients and below 9 % for Isherwood's, whose tables have kinks (`tests/shipgym/test_wind.py`).
         """
         return Harmonics(
             cosine_series(self.X, n), sine_series(self.Y, n), sine_series(self.N, n), sine_series(self.K, n)
