@@ -181,9 +181,8 @@ def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed:
     The sum of what the ship's motions radiate and what its ends reflect: the SNNM formula of ITTC
     Recommended Procedure 7.5-04-01-01.1 (2021), appendix G; Liu & Papanikolaou 2020, Regression analysis of
     experimental data for added resistance in waves of arbitrary heading, Ocean Engineering 206. On even
-    keel, with the angle of :func:`end_angle`. Its stated
-    range is 75 m <= L <= 400 m, L/B 4 to 9, B/T 2 to 9, CB 0.5 to 0.9, Froude number up to 0.3;
-    the hull's proportion B/T counts as at least 2, the Froude number as at most 0.4.
+    keel, with the angle of :func:`end_angle`. It stands for ships of 75 to 400 m with L/B 4 to 9, B/T 2 to 9,
+    CB 0.5 to 0.9 and Froude numbers up to 0.3; B/T counts as at least 2, the Froude number as at most 0.4.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from shipgym.errors import InputError
 from shipgym.models.inertia import inertia
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.term_table import Structure
-from shipgym.weather.estimates import weather_particulars
+from shipgym.weather.estimates import GRAVITY, weather_particulars
 
 Floats = NDArray[np.float64]
 
@@ -49,7 +49,8 @@ def mobility_matrix(model: ShipModel, water_depth: float = np.inf) -> Floats:
 
     An identified model divides by the inertia of its particulars, given or estimated, a reference ship by
     that of its own equations. A structure without an equation of surge keeps its speed, one without sway or
-    yaw does not drift or turn: their rows and columns are 0. So is roll where the model has none.
+    yaw does not drift or turn: their rows and columns are 0. So is roll where the model has none; a
+    structure with an equation of roll has that inertia which the roll period and the metacentric height tell.
 
     Parameters
     ----------
@@ -74,7 +75,8 @@ def mobility_matrix(model: ShipModel, water_depth: float = np.inf) -> Floats:
         axes = [0, 1, 2, 3]
         mass[3] = _container_roll(model, mass)
     elif isinstance(model.dynamics, Structure):
-        axes = ["uvr".index(equation) for equation in model.dynamics.equations]
+        axes = [_AXES.index(equation) for equation in model.dynamics.equations if equation in _AXES]
+        mass[3, 3] = roll_inertia(model) if 3 in axes else 0.0
     matrix = np.zeros((4, 4))
     matrix[np.ix_(axes, axes)] = np.linalg.inv(mass[np.ix_(axes, axes)])
     return matrix
@@ -87,6 +89,13 @@ def _inertia(model: ShipModel, water_depth: float) -> Floats:
         return inertia(model, water_depth)
     except InputError as error:
         raise InputError(f"weather without the particulars it needs: {error}") from None
+
+
+def roll_inertia(model: ShipModel) -> float:
+    """Inertia in roll of the ship and the water that rolls with it, kg m2: m g GM (T / 2 pi)^2."""
+    ship = weather_particulars(model.particulars)
+    stiffness = ship.require("mass") * GRAVITY * ship.require("metacentric_height")
+    return stiffness * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
 
 
 def _container_roll(model: ShipModel, mass: Floats) -> Floats:

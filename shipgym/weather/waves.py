@@ -254,6 +254,7 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
         return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
     draught = weather_particulars(particulars).require("draught")
-    weighted = wave_spectrum(waves, omega) * draught_attenuation(omega, draught)
+    shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)  # the height does not matter
+    weighted = shape * draught_attenuation(omega, draught)
     time_constant = np.pi * np.trapezoid(weighted**2, omega) / np.trapezoid(weighted, omega) ** 2
     return GaussMarkov(float(time_constant), 1.0)

@@ -4,14 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
+from shipgym.models import get_structure
 from shipgym.models.inertia import inertia
-from shipgym.weather import slow_drift, wave_drift, wave_spectrum
+from shipgym.weather import slow_drift, wave_drift, wave_motion, wave_spectrum
 from shipgym.weather.drift import added_resistance, reflection_coefficients
 from shipgym.weather.estimates import GRAVITY, weather_particulars
 from shipgym.weather.harmonics import evaluate_cosines, evaluate_sines
-from shipgym.weather.mobility import MOBILITY_ROWS, mobility, mobility_matrix
+from shipgym.weather.mobility import MOBILITY_ROWS, mobility, mobility_matrix, roll_inertia
 from shipgym.weather.waves import draught_attenuation
 
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
@@ -192,8 +195,50 @@ def test_shallow_water_makes_the_tanker_heavier():
     assert (shallow[[0, 1, 4]] < deep[[0, 1, 4]]).all()
 
 
+def test_a_structure_without_surge_and_sway_only_turns():
+    mariner = load_model("mariner")
+    table = get_structure("nomoto")
+    coefficients = dict.fromkeys(table.coefficient_names, 0.1)
+    model = replace(mariner, structure="nomoto", coefficients=coefficients)
+    matrix = mobility_matrix(model)
+    assert matrix[2, 2] == pytest.approx(1.0 / inertia(mariner)[2, 2])
+    assert np.count_nonzero(matrix) == 1
+
+
+def test_roll_inertia_from_period_and_stability_is_that_of_the_container_ship():
+    from shipgym.kernels import container as c
+
+    own = (c.Ix + c.Jx) * 0.5 * 1025.0 * c.LENGTH**5
+    assert roll_inertia(load_model("container")) == pytest.approx(own, rel=0.1)
+
+
 def test_weather_tells_which_particulars_it_needs():
     model = load_model("mariner")
     bare = replace(model.particulars, beam=None, mass=None, block_coefficient=None)
     with pytest.raises(InputError, match="weather without the particulars it needs: beam, block_coefficient"):
         mobility(replace(model, particulars=bare))
+
+
+@given(
+    length=st.floats(2.0, 400.0),
+    slender=st.floats(4.0, 9.0),
+    flat=st.floats(2.0, 6.0),
+    fullness=st.floats(0.5, 0.9),
+    froude=st.floats(0.0, 0.6),
+    period=st.floats(0.5, 25.0),
+    steepness=st.floats(0.001, 0.06),
+)
+@settings(max_examples=10, deadline=None)
+def test_drift_and_motion_are_finite_for_any_ship_in_any_sea(
+    length, slender, flat, fullness, froude, period, steepness
+):
+    speed = min(froude * (GRAVITY * length) ** 0.5, 40.0) or None
+    beam = length / slender
+    ship = Particulars(length=length, beam=beam, draught=beam / flat, block_coefficient=fullness, speed=speed)
+    sea = Waves(min(steepness * GRAVITY * period**2 / (2.0 * np.pi), 20.0), period)
+    drift, motion = wave_drift(sea, ship), wave_motion(sea, ship)
+    for curve in (drift.X, drift.Y, drift.N, motion.heading_variance, motion.roll_variance):
+        assert np.isfinite(curve).all()
+    assert drift.time_constant > 0.0
+    for variance in (motion.heading_variance, motion.roll_variance):
+        assert variance.min() >= -1e-9 * variance.max()
