@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from shipgym import manoeuvres, plots, towing_tank
+    from shipgym import manoeuvres, plots, towing_tank, weather
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
@@ -20,10 +20,12 @@ if TYPE_CHECKING:
     from shipgym.ship_file import ShipFile
     from shipgym.steering import SteeringGear
     from shipgym.trial import Trial
+    from shipgym.weather.conditions import Current, Waves, Weather, Wind, sea_states
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "Current": "shipgym.weather.conditions",
     "InputError": "shipgym.errors",
     "ManoeuvreError": "shipgym.errors",
     "ModelCheck": "shipgym.models.checker",
@@ -33,17 +35,22 @@ _HOME = {
     "SteeringGear": "shipgym.steering",
     "Trial": "shipgym.trial",
     "UnstableModelError": "shipgym.errors",
+    "Waves": "shipgym.weather.conditions",
+    "Weather": "shipgym.weather.conditions",
+    "Wind": "shipgym.weather.conditions",
     "check_ship_model": "shipgym.models.checker",
     "list_models": "shipgym.models",
     "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
     "register_structure": "shipgym.models",
     "scale_model": "shipgym.models.scaling",
+    "sea_states": "shipgym.weather.conditions",
 }
 
-_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank")
+_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank", "weather")
 
 __all__ = [
+    "Current",
     "InputError",
     "ManoeuvreError",
     "ModelCheck",
@@ -53,6 +60,9 @@ __all__ = [
     "SteeringGear",
     "Trial",
     "UnstableModelError",
+    "Waves",
+    "Weather",
+    "Wind",
     "check_ship_model",
     "list_models",
     "list_structures",
@@ -61,7 +71,9 @@ __all__ = [
     "plots",
     "register_structure",
     "scale_model",
+    "sea_states",
     "towing_tank",
+    "weather",
 ]
 
 
