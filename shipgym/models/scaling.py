@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 #: Powers of the length with which the particulars grow; those without unit stay.
 GROWTH = {
     "beam": 1, "draught": 1, "xg": 1, "yaw_gyradius": 1, "rudder_area": 2, "propeller_diameter": 1,
+    "length_overall": 1, "frontal_area": 2, "lateral_area": 2, "lateral_centroid": 1,
+    "lateral_centroid_height": 1, "metacentric_height": 1, "roll_period": 0.5,
 }  # fmt: skip
 
 
