@@ -211,7 +211,7 @@ def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
         if isinstance(run, Trial):
             trials[key] = run
     if name == "pull-outs" and trials:
-        caption = "Yaw rate in deg/s; of a ship that is stable on a straight course both sides end alike."
+        caption = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a straight course."
         parts.append(figure(pull_out_figure(trials), name, caption))
     else:
         for k, key in enumerate(shown):
