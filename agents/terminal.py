@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from agents.autopilot import Progress
     from agents.autopilot_result import AutopilotResult
     from identification import IdentificationResult
-    from shipgym.manoeuvres import Criterion
+    from shipgym.manoeuvres import Criterion, IndexInterval
 
 WIDTH_WITHOUT_TERMINAL = 110
 
@@ -111,37 +111,60 @@ def _indices(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def manoeuvre_table(rows: Mapping[str, Mapping[str, float | None]]) -> Table:
-    """Indices of manoeuvres, one line each."""
+def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]]) -> Table:
+    """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
+    drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
     table = plain_table("Manoeuvres from service speed in deep water")
     table.add_column("manoeuvre")
     table.add_column("index")
     table.add_column("value", justify="right")
+    if drawn:
+        table.add_column("95 % interval", justify="right")
+        table.add_column("draws without value", justify="right")
     for manoeuvre, indices in rows.items():
-        for k, (name, value) in enumerate(indices.items()):
-            table.add_row(manoeuvre if k == 0 else "", name, _number(value, 2))
+        for k, (name, index) in enumerate(indices.items()):
+            cells = [manoeuvre if k == 0 else "", name, _number(index.value, 2)]
+            if drawn:
+                cells += [_interval(index.interval), str(index.n_ran_away + index.n_never_reached)]
+            table.add_row(*cells)
     return table
 
 
-def criteria_table(
-    criteria: Mapping[str, Criterion], probabilities: Mapping[str, float] | None = None
-) -> Table:
-    """IMO criteria, with the probability of passing where it is known."""
+def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
+    """IMO criteria, with interval and probability of passing where there are models drawn."""
+    drawn = any(criterion.share_passed is not None for criterion in criteria.values())
     table = plain_table("IMO criteria, resolution MSC.137(76)")
     table.add_column("criterion")
-    for heading in ("value", "limit"):
+    for heading in ("value", *(["95 % interval"] if drawn else []), "limit"):
         table.add_column(heading, justify="right")
     for heading in ("unit", "verdict"):
         table.add_column(heading)
-    if probabilities is not None:
-        table.add_column("probability of passing", justify="right")
+    if drawn:
+        table.add_column("draws that pass", justify="right")
+    table.add_column("paragraph")
     for name, criterion in criteria.items():
-        verdict = "[green]passes[/]" if criterion.passed else "[red]fails[/]"
-        cells = [name, _number(criterion.value, 2), _number(criterion.limit, 2), criterion.unit, verdict]
-        if probabilities is not None:
-            cells.append(f"{100.0 * probabilities[name]:.1f} %")
-        table.add_row(*cells)
+        cells = [
+            _number(criterion.value, 2),
+            _number(criterion.limit, 2),
+            criterion.unit,
+            _verdict(criterion),
+        ]
+        if drawn:
+            cells.insert(1, _interval(criterion.interval))
+            share = criterion.share_passed
+            cells.append("-" if share is None else f"{100.0 * share:.1f} %")
+        table.add_row(name, *cells, criterion.source.rpartition(" ")[2])
     return table
+
+
+def _verdict(criterion: Criterion) -> str:
+    if criterion.passed is None:
+        return "not assessable"
+    return "[green]passes[/]" if criterion.passed else "[red]fails[/]"
+
+
+def _interval(interval: tuple[float, float] | None) -> str:
+    return "-" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
 def ranking_table(result: AutopilotResult) -> Table:

@@ -171,6 +171,14 @@ def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -
     )
 
 
+def zigzag_run() -> Row:
+    """A 20/20 zigzag of 600 s at 0.1 s, the Trial included."""
+    ship = shipgym.load_model(MODEL)
+    shipgym.manoeuvres.zigzag(ship, 20.0, 20.0)
+    seconds = best_time(lambda: shipgym.manoeuvres.zigzag(ship, 20.0, 20.0), 20)
+    return Row("zigzag 20/20, 600 s at 0.1 s", f"{1e3 * seconds:.1f} ms", "", None, "5 ms")
+
+
 def start_up() -> list[Row]:
     """Import, and `gymnasium.make` up to the first step with a warm cache, in fresh processes."""
     code = FIRST_STEP.format(model=MODEL)
@@ -195,6 +203,7 @@ def main(as_json: bool = typer.Option(False, "--json", help="Print JSON instead 
         truncated_fit(1800, "500 times"),
         truncated_fit(6000, "5000 times"),
         *(bee_colony_search(objective) for objective in ("training", "k-fold")),
+        zigzag_run(),
         *start_up(),
     ]
     if as_json:

@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel, two_commands
+from shipgym.simulation.orders import checked_orders
 from shipgym.trial import Trial
 from shipgym.units import CHANNELS
 
@@ -24,14 +25,7 @@ def simulate(
     kind: str | None = None,
 ) -> Trial:
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
-    held = np.asarray(commands, dtype=float)
-    if held.ndim != 2 or held.shape[1] != len(model.command_names) or len(held) < 2:
-        raise InputError(
-            f"commands: shape {held.shape} found, expected (n_steps, {len(model.command_names)}) for "
-            f"{', '.join(model.command_names)}, with at least 2 steps"
-        )
-    if not np.all(np.isfinite(held)):
-        raise InputError(f"commands: row {int(np.argwhere(~np.isfinite(held))[0, 0])} is not finite")
+    held = checked_orders(model, commands)
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     states = np.empty((len(held) + 1, layout.N_STATE))
@@ -113,6 +107,10 @@ def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind
     channels = _channels(model, states)
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
+        if name == "n":
+            channels.setdefault(
+                "n", command
+            )  # a shaft without lag turns as ordered, and is part of the record
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
 
 
