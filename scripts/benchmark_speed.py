@@ -23,7 +23,7 @@ from rich.console import Console
 from rich.table import Table
 
 import shipgym
-from identification import ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM
+from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM
 from identification.dense_dual import dense_dual_solution
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
@@ -203,6 +203,32 @@ def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -
     )
 
 
+def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
+    """Recursive least squares with forgetting, sample by sample, against the same update in NumPy."""
+    random = np.random.default_rng(0)
+    X = random.standard_normal((n_samples, n_terms))
+    y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
+    machine = RecursiveLeastSquares(forgetting=0.999).update(X[:100], y[:100])
+
+    def in_numpy(n: int = 2000) -> None:
+        theta, P = np.zeros(n_terms), 1e6 * np.eye(n_terms)
+        for phi, target in zip(X[:n], y[:n], strict=True):
+            gain = P @ phi
+            gain /= 0.999 + phi @ gain
+            theta += gain * (target - phi @ theta)
+            P = (P - np.outer(gain, phi @ P)) / 0.999
+
+    compiled = n_samples / best_time(lambda: machine.update(X, y))
+    plain = 2000 / best_time(in_numpy)
+    return Row(
+        f"recursive least squares, {n_terms} coefficients",
+        f"{compiled / 1e6:.2f} M updates/s",
+        f"NumPy {plain / 1e6:.3f} M updates/s",
+        compiled / plain,
+        "1 M updates/s",
+    )
+
+
 def start_up() -> list[Row]:
     """Import, and `gymnasium.make` up to the first step with a warm cache, in fresh processes."""
     code = FIRST_STEP.format(model=MODEL)
@@ -228,6 +254,7 @@ def main(as_json: bool = typer.Option(False, "--json", help="Print JSON instead 
         truncated_fit(1800, "500 times"),
         truncated_fit(6000, "5000 times"),
         *(bee_colony_search(objective) for objective in ("training", "k-fold")),
+        recursive_updates(),
         *start_up(),
     ]
     if as_json:
