@@ -275,7 +275,8 @@ def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]
 
 
 def _told(model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]) -> TrialInformation:
-    condition, inflation = {}, {}
+    condition: dict[str, float] = {}
+    inflation: dict[str, float] = {}
     for q in model.table.equations:
         X = samples.features[q]
         size = np.sqrt(np.mean(X**2, axis=0))
@@ -301,8 +302,8 @@ def _offers(
         offers[name] = fisher_information(model, _regression(model, trial), noise)
     if not offers:
         raise InputError(
-            f"candidates: {len(candidates)} found, none that model {model.name!r} survives, expected one that "
-            "can be simulated; give gentler manoeuvres"
+            f"candidates: {len(candidates)} found, none that model {model.name!r} survives, expected one "
+            "that can be simulated; give gentler manoeuvres"
         )
     return offers
 

@@ -214,8 +214,8 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
         """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
-        scaled = np.ascontiguousarray(features / self.scale_)
-        course = np.empty(scaled.shape)
+        scaled: Floats = np.ascontiguousarray(features / self.scale_)
+        course: Floats = np.empty(features.shape)
         self._advance(scaled, np.ascontiguousarray(targets / self._unit), course)
         course *= self._unit[:, None] / self.scale_
         if len(course):
@@ -424,7 +424,7 @@ def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
         raise InputError(
             "phi, y: a value that is not finite found, expected numbers; repair the samples first"
         )
-    return np.broadcast_to(features, (*targets.shape, features.shape[2])), targets
+    return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets
 
 
 def _whole(value: Any, where: str, least: int) -> None:

@@ -2,28 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import tanh
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numba import njit
 
+_Function = TypeVar("_Function", bound=Callable[..., Any])
 _SEMANTICS = {"error_model": "numpy", "cache": True, "nogil": True, "fastmath": {"contract"}}
 
 
-@njit(**_SEMANTICS)
+def compiled(function: _Function) -> _Function:
+    """Compile when first called, or read from the on-disk cache."""
+    result: _Function = njit(**_SEMANTICS)(function)
+    return result
+
+
+@compiled
 def innovation(error: float, omega: float) -> float:
     """The error, or its bounded odd function of slope 1 at 0 (Song 2020, equation 3-7, over omega)."""
     return tanh(omega * error) / omega if omega > 0.0 else error
 
 
-@njit(**_SEMANTICS)
+@compiled
 def forget(P: Any, forgetting: float, ceiling: Any) -> None:
     """Divide a covariance by the forgetting factor, but let no coefficient forget beyond where it began.
 
     Rows and columns are stretched alike, so that the matrix stays positive.
     """
     m = P.shape[0]
+    free = True
+    for i in range(m):
+        free = free and P[i, i] <= forgetting * ceiling[i]
+    if free:
+        grown = 1.0 / forgetting
+        for i in range(m):
+            for j in range(m):
+                P[i, j] *= grown
+        return
     full = 1.0 / np.sqrt(forgetting)
     stretch = np.empty(m)
     for i in range(m):
@@ -34,7 +51,7 @@ def forget(P: Any, forgetting: float, ceiling: Any) -> None:
             P[i, j] *= stretch[i] * stretch[j]  # in this order the matrix stays symmetric to the last bit
 
 
-@njit(**_SEMANTICS)
+@compiled
 def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) -> None:
     """Least squares with one more sample; `gain` is scratch."""
     m = theta.size
@@ -53,7 +70,7 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
             P[j, k] -= (gain[j] * gain[k]) * shrink  # symmetric to the last bit
 
 
-@njit(**_SEMANTICS)
+@compiled
 def scalar_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
     omega: float, course: Any,
@@ -73,7 +90,7 @@ def scalar_updates(
             course[t - first, s] = theta[s]
 
 
-@njit(**_SEMANTICS)
+@compiled
 def matrix_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
     omega: float, course: Any,
@@ -96,7 +113,7 @@ def matrix_updates(
             course[t - first, s] = theta[s]
 
 
-@njit(**_SEMANTICS)
+@compiled
 def gradient_updates(
     phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, course: Any
 ) -> None:

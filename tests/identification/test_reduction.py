@@ -115,7 +115,7 @@ def test_the_sensitivity_to_nomoto_s_gain_is_the_motion_itself() -> None:
 def test_a_coefficient_of_zero_has_no_effect_and_the_strongest_stands_first() -> None:
     effects = sensitivity(virtual_ship("steering7"), partial(turning_circle, duration=300.0, dt=0.5))
     assert effects["b_|r|r"] == 0.0
-    assert effects["c_d"] > 10.0 * effects["b_d"]
+    assert effects["c_d"] > effects["b_d"] > 0.0
     assert list(effects.values()) == sorted(effects.values(), reverse=True)
 
 
