@@ -63,6 +63,7 @@ _HOME = {
 }
 
 __all__ = [
+    "LSSVM",
     "Advice",
     "ArtificialBeeColony",
     "Course",
@@ -70,7 +71,6 @@ __all__ = [
     "ForceRegression",
     "GridSearch",
     "IdentificationResult",
-    "LSSVM",
     "MultiInnovationLeastSquares",
     "ParticleSwarm",
     "RecursiveLeastSquares",
