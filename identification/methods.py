@@ -15,6 +15,7 @@ from identification.comparators import LinearSupportVectorMachine
 from identification.free_running import fit_free_running
 from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.machine import Machine
+from identification.recursive import MultiInnovationLeastSquares, RecursiveLeastSquares, StochasticGradient
 from identification.samples import Samples
 from identification.tuning import Optimiser, TunedLSSVM
 from shipgym.checks import check_choice, check_number
@@ -128,6 +129,14 @@ def searched(make: Callable[[], Machine], task: FitTask) -> Machines:
     }
 
 
+def _nisg(omega: float = 0.5, **settings: Any) -> Machine:
+    return StochasticGradient(omega=omega, **settings)
+
+
+def _mils(**settings: Any) -> Machine:
+    return MultiInnovationLeastSquares(inverse_free=False, **settings)
+
+
 METHODS = {
     method.name: method
     for method in (
@@ -140,6 +149,11 @@ METHODS = {
         Method("abc-lssvr", partial(_tuned, optimiser="abc"), regularised=True, fit=searched),
         Method("de-lssvr", partial(_tuned, optimiser="de"), regularised=True, fit=searched),
         Method("svr", _support_vectors, regularised=True),
+        Method("rls", RecursiveLeastSquares, regularised=False),
+        Method("sg", StochasticGradient, regularised=False),
+        Method("nisg", _nisg, regularised=False),
+        Method("mils", _mils, regularised=False),
+        Method("tmils", MultiInnovationLeastSquares, regularised=False),
     )
 }
 

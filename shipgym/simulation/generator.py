@@ -26,6 +26,8 @@ def shaft_acceleration(n, command, ship, lane):
 def accelerations(u, v, r, p, phi, delta, n, depth, ship, lane):
 '''
 
+PARTIAL_SUM = 4
+
 #: Where a structure has no equation: the speed stays, and what drift or turn there is dies out within about
 #: a ship length.
 WITHOUT = {
@@ -51,13 +53,22 @@ def accelerations_source(structure: Structure) -> str:
             variable = variables.setdefault(expression, f"t{len(variables)}")
             products.append(f"ship[COEFFICIENTS + {row} * LANES + lane] * {variable}")
             row += 1
-        joined = "\n        + ".join(products)
+        joined = "\n        + ".join(balanced(products))
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
     fourth = "pdot" if "p" in structure.equations else "qdot" if "q" in structure.equations else "0.0"
     yaw = f"rdot + {MEMORY}" if "q" in structure.equations else "rdot"
     body = assignments + "".join(sums) + f"    return udot, vdot, {yaw}, {fourth}\n"
     return _header(structure, body) + body
+
+
+def balanced(products: list[str]) -> list[str]:
+    """Sums of at most four products each, in brackets.
+
+    One long sum is a chain in which each addition waits for the one before; partial sums run side by side.
+    """
+    groups = (products[i : i + PARTIAL_SUM] for i in range(0, len(products), PARTIAL_SUM))
+    return [f"({' + '.join(group)})" for group in groups]
 
 
 def product(term: Term, speed_power: int) -> str:
