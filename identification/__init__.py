@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from identification.lssvm import LSSVM, TruncatedLSSVM
     from identification.pipeline import IdentificationResult, identify
     from identification.polynomial import polynomial_coefficients
+    from identification.rm_svm import RMSVM
     from identification.samples import Samples, build_samples
     from identification.tuning import (
         ArtificialBeeColony,
@@ -28,6 +29,7 @@ _HOME = {
     "LSSVM": "identification.lssvm",
     "IdentificationResult": "identification.pipeline",
     "ParticleSwarm": "identification.tuning",
+    "RMSVM": "identification.rm_svm",
     "Samples": "identification.samples",
     "SearchResult": "identification.tuning",
     "TruncatedLSSVM": "identification.lssvm",
@@ -46,6 +48,7 @@ __all__ = [
     "GridSearch",
     "IdentificationResult",
     "ParticleSwarm",
+    "RMSVM",
     "Samples",
     "SearchResult",
     "TruncatedLSSVM",

@@ -56,7 +56,7 @@ def hard_turn_features(
         "delta": HARD_TURN["rudder"],
         "n": HARD_TURN["shaft"] * shaft_speed,
     }
-    channels = {name: np.array([state[name]]) for name in structure.required_channels}
+    channels = {name: np.array([state.get(name, 0.0)]) for name in structure.required_channels}
     return {
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from identification.comparators import LinearSupportVectorMachine
 from identification.free_running import fit_free_running
 from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.machine import Machine
+from identification.rm_svm import RMSVM, fit_rm_svm
 from identification.samples import Samples
 from identification.tuning import Optimiser, TunedLSSVM
 from shipgym.checks import check_choice, check_number
@@ -128,6 +129,14 @@ def searched(make: Callable[[], Machine], task: FitTask) -> Machines:
     }
 
 
+def _rm_svm(**settings: Any) -> Machine:
+    return RMSVM(**settings)
+
+
+def _fit_rm_svm(make: Callable[[], Machine], task: FitTask) -> Machines:
+    return fit_rm_svm(cast("Callable[[], RMSVM]", make), task.samples, task.blank, task.trials)
+
+
 METHODS = {
     method.name: method
     for method in (
@@ -140,6 +149,7 @@ METHODS = {
         Method("abc-lssvr", partial(_tuned, optimiser="abc"), regularised=True, fit=searched),
         Method("de-lssvr", partial(_tuned, optimiser="de"), regularised=True, fit=searched),
         Method("svr", _support_vectors, regularised=True),
+        Method("rm-svm", _rm_svm, regularised=True, fit=_fit_rm_svm),
     )
 }
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.models.catalogue import load_model
+from shipgym.models.greybox import GreyBox
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.term_table import Structure
 
@@ -162,6 +163,11 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
         features = table.features(equation, channels, model.particulars, shaft)
         accelerations[:, "uvr".index(equation)] = features @ theta[row : row + len(terms)]
         row += len(terms)
+    if isinstance(table, GreyBox):
+        known = table.converted_accelerations(channels, model.particulars, shaft)
+        for axis, equation in enumerate("uvr"):
+            own = accelerations[:, axis] if equation in table.equations else 0.0
+            accelerations[:, axis] = known[equation] + own
     return accelerations
 
 
