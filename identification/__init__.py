@@ -43,12 +43,12 @@ _HOME = {
 
 __all__ = [
     "LSSVM",
+    "RMSVM",
     "ArtificialBeeColony",
     "DifferentialEvolution",
     "GridSearch",
     "IdentificationResult",
     "ParticleSwarm",
-    "RMSVM",
     "Samples",
     "SearchResult",
     "TruncatedLSSVM",
