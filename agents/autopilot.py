@@ -18,6 +18,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel
+from shipgym.models.greybox import GREY_BOX
 from shipgym.models.linear import is_course_stable, nomoto
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
@@ -143,7 +144,15 @@ def identification_settings(
     """Settings of `identify`: those given, else the ship file's, else the defaults of `identify`."""
     given = {"structure": structure, "method": method, "samples": samples}
     chosen = {key: value or ship.identify.get(key) for key, value in given.items()}
+    if chosen["structure"] == GREY_BOX:
+        chosen["reference_model"] = _reference_model(ship)
     return {key: value for key, value in chosen.items() if value is not None}
+
+
+def _reference_model(ship: ShipFile) -> str:
+    """The reference ship that a ship file names, by default the most similar; paths relative to it."""
+    name = ship.identify.get("reference_model", "auto")
+    return str(ship.path.parent / name) if name.endswith(".json") else name
 
 
 def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = None) -> Verification:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         StochasticGradient,
     )
     from identification.reduction import Reduction, backward_elimination, forward_selection, sensitivity
+    from identification.rm_svm import RMSVM
     from identification.samples import Samples, build_samples
     from identification.tuning import (
         ArtificialBeeColony,
@@ -43,6 +44,7 @@ _HOME = {
     "ParticleSwarm": "identification.tuning",
     "RecursiveLeastSquares": "identification.recursive",
     "Reduction": "identification.reduction",
+    "RMSVM": "identification.rm_svm",
     "Samples": "identification.samples",
     "SearchResult": "identification.tuning",
     "StochasticGradient": "identification.recursive",
@@ -64,6 +66,7 @@ _HOME = {
 
 __all__ = [
     "LSSVM",
+    "RMSVM",
     "Advice",
     "ArtificialBeeColony",
     "Course",

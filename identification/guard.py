@@ -59,7 +59,7 @@ def hard_turn_features(
         "p": HARD_TURN["heel"] * HARD_TURN["speed"] * particulars["speed"] / particulars["length"],
         "phi": HARD_TURN["heel"],
     }
-    channels = {name: np.array([state[name]]) for name in structure.required_channels}
+    channels = {name: np.array([state.get(name, 0.0)]) for name in structure.required_channels}
     sizes = {
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }

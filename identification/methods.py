@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from identification.free_running import fit_free_running
 from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.machine import Machine
 from identification.recursive import MultiInnovationLeastSquares, RecursiveLeastSquares, StochasticGradient
+from identification.rm_svm import RMSVM, fit_rm_svm
 from identification.samples import Samples
 from identification.tuning import Optimiser, TunedLSSVM
 from shipgym.checks import check_choice, check_number
@@ -137,6 +138,14 @@ def _mils(**settings: Any) -> Machine:
     return MultiInnovationLeastSquares(inverse_free=False, **settings)
 
 
+def _rm_svm(**settings: Any) -> Machine:
+    return RMSVM(**settings)
+
+
+def _fit_rm_svm(make: Callable[[], Machine], task: FitTask) -> Machines:
+    return fit_rm_svm(cast("Callable[[], RMSVM]", make), task.samples, task.blank, task.trials)
+
+
 METHODS = {
     method.name: method
     for method in (
@@ -154,6 +163,7 @@ METHODS = {
         Method("nisg", _nisg, regularised=False),
         Method("mils", _mils, regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
+        Method("rm-svm", _rm_svm, regularised=True, fit=_fit_rm_svm),
     )
 }
 

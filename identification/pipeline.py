@@ -14,17 +14,20 @@ from numpy.typing import NDArray
 import shipgym
 from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
 from identification.gear import estimated_gear
+from identification.grey_box import bare_metrics, chosen_box, structure_samples
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
-from identification.samples import Samples, build_samples
+from identification.prior import with_prior
+from identification.samples import Samples
 from identification.threads import on_one_thread
 from identification.tuning import SearchResult
 from identification.uncertainty import coefficient_covariance, joint_covariance
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
-from shipgym.models import Envelope, ShipModel, Structure, get_structure
+from shipgym.models import Envelope, GreyBox, ShipModel, Structure, get_structure
+from shipgym.models.greybox import GREY_BOX
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 from shipgym.trial import Trial
@@ -130,6 +133,9 @@ def identify(
     smooth: bool = True,
     guarded: bool = True,
     hold_out: Sequence[str] = (),
+    reference_model: str | ShipModel | None = None,
+    prior: str | ShipModel | None = None,
+    prior_strength: float | None = None,
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -147,7 +153,7 @@ def identify(
         A name of `identification.methods.METHODS`: truncated LS-SVM (`tls-svm`), LS-SVM of given C (`ls-svm`)
         or of one found by grid, particle swarm, bee colony or differential evolution (`cv-lssvr`,
         `pso-lssvr`, `abc-lssvr`, `de-lssvr`), or scikit-learn's least squares, ridge and support
-        vector regression (`ls`, `ridge`, `svr`).
+        vector regression (`ls`, `ridge`, `svr`); for the structure `grey-box` also RM-SVM (`rm-svm`).
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
@@ -170,6 +176,14 @@ def identify(
         is large in a hard turn and invisible in the data. The provenance tells what was done.
     hold_out : sequence of str
         Names of trials that are predicted only, as if they were marked `validate`.
+    reference_model : str or ShipModel, optional
+        Of the structure "grey-box": a model, its name or file, or "auto" for the reference ship most like
+        this one (`similarity.select_reference`).
+    prior : str or ShipModel, optional
+        What the coefficients are pulled to: a reference ship's ("auto" for the most similar, or a model, its
+        name or file), or the regression formulas "clarke" or "kijima". See `prior`.
+    prior_strength : float, optional
+        0 for none, infinite for the prior itself; by default chosen by cross-validation.
     **settings
         Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
         `optimiser` of a search.
@@ -183,16 +197,21 @@ def identify(
     InputError
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
-    chosen, table = get_method(method), get_structure(structure)
+    chosen = get_method(method)
     trials = _held_out(trials, hold_out)
     used = _used(trials)
+    table, similarity = _table(structure, reference_model, particulars, used)
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     shaft = _shaft_speed(service_shaft_speed, used, table)
-    regression = build_samples(used, table, ship, samples, window, steering, smooth, shaft)
+    regression = structure_samples(used, table, ship, samples, window, steering, smooth, shaft)
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
-    blank = _blank(ship["name"] if name is None else name, structure, ship, gear, shaft, used)
+    blank = _blank(ship["name"] if name is None else name, table, ship, gear, shaft, used)
+    if prior is None and prior_strength is not None:
+        raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
+    if prior is not None:
+        chosen = with_prior(chosen, prior, prior_strength, blank)
     fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
     asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
     provenance = {
@@ -201,6 +220,8 @@ def identify(
         "samples": samples,
         "settings": {key: _plain(value) for key, value in asked.items()},
         "steering": "estimated" if steering is None else "given",
+        **({"reference": _reference(table, similarity)} if isinstance(table, GreyBox) else {}),
+        **({"prior": _prior_name(prior), **_prior_found(fit)} if prior is not None else {}),
         **_origin(fit, regression, used),
     }
     covariance = _covariance(fit, regression, blank)
@@ -209,16 +230,17 @@ def identify(
 
 
 def _blank(
-    name: str, structure: str, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
+    name: str, table: Structure, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
     return ShipModel(
         name=name,
-        structure=structure,
+        structure=table.name,
         particulars=ship,
         steering=gear,
-        coefficients=dict.fromkeys(get_structure(structure).coefficient_names, 0.0),
+        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         service_shaft_speed=shaft,
+        own_table=table if isinstance(table, GreyBox) else None,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
     )
 
@@ -260,12 +282,14 @@ def _judged(
     """The model with its predictions of all trials that are not skipped, and its diagnostics."""
     predictable = [trial for trial in trials if trial.use != "skip"]
     predictions = {trial.name: predict(model, trial) for trial in predictable}
+    bare = {"reference": bare_metrics(model, predictable)} if isinstance(model.table, GreyBox) else {}
     return IdentificationResult(
         model=model,
         stable=fit.stable,
         metrics={
             "stable": fit.stable,
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in predictable},
+            **bare,
         },
         diagnostics=diagnose(fit.machines, regression, model.table),
         predictions=predictions,
@@ -280,6 +304,38 @@ def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
     for name in wanted:
         check_choice(name, known, "hold_out")
     return [trial.with_(use="validate") if trial.name in wanted else trial for trial in trials]
+
+
+def _table(
+    structure: str,
+    reference: str | ShipModel | None,
+    particulars: Particulars | Mapping[str, Any] | None,
+    used: Sequence[Trial],
+) -> tuple[Structure, dict[str, float]]:
+    """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
+    if structure != GREY_BOX:
+        if reference is not None:
+            raise InputError(
+                f"reference_model: {reference!r} found with structure {structure!r}, expected structure "
+                "'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give prior)"
+            )
+        return get_structure(structure), {}
+    check_trials(used, get_structure("linear-steering"))
+    return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
+
+
+def _reference(box: GreyBox, similarity: Mapping[str, float]) -> dict[str, Any]:
+    """What a grey box stands on, for the provenance."""
+    return {"name": box.ship.name, "similarity": dict(similarity), "shaft": box.shaft}
+
+
+def _prior_name(prior: str | ShipModel) -> str:
+    return prior.name if isinstance(prior, ShipModel) else prior
+
+
+def _prior_found(fit: GuardedFit) -> dict[str, Any]:
+    """Strength of the prior and what it was, from the machines."""
+    return next(iter(getattr(machine, "prior_", {}) for machine in fit.machines.values()), {})
 
 
 def _used(trials: Sequence[Trial]) -> list[Trial]:

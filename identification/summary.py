@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from io import StringIO
+from math import degrees
 from typing import TYPE_CHECKING
 
 from rich.console import Console
@@ -31,6 +32,8 @@ def summary_table(result: IdentificationResult) -> str:
     console.print(_coefficients(result), _inertia(result), _equations(result))
     for line in _undetermined(result):
         console.print(line, highlight=False)
+    if "reference" in result.metrics:
+        console.print(_against_reference(result))
     file = console.file
     assert isinstance(file, StringIO)
     return file.getvalue()
@@ -102,3 +105,17 @@ def _undetermined(result: IdentificationResult) -> list[str]:
         for name, fit in result.diagnostics.items()
         if fit.dropped
     ]
+
+
+def _against_reference(result: IdentificationResult) -> Table:
+    """The heading of each trial as predicted, and as the bare reference ship predicts it."""
+    reference = result.metrics["reference"]
+    title = f"Open-loop heading, root mean square error, beside the bare reference ship '{reference['name']}'"
+    table = Table(title=title, title_justify="left")
+    for heading in ("trial", "use", "model, deg", "reference, deg"):
+        table.add_column(heading, justify="right" if heading.endswith("deg") else "left")
+    for name, metrics in result.metrics["trials"].items():
+        errors = (found["rmse"]["psi"] for found in (metrics, reference["trials"][name]))
+        shown = ("ran away" if e is None else f"{degrees(e):.2f}" for e in errors)
+        table.add_row(name, metrics["use"], *shown)
+    return table

@@ -2,15 +2,19 @@
 
 from shipgym.models.catalogue import list_models, load_model
 from shipgym.models.envelope import Envelope
+from shipgym.models.greybox import GreyBox, converted_model, grey_box
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.structures import Structure, Term, get_structure, list_structures, register_structure
 
 __all__ = [
     "Envelope",
+    "GreyBox",
     "ShipModel",
     "Structure",
     "Term",
+    "converted_model",
     "get_structure",
+    "grey_box",
     "list_models",
     "list_structures",
     "load_model",

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.models.catalogue import load_model
+from shipgym.models.greybox import GreyBox
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.term_table import Structure
 
@@ -178,6 +179,11 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
         row += len(terms)
     if "q" in rates:
         accelerations[:, rates.index("r")] += channels["q"]
+    if isinstance(table, GreyBox):
+        known = table.converted_accelerations(channels, model.particulars, shaft)
+        for axis, equation in enumerate("uvr"):
+            own = accelerations[:, axis] if equation in table.equations else 0.0
+            accelerations[:, axis] = known[equation] + own
     return accelerations
 
 

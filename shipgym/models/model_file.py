@@ -7,7 +7,9 @@ Format 1:
     structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r" | "p" | "q":
                    [{"name", "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be
                    absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
-                   [{"coefficient", "name", "powers", "sign"}, ...]}}; for a reference ship {"name", "source"}
+                   [{"coefficient", "name", "powers", "sign"}, ...]}};
+                   for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether the
+                   shaft speed is known) and "reference": a reference ship, as a whole model file
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s
@@ -32,6 +34,7 @@ from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models.envelope import CHANNELS, Envelope
 from shipgym.models.equations import EQUATIONS, Equations
+from shipgym.models.greybox import GreyBox
 from shipgym.models.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.models.ship_model import ShipModel
 from shipgym.models.structures import EQUATION_NAMES, SYMBOLS, Structure
@@ -48,7 +51,12 @@ REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steer
 
 def save(model: ShipModel, path: Path) -> None:
     """Write a model file: to a temporary name, then renamed."""
-    fields = {
+    write_json(model_fields(model), path)
+
+
+def model_fields(model: ShipModel) -> dict[str, Any]:
+    """What a model file holds, ready for JSON."""
+    return {
         "format": FORMAT,
         "name": model.name,
         "structure": model.dynamics.to_dict(),
@@ -61,7 +69,6 @@ def save(model: ShipModel, path: Path) -> None:
         "envelope": None if model.envelope is None else model.envelope.to_dict(),
         "provenance": model.provenance,
     }
-    write_json(fields, path)
 
 
 def load(path: Path) -> ShipModel:
@@ -119,12 +126,31 @@ def _normalisation(dynamics: Structure | Equations) -> str:
 def _dynamics(value: Any, where: str) -> Structure | Equations:
     """A table of terms, or the name of a reference ship's equations."""
     table = check_table(value, where)
-    check_keys(table, ("name", "source", "normalisation", "quantity", "equations", "shares"), where)
+    keys = ("name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares")
+    check_keys(table, keys, where)
     if "shares" in table:
         return _shared(table, where)
     if "equations" in table:
-        return _structure(table, where)
+        structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
+        return _grey_box(structure, table, where) if {"reference", "shaft"} & table.keys() else structure
     return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
+
+
+def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> GreyBox:
+    """A table of terms that is added to a reference ship, which is held whole."""
+    reference = check_table(table.get("reference"), f"{where}.reference")
+    shaft = table.get("shaft", False)
+    if not isinstance(shaft, bool):
+        raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
+    return GreyBox(
+        structure.name,
+        structure.source,
+        structure.equations,
+        structure.normalisation,
+        structure.quantity,
+        _model(reference, f"{where}.reference"),
+        shaft,
+    )
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:

@@ -144,8 +144,13 @@ def get_structure(name: str) -> Structure:
     Raises
     ------
     InputError
-        If there is none of that name.
+        If there is none of that name, or it is the grey box, which takes a reference ship.
     """
+    if name == "grey-box":
+        raise InputError(
+            "structure: 'grey-box' found, which is a reference ship and a table of terms; give the reference "
+            "ship: identify(..., structure='grey-box', reference_model='tanker'), or shipgym.models.grey_box"
+        )
     return STRUCTURES[check_choice(name, STRUCTURES, "structure")]
 
 

@@ -1,0 +1,203 @@
+"""RM-SVM: which reference ship, and what is learnt on top of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from sklearn.utils.estimator_checks import check_estimator
+
+import shipgym
+from identification import IdentificationResult, identify
+from identification.pattern_search import pattern_search
+from identification.rm_svm import RMSVM
+from identification.similarity import correlations, select_reference, similarity_vector
+from shipgym import ShipModel, Trial
+from shipgym.errors import InputError
+from shipgym.manoeuvres import zigzag
+
+#: Mei 2019, Table 4: block coefficient, L/B, B/T, L/V0 in s, rudder area by L T.
+TABLE_4 = {
+    "Mariner": (0.60, 6.95, 3.10, 20.9, 1 / 83.1),
+    "Tanker": (0.83, 6.39, 2.58, 37.0, 1 / 61.0),
+    "SR108": (0.56, 6.89, 2.99, 14.1, 1 / 45.8),
+    "PCC": (0.55, 5.60, 3.93, 18.0, 1 / 39.8),
+}
+KVLCC2 = (0.90, 5.52, 2.79, 40.1, 1 / 48.7)
+CHANNELS = ("x", "y", "psi", "u", "v", "r", "delta")
+
+
+@pytest.fixture(scope="module")
+def target() -> ShipModel:
+    return shipgym.load_model("kvlcc2-l7")
+
+
+@pytest.fixture(scope="module")
+def trials(target: ShipModel) -> list[Trial]:
+    """The plan of Mei 2019, on the MMG model: 10/10 and 20/20 to both sides; the last is held out."""
+    plan = [(10, False, "fit"), (10, True, "fit"), (20, False, "fit"), (20, True, "validate")]
+    found = []
+    for angle, port_first, use in plan:
+        run = zigzag(target, angle, angle, duration=70, dt=0.05, port_first=port_first)
+        channels = {name: run[name][::4] for name in CHANNELS}
+        channels["n"] = np.full(len(run.t[::4]), target.service_shaft_speed)
+        name = f"{'port' if port_first else 'starboard'}-{angle}"
+        found.append(Trial(run.t[::4], channels, name=name, kind="zigzag", use=use, length=7.0))
+    return found
+
+
+def fit(target: ShipModel, trials: list[Trial], **settings: Any) -> IdentificationResult:
+    return identify(
+        trials, structure="grey-box", particulars=target.particulars, steering=target.steering,
+        service_shaft_speed=target.service_shaft_speed, **settings,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def rm_svm(target: ShipModel, trials: list[Trial]) -> IdentificationResult:
+    return fit(target, trials, method="rm-svm", reference_model="kvlcc2")
+
+
+def heading_errors(result: IdentificationResult, use: str) -> tuple[float, float]:
+    """Root mean square error of the heading over trials of one use: of the fit and of the bare reference."""
+    ours, bare = result.metrics["trials"], result.metrics["reference"]["trials"]
+    names = [name for name, metrics in ours.items() if metrics["use"] == use]
+    mine, theirs = (np.mean([found[name]["rmse"]["psi"] for name in names]) for found in (ours, bare))
+    return float(mine), float(theirs)
+
+
+def test_table_4_gives_the_correlations_of_its_figures() -> None:
+    """Printed, from figures before rounding: -0.5758, 0.8510, -0.8873, -0.7228."""
+    found = correlations(KVLCC2, TABLE_4)
+    for name, value in {"Mariner": -0.562, "Tanker": 0.851, "SR108": -0.890, "PCC": -0.724}.items():
+        assert found[name] == pytest.approx(value, abs=1e-3)
+    assert max(found, key=lambda name: found[name]) == "Tanker"
+
+
+def test_the_tanker_is_most_like_kvlcc2_at_any_scale() -> None:
+    """As long as KVLCC2 itself is not among the candidates."""
+    others = ("mariner", "container", "tanker")
+    for name in ("kvlcc2", "kvlcc2-l7"):
+        ship = shipgym.load_model(name).particulars
+        assert select_reference(ship, candidates=others)[0] == "tanker"
+        assert select_reference(ship)[0] == name
+
+
+def test_the_printed_feature_of_speed_depends_on_the_scale() -> None:
+    full, model = (shipgym.load_model(name).particulars for name in ("kvlcc2", "kvlcc2-l7"))
+    ours, printed = (
+        similarity_vector(full, kind)[3] / similarity_vector(model, kind)[3] for kind in (False, True)
+    )
+    assert ours == pytest.approx(1.0, abs=2e-3)
+    assert printed == pytest.approx(np.sqrt(320.0 / 7.0), rel=2e-3)
+
+
+def test_a_reference_ship_that_rolls_is_chosen_only_where_roll_is_recorded() -> None:
+    ship = shipgym.load_model("container").particulars
+    assert select_reference(ship, channels=("u", "v", "r", "p", "phi"))[0] == "container"
+    assert select_reference(ship, channels=("u", "v", "r"))[0] != "container"
+
+
+def test_too_little_known_to_choose() -> None:
+    with pytest.raises(InputError, match=r"give beam, draught.*or name the reference_model"):
+        select_reference(shipgym.models.ship_model.Particulars(length=7.0, speed=1.0))
+
+
+def test_pattern_search_finds_the_corner_and_the_inside() -> None:
+    found = pattern_search(lambda x: float((x[0] - 0.3) ** 2 + x[1]), (0.1, 0.5), (0, 0), (1, 1))
+    assert found.x == pytest.approx([0.3, 0.0], abs=1 / 64)
+    assert list(found.history) == sorted(found.history, reverse=True)
+
+
+def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
+    for estimator in (RMSVM(C=10.0), RMSVM(C=10.0, regression="ls-svm")):
+        checks = check_estimator(estimator, on_skip=None, on_fail=None)
+        assert [(c["check_name"], c["exception"]) for c in checks if c["status"] == "failed"] == []
+
+
+@pytest.mark.parametrize("regression", ["svr", "ls-svm"])
+def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.standard_normal((200, 2)) * [1.0, 1e-3], np.ones(200)])
+    machine = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(X, X @ [2.0, -500.0, 0.3])
+    assert machine.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
+    free = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(X[:, :2], X[:, :2] @ [2.0, -500.0])
+    assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
+
+
+def test_a_weight_of_zero_is_the_bare_reference_ship(target: ShipModel, trials: list[Trial]) -> None:
+    result = fit(target, trials, method="rm-svm", reference_model="kvlcc2", C=0.0)
+    assert set(result.coefficients.values()) == {0.0}
+    assert result.metrics["trials"] == result.metrics["reference"]["trials"]
+
+
+def test_rm_svm_predicts_a_held_out_zigzag_better_than_the_bare_reference(
+    rm_svm: IdentificationResult,
+) -> None:
+    ours, bare = heading_errors(rm_svm, "validate")
+    assert rm_svm.stable
+    assert ours < 0.6 * bare
+    assert ours < np.radians(1.0)
+
+
+def test_the_tanker_as_reference_for_kvlcc2(target: ShipModel, trials: list[Trial]) -> None:
+    """The reference ship of Mei 2019; the steady turn is in no zigzag."""
+    result = fit(target, trials, method="rm-svm", reference_model="tanker")
+    ours, bare = heading_errors(result, "validate")
+    assert ours < 0.7 * bare
+
+
+def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
+    provenance = rm_svm.model.provenance or {}
+    assert provenance["reference"] == {"name": "kvlcc2", "similarity": {}, "shaft": True}
+    assert set(provenance["search"]) == {"u", "v", "r"}
+    assert all(0.0 <= chosen["epsilon"] <= 1.0 for chosen in provenance["search"].values())
+    assert "bare reference ship 'kvlcc2'" in rm_svm.summary()
+
+
+@pytest.fixture(scope="module")
+def silent(trials: list[Trial]) -> list[Trial]:
+    """Without the shaft speed."""
+    return [
+        Trial(t.t, {c: t[c] for c in CHANNELS}, name=t.name, kind=t.kind, use=t.use, length=7.0)
+        for t in trials
+    ]
+
+
+def test_without_shaft_speed_the_reference_ship_keeps_that_of_service(
+    target: ShipModel, trials: list[Trial], silent: list[Trial]
+) -> None:
+    """The virtual trials were sailed with it, so nothing changes."""
+    with_n, without = (fit(target, runs, method="ls", reference_model="kvlcc2") for runs in (trials, silent))
+    assert without.model.command_names == ("delta",)
+    assert without.coefficients == pytest.approx(with_n.coefficients, rel=1e-6, abs=1e-9)
+
+
+def test_the_exact_reference_leaves_nothing_to_learn(target: ShipModel, silent: list[Trial]) -> None:
+    result = fit(target, silent, method="ls", reference_model="kvlcc2-l7")
+    assert np.abs(list(result.coefficients.values())).max() < 2e-3
+    assert heading_errors(result, "validate")[1] < np.radians(0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"structure": "abkowitz", "method": "rm-svm"}, r"method: 'rm-svm' found with structure 'abkowitz'"),
+        ({"structure": "grey-box", "method": "rm-svm"}, r"reference_model: None found"),
+        ({"structure": "grey-box", "reference_model": "titanic"}, r"titanic"),
+        ({"structure": "abkowitz", "reference_model": "tanker"}, r"reference_model: 'tanker' found with"),
+        ({"structure": "grey-box", "reference_model": "container"}, r"channel 'p' is missing"),
+        ({"structure": "grey-box", "reference_model": "tanker", "prior": "auto"}, r"leave the prior out"),
+        ({"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "C": -1.0}, r"C: -1"),
+        (
+            {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "objective": "luck"},
+            r"objective: 'luck' found",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    target: ShipModel, trials: list[Trial], settings: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        identify(trials, particulars=target.particulars, steering=target.steering, **settings)

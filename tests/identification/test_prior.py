@@ -1,0 +1,181 @@
+"""Priors: coefficients pulled toward a reference ship's or toward regression formulas."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shipgym
+from identification import IdentificationResult, identify
+from identification.formulas import clarke_derivatives, formula_coefficients, kijima_derivatives
+from shipgym import ShipModel, Trial
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
+from shipgym.models.linear import steering_state_space
+from shipgym.models.structures import get_structure
+
+NOISE = {"psi": np.radians(0.1), "u": 0.01, "v": 0.01, "r": np.radians(0.1), "delta": np.radians(0.1)}
+
+
+@pytest.fixture(scope="module")
+def target() -> ShipModel:
+    return shipgym.load_model("kvlcc2-l7")
+
+
+def recorded(run: Trial, ship: ShipModel, noise: float, seed: int, name: str, use: str = "fit") -> Trial:
+    rng = np.random.default_rng(seed)
+    t = run.t[::4]
+    channels = {
+        c: run[c][::4] + noise * NOISE.get(c, 0.0) * rng.standard_normal(len(t))
+        for c in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
+    channels["n"] = np.full(len(t), ship.service_shaft_speed)
+    return Trial(t, channels, name=name, kind=run.kind, use=use, length=ship.particulars.length)
+
+
+@pytest.fixture(scope="module")
+def short_trials(target: ShipModel) -> list[Trial]:
+    """Two short noisy 20/20 zigzags."""
+    return [
+        recorded(zigzag(target, 20, 20, duration=50, dt=0.05, port_first=port), target, 1.0, i, f"zigzag-{i}")
+        for i, port in enumerate((False, True))
+    ]
+
+
+def fit(target: ShipModel, trials: list[Trial], **settings: Any) -> IdentificationResult:
+    settings = {"structure": "abkowitz", "method": "ls"} | settings
+    return identify(trials, particulars=target.particulars, steering=target.steering, **settings)
+
+
+def values(result: IdentificationResult) -> list[float]:
+    return list(result.coefficients.values())
+
+
+@pytest.mark.parametrize("prior", ["tanker", "clarke"])
+@pytest.mark.parametrize("method", ["ls", "tls-svm"])
+def test_a_strength_of_zero_is_no_prior(
+    target: ShipModel, short_trials: list[Trial], prior: str, method: str
+) -> None:
+    free = fit(target, short_trials, method=method)
+    assert values(fit(target, short_trials, method=method, prior=prior, prior_strength=0.0)) == values(free)
+
+
+def test_an_infinite_strength_is_the_prior_whatever_the_data(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
+    one, other = (
+        values(fit(target, trials, prior="tanker", prior_strength=np.inf))
+        for trials in (short_trials[:1], short_trials)
+    )
+    assert one == pytest.approx(other, rel=1e-9, abs=1e-15)
+    strong = values(fit(target, short_trials, prior="tanker", prior_strength=1e6))
+    assert strong == pytest.approx(one, rel=1e-4, abs=1e-7)
+
+
+def test_an_infinite_strength_of_formulas_is_what_they_say(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
+    ship = target.particulars.completed()
+    result = fit(target, short_trials, prior="clarke", prior_strength=np.inf, guarded=False)
+    clarke = clarke_derivatives(ship)
+    assert result.coefficients["Y_v"] == pytest.approx(clarke["Y_v"], rel=1e-9)
+    assert result.coefficients["N_v"] == pytest.approx(clarke["N_v"], rel=1e-9)
+    assert result.coefficients["Y_r"] == pytest.approx(clarke["Y_r"] - ship.mass_prime, rel=1e-9)
+    assert result.coefficients["N_d"] == pytest.approx(clarke["N_delta"], rel=1e-9)
+
+
+@pytest.mark.parametrize("structure", ["linear-steering", "steering7", "abkowitz"])
+def test_formulas_mean_the_same_ship_in_every_structure(target: ShipModel, structure: str) -> None:
+    """Linearised about service speed, whatever the units and the powers of the speed."""
+    table, ship = get_structure(structure), target.particulars.completed()
+    found = formula_coefficients("clarke", table, ship)
+    theta = np.concatenate([coefficients for coefficients, _ in found.values()])
+    values = np.linalg.solve(table.acceleration_matrix(ship), theta)
+    model = ShipModel(
+        "formulas", structure, ship, target.steering,
+        dict(zip(table.coefficient_names, values.tolist(), strict=True)),
+    )  # fmt: skip
+    at = np.array([0.0, 0.0, 0.0, ship["speed"], 0.0, 0.0, 0.0])
+    step = np.diag([1e-6, 1e-6, 1e-6])
+    changed = at + np.column_stack([np.zeros((3, 4)), step[:, :2], step[:, 2]])
+    slopes = (model.derivatives(changed, [0.0]) - model.derivatives(at, [0.0]))[:, 4:6].T / 1e-6
+    linear = formula_coefficients("clarke", get_structure("linear-steering"), ship)
+    U = ship["speed"]
+    expected = np.array([linear[q][0] * [U, U, U**2] for q in ("v", "r")])
+    np.testing.assert_allclose(slopes, expected, rtol=1e-4, atol=1e-7)
+
+
+def test_formulas_are_near_the_mmg_model_of_kvlcc2(target: ShipModel) -> None:
+    """To a third, which is what such regressions are worth; signs and units follow from it."""
+    A, _ = steering_state_space(target)
+    for formula in ("clarke", "kijima"):
+        found = formula_coefficients(formula, get_structure("steering7"), target.particulars)
+        sway, yaw = found["v"][0], found["r"][0]
+        assert [sway[0], sway[3], yaw[0], yaw[3]] == pytest.approx(A.ravel(), rel=0.33)
+
+
+def test_clarke_and_kijima_agree_in_sign_and_size(target: ShipModel) -> None:
+    ship = target.particulars.completed()
+    clarke, kijima = clarke_derivatives(ship), kijima_derivatives(ship)
+    for name in ("Y_v", "N_v", "N_r", "Y_r"):
+        assert kijima[name] == pytest.approx(clarke[name], rel=0.4)
+
+
+def test_the_prior_holds_the_hard_turn_that_no_zigzag_has(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
+    """Plain least squares runs away there; toward the full-scale ship it is within 8 per cent."""
+    truth = turning_indices(turning_circle(target, 35, duration=140, dt=0.05), 7.0)
+    assert not fit(target, short_trials).stable
+    result = fit(target, short_trials, prior="kvlcc2")
+    ours = turning_indices(turning_circle(result.model, 35, duration=140, dt=0.05), 7.0)
+    assert result.stable
+    assert ours.advance_lengths == pytest.approx(truth.advance_lengths, rel=0.08)
+    assert ours.tactical_diameter_lengths == pytest.approx(truth.tactical_diameter_lengths, rel=0.08)
+
+
+def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> None:
+    """The Mariner from one short zigzag: with noise, the coefficients come from the prior, and are right."""
+    ship = shipgym.load_model("mariner")
+    truth = np.array(list(ship.coefficients.values()))
+    run = zigzag(ship, 10, 10, duration=150, dt=0.1)
+    noisy = recorded(run, ship, 3.0, 0, "short")
+    settings = {"particulars": ship.particulars, "steering": ship.steering, "method": "ls"}
+    free = identify([noisy], **settings, guarded=False)
+    held = identify([noisy], **settings, prior="mariner", guarded=False)
+    size = np.maximum(np.abs(truth), 1e-5)
+    errors = [float(np.median(np.abs(np.array(values(r)) - truth) / size)) for r in (free, held)]
+    assert errors[1] < 0.05 < 1.0 < errors[0]
+
+
+def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Trial]) -> None:
+    result = fit(target, short_trials, prior="auto", prior_strength=1.0)
+    provenance = result.model.provenance or {}
+    assert (provenance["prior"], provenance["prior_source"]) == ("auto", "kvlcc2-l7")
+    assert provenance["prior_strength"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"structure": "cubic", "prior": "clarke"}, r"prior: 'clarke' found with structure 'cubic'"),
+        ({"structure": "nomoto", "prior": "kijima"}, r"prior: 'kijima' found with structure 'nomoto'"),
+        ({"prior": "titanic"}, r"titanic"),
+        ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
+        ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
+    ],
+)
+def test_what_does_not_fit_is_refused(
+    target: ShipModel, short_trials: list[Trial], settings: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        fit(target, short_trials, **settings)
+
+
+def test_formulas_need_the_rudder_area(target: ShipModel, short_trials: list[Trial]) -> None:
+    bare = replace(target, particulars=replace(target.particulars, rudder_area=None))
+    with pytest.raises(InputError, match="rudder_area is needed"):
+        fit(bare, short_trials, prior="clarke")
