@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import preprocess
-from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.machine import Machine
 from identification.samples import Samples
 from identification.uncertainty import residuals
 from shipgym.errors import InputError
@@ -139,13 +139,13 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
 
 
 def diagnose(
-    machines: Mapping[str, LSSVM | TruncatedLSSVM], samples: Samples, structure: Structure
+    machines: Mapping[str, Machine], samples: Samples, structure: Structure
 ) -> dict[str, EquationDiagnostics]:
     """Diagnostics of each equation.
 
     Parameters
     ----------
-    machines : mapping of str to LSSVM or TruncatedLSSVM
+    machines : mapping of str to Machine
         Fitted to `samples`, by equation.
     samples : Samples
         The regression.

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from identification.guard import STRENGTHS, hard_turn_features, reasons_unstable
-from identification.methods import Machine, Method, fit_all, fit_held
+from identification.machine import Machine
+from identification.methods import FitTask, Method, fit_held
 from identification.samples import Samples
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
@@ -24,7 +25,7 @@ class GuardedFit:
     ----------
     model : ShipModel
         With the identified coefficients.
-    machines : dict of str to LSSVM or TruncatedLSSVM
+    machines : dict of str to Machine
         By equation.
     stable : bool
         Whether the model passed the guard.
@@ -74,7 +75,7 @@ def guarded_fit(
         For settings that the method does not know.
     """
     try:
-        machines = fit_all(lambda: method.machine(**settings), samples)
+        machines = method.machines(settings, FitTask(samples, blank, trials))
     except TypeError as error:
         raise InputError(f"settings: {', '.join(settings)} found, method {method.name!r}: {error}") from None
     model = with_coefficients(blank, machines)

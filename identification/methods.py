@@ -2,19 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.machine import Machine
 from identification.samples import Samples
-from shipgym.errors import InputError
+from shipgym.checks import check_choice
+from shipgym.models import ShipModel
+from shipgym.trial import Trial
 
 Floats = NDArray[np.float64]
-Machine = LSSVM | TruncatedLSSVM
+Machines = dict[str, Machine]
+
+
+@dataclass(frozen=True, eq=False)
+class FitTask:
+    """All that a method may look at.
+
+    Attributes
+    ----------
+    samples : Samples
+        The regression of each equation.
+    blank : ShipModel
+        The model but for its coefficients.
+    trials : sequence of Trial
+        Those behind the samples.
+    """
+
+    samples: Samples
+    blank: ShipModel
+    trials: Sequence[Trial]
+
+
+def each_equation(make: Callable[[], Machine], task: FitTask) -> Machines:
+    """Fit one machine to each equation by itself."""
+    return fit_all(make, task.samples)
 
 
 @dataclass(frozen=True)
@@ -29,11 +57,19 @@ class Method:
         Makes an unfitted machine from settings.
     regularised : bool
         Whether the guard against models that run away may penalise it.
+    fit : callable
+        Fits machines, made by its first argument, to the task that is its second, and returns them by
+        equation. By default each equation by itself, from the samples alone.
     """
 
     name: str
     machine: Callable[..., Machine]
     regularised: bool
+    fit: Callable[[Callable[[], Machine], FitTask], Machines] = each_equation
+
+    def machines(self, settings: Mapping[str, Any], task: FitTask) -> Machines:
+        """Machines of all equations, fitted with the settings."""
+        return self.fit(partial(self.machine, **settings), task)
 
 
 def _least_squares(**settings: Any) -> Machine:
@@ -66,17 +102,15 @@ def get_method(name: str) -> Method:
     InputError
         If there is none of that name.
     """
-    if name not in METHODS:
-        raise InputError(f"method: {name!r} found, expected one of {', '.join(METHODS)}")
-    return METHODS[name]
+    return METHODS[check_choice(name, METHODS, "method")]
 
 
-def fit_all(machine: Callable[[], Machine], samples: Samples) -> dict[str, Machine]:
+def fit_all(machine: Callable[[], Machine], samples: Samples) -> Machines:
     """One machine for each equation, fitted."""
     return {q: machine().fit(samples.features[q], samples.targets[q]) for q in samples.features}
 
 
-def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> dict[str, Machine]:
+def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Machines:
     """Machines whose terms are held back by what they do in a hard turn.
 
     Ridge regression in which each feature is scaled by its size in a hard turn over a window: the

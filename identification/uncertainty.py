@@ -7,12 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.machine import Machine, weights
 from identification.samples import Samples
 from identification.threads import on_one_thread
 
 Floats = NDArray[np.float64]
-Machines = Mapping[str, LSSVM | TruncatedLSSVM]
+Machines = Mapping[str, Machine]
 
 
 def residuals(machines: Machines, samples: Samples) -> dict[str, Floats]:
@@ -28,10 +28,12 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
     of the residuals. Without memory they are independent in time (classical formula, with the
     covariance of the residuals between equations); with memory it is estimated as by Newey & West
     1987 (Econometrica 55(3)) with Bartlett's weights, each trial by itself. Exact features are assumed.
+    Of a machine that weights its samples it is the residuals times their weights that count (Huber's
+    sandwich).
 
     Parameters
     ----------
-    machines : mapping of str to LSSVM or TruncatedLSSVM
+    machines : mapping of str to Machine
         Fitted to `samples` without intercept, by equation.
     samples : Samples
         The regression.
@@ -43,7 +45,10 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
     array of shape (n_coefficients, n_coefficients)
         In the order of the equations and their features.
     """
-    errors = residuals(machines, samples)
+    errors = {
+        q: error * weights(machines[q], samples.features[q])
+        for q, error in residuals(machines, samples).items()
+    }
     freedom = {q: effective_freedom(machines[q], samples.features[q]) for q in machines}
     maps = {q: samples.features[q] @ machines[q].inverse_moment_ for q in machines}
     if memory <= 0.0:
@@ -66,9 +71,10 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
     return 0.5 * (total + total.T)
 
 
-def effective_freedom(machine: LSSVM | TruncatedLSSVM, features: Floats) -> float:
+def effective_freedom(machine: Machine, features: Floats) -> float:
     """Samples less effective number of parameters, at least 1."""
-    used = float(np.einsum("ij,ji->", machine.inverse_moment_, features.T @ features))
+    moment = features.T @ (features * weights(machine, features)[:, None])
+    used = float(np.einsum("ij,ji->", machine.inverse_moment_, moment))
     return max(len(features) - used, 1.0)
 
 

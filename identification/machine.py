@@ -1,0 +1,46 @@
+"""What every estimator offers that `identify` may fit to the regression of an equation."""
+
+from __future__ import annotations
+
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+
+class Machine(Protocol):
+    """A linear estimator in scikit-learn's manner.
+
+    Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the directions dropped),
+    `weights_` (of the samples; all equal where absent), `search_` (how settings were chosen) and
+    `chosen_` (the settings chosen, for the provenance).
+
+    Attributes
+    ----------
+    coef_ : array of shape (n_features,)
+        Coefficients of the features as given.
+    covariance_ : array of shape (n_features, n_features)
+        Of `coef_`, for exact features and independent errors.
+    inverse_moment_ : array of shape (n_features, n_features)
+        Regularised inverse M of X' W X: `coef_` is M X' W y with W the weights.
+    """
+
+    coef_: Floats
+    covariance_: Floats
+    inverse_moment_: Floats
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to features of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        ...
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of features of shape (n_samples, n_features)."""
+        ...
+
+
+def weights(machine: Machine, features: Floats) -> Floats:
+    """Weight of each sample, shape (n_samples,), 1 where the machine knows none."""
+    given: Floats | None = getattr(machine, "weights_", None)
+    return np.ones(len(features)) if given is None else given
