@@ -17,6 +17,7 @@ from identification.gear import estimated_gear
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
+from identification.refine import Refined, refine, split_settings
 from identification.samples import Samples, build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
@@ -138,8 +139,8 @@ def identify(
         that know the shaft speed.
     structure : str
         Terms of the model: a name of `shipgym.list_structures`.
-    method : {"tls-svm", "ls-svm", "ls"}
-        Truncated LS-SVM, LS-SVM, or least squares.
+    method : {"tls-svm", "ls-svm", "ls", "output-error"}
+        Truncated LS-SVM, LS-SVM, least squares, or refinement of a truncated LS-SVM by simulation.
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
@@ -161,7 +162,8 @@ def identify(
         Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
         is large in a hard turn and invisible in the data. The provenance tells what was done.
     **settings
-        Of the machine: `rank`, `selection`, `C`, `scale`.
+        Of the machine: `rank`, `selection`, `C`, `scale`; of "output-error" also those of
+        `refine.Refinement`.
 
     Returns
     -------
@@ -181,7 +183,10 @@ def identify(
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(ship["name"] if name is None else name, structure, ship, gear, shaft, used)
-    fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
+    refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
+    fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
+    refined = refine(fit, regression, used, refinement, _memory(ship)) if refinement else None
+    fit = refined.fit if refined else fit
     asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
     provenance = {
         "structure": structure,
@@ -191,7 +196,9 @@ def identify(
         "steering": "estimated" if steering is None else "given",
         **_origin(fit, regression, used),
     }
-    covariance = _covariance(fit, regression, blank)
+    if refined:
+        provenance["refinement"] = refined.report
+    covariance = _covariance(fit, regression, blank, refined)
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _judged(model, fit, regression, trials)
 
@@ -211,13 +218,20 @@ def _blank(
     )
 
 
-def _covariance(fit: GuardedFit, regression: Samples, blank: ShipModel) -> Floats:
+def _memory(ship: Particulars) -> float:
+    """Time over which errors are correlated, s."""
+    return float(MEMORY * ship["length"] / ship["speed"])
+
+
+def _covariance(fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None) -> Floats:
     """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
     ship = blank.particulars
-    memory = MEMORY * ship["length"] / ship["speed"]
+    if refined is None or refined.covariance is None:
+        covariance = joint_covariance(fit.machines, regression, _memory(ship))
+    else:
+        covariance = refined.covariance
     return coefficient_covariance(
-        joint_covariance(fit.machines, regression, memory),
-        blank.table.acceleration_matrix(ship, blank.service_shaft_speed),
+        covariance, blank.table.acceleration_matrix(ship, blank.service_shaft_speed)
     )
 
 
