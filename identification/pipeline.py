@@ -12,16 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
+from identification.bootstrap import bootstrap_covariance, influence_covariance
 from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
 from identification.gear import estimated_gear
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
+from identification.preprocess import repaired
 from identification.refine import Refined, refine, split_settings
 from identification.samples import Samples, build_samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
-from shipgym.checks import check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
 from shipgym.models import Envelope, ShipModel, Structure, get_structure
@@ -32,6 +34,7 @@ from shipgym.trial import Trial
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 Floats = NDArray[np.float64]
 
+UNCERTAINTIES = ("analytic", "bootstrap")
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
@@ -125,6 +128,9 @@ def identify(
     name: str | None = None,
     window: int | None = None,
     smooth: bool = True,
+    preprocessing: str | None = None,
+    repair: bool = False,
+    uncertainty: str = "analytic",
     guarded: bool = True,
     **settings: Any,
 ) -> IdentificationResult:
@@ -158,6 +164,13 @@ def identify(
         Sampling steps over which the velocities are integrated; see `samples.build_samples`.
     smooth : bool
         Whether noisy channels are smoothed first.
+    preprocessing : {"spline", "savgol", "median", "rts", "none"}, optional
+        How they are smoothed (`preprocess.smoothed_channels`); by default by splines.
+    repair : bool
+        Whether outliers are replaced and short dropouts filled first (`preprocess.repaired`).
+    uncertainty : {"analytic", "bootstrap"}
+        Where the covariance comes from: the formula for errors correlated over the time to sail one ship
+        length, or refits to blocks of that time drawn with replacement (`bootstrap`).
     guarded : bool
         Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
         is large in a hard turn and invisible in the data. The provenance tells what was done.
@@ -175,11 +188,12 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     chosen, table = get_method(method), get_structure(structure)
-    used = _used(trials)
+    check_choice(uncertainty, UNCERTAINTIES, "uncertainty")
+    used = [repaired(trial) if repair else trial for trial in _used(trials)]
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     shaft = _shaft_speed(service_shaft_speed, used, table)
-    regression = build_samples(used, table, ship, samples, window, steering, smooth, shaft)
+    regression = build_samples(used, table, ship, samples, window, steering, preprocessing or smooth, shaft)
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(ship["name"] if name is None else name, structure, ship, gear, shaft, used)
@@ -187,7 +201,9 @@ def identify(
     fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
     refined = refine(fit, regression, used, refinement, _memory(ship)) if refinement else None
     fit = refined.fit if refined else fit
-    asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
+    asked = {"window": window, "smooth": smooth, "guarded": guarded, **of_machine}
+    if preprocessing is not None:
+        asked["preprocessing"] = preprocessing
     provenance = {
         "structure": structure,
         "method": method,
@@ -198,7 +214,9 @@ def identify(
     }
     if refined:
         provenance["refinement"] = refined.report
-    covariance = _covariance(fit, regression, blank, refined)
+    if uncertainty != "analytic":
+        provenance["uncertainty"] = uncertainty
+    covariance = _covariance(fit, regression, blank, refined, uncertainty)
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _judged(model, fit, regression, trials)
 
@@ -223,11 +241,17 @@ def _memory(ship: Particulars) -> float:
     return float(MEMORY * ship["length"] / ship["speed"])
 
 
-def _covariance(fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None) -> Floats:
+def _covariance(
+    fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None, uncertainty: str
+) -> Floats:
     """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
     ship = blank.particulars
+    memory, bootstrap = _memory(ship), uncertainty == "bootstrap"
     if refined is None or refined.covariance is None:
-        covariance = joint_covariance(fit.machines, regression, _memory(ship))
+        by_machines = bootstrap_covariance if bootstrap else joint_covariance
+        covariance = by_machines(fit.machines, regression, memory)
+    elif bootstrap:
+        covariance = influence_covariance(refined.influences, max(round(memory / refined.width), 1))
     else:
         covariance = refined.covariance
     return coefficient_covariance(
@@ -244,7 +268,9 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
-            {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
+            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
+            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
+            for trial in used
         ],
     }
 

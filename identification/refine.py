@@ -98,16 +98,19 @@ class Refined:
         As the start, with the refined model.
     covariance : array of shape (n_coefficients, n_coefficients) or None
         Of the coefficients of the accelerations; None where the start stayed.
-    influence : array of shape (n_segments, n_coefficients) or None
-        By how much each segment of the trials moved those coefficients, for the block bootstrap.
+    influences : list of array of shape (n_stretches, n_coefficients)
+        By trial: by how much stretches of time moved those coefficients, for the bootstrap.
     report : dict
         For the provenance: settings, cost before and after, scales, offsets, decision.
+    width : float
+        Of the stretches, s.
     """
 
     fit: GuardedFit
     covariance: Floats | None
-    influence: Floats | None
+    influences: list[Floats]
     report: dict[str, Any]
+    width: float = 0.0
 
 
 def refine(
@@ -139,7 +142,7 @@ def refine(
     """
     problem = _Problem(start, samples, trials, settings)
     if not start.stable or not problem.finite():
-        return Refined(start, None, None, settings.plain() | {"decision": "not refined: the start runs away"})
+        return Refined(start, None, [], settings.plain() | {"decision": "not refined: the start runs away"})
     rejected: list[dict[str, Any]] = []
     prior = settings.prior
     for _ in range(ATTEMPTS):
@@ -148,13 +151,16 @@ def refine(
         reasons = reasons_unstable(model, trials)
         if not reasons:
             fit = replace(start, model=model, machines=problem.machines(solution.parameters))
-            covariance, influence = problem.covariance(solution, prior, memory)
+            covariance, influences = problem.covariance(solution, prior, memory)
             report = settings.plain() | problem.report(solution) | {"decision": "refined", "prior": prior}
-            return Refined(fit, covariance, influence, report | ({"rejected": rejected} if rejected else {}))
+            report |= {"rejected": rejected} if rejected else {}
+            return Refined(
+                fit, covariance, influences, report, stretch(model, solution.segments[: problem.own])
+            )
         rejected.append({"prior": prior, "reasons": reasons})
         prior = max(prior * STRONGER, 1e-9)
     report = settings.plain() | {"decision": "not refined: it runs away", "rejected": rejected}
-    return Refined(start, None, None, report)
+    return Refined(start, None, [], report)
 
 
 @dataclass(frozen=True, eq=False)
@@ -286,8 +292,8 @@ class _Problem:
             first = last
         return machines
 
-    def covariance(self, solution: _Solution, prior: float, memory: float) -> tuple[Floats, Floats]:
-        """Sandwich covariance of the coefficients of the accelerations, and each segment's influence.
+    def covariance(self, solution: _Solution, prior: float, memory: float) -> tuple[Floats, list[Floats]]:
+        """Sandwich covariance of the coefficients of the accelerations, and each stretch's influence.
 
         Scores are added up over the samples of the same time, which the staggered set has twice, and over
         time as by Newey & West 1987. Extra trials and the prior count as known.
@@ -296,8 +302,9 @@ class _Problem:
         weights = self._prior_weights(prior, solution.segments)
         jacobian = shooting.jacobian
         inverse = np.linalg.pinv(jacobian.T @ jacobian + np.diag(weights**2), rcond=1e-14, hermitian=True)
-        travel = self.start.model.particulars["length"] / self.start.model.particulars["speed"]
-        scores, by_segment = _scores(shooting, solution.segments[: self.own], BLOCK * travel)
+        segments = solution.segments[: self.own]
+        width = stretch(self.start.model, segments)
+        scores = _scores(shooting, segments, width)
         rows = shooting.rows[self.own - 1].stop
         times = 2.0 if self.settings.staggered else 1.0
         used = float(np.einsum("ij,jk,ik->", jacobian[:rows], inverse, jacobian[:rows]))
@@ -305,10 +312,10 @@ class _Problem:
         factor = (rows / times) / max(rows / times - used, 1.0)
         total = np.zeros_like(inverse)
         for score in scores:
-            total += newey_west(score, round(memory / (BLOCK * travel)))
+            total += newey_west(score, round(memory / width))
         cov = (factor * inverse @ total @ inverse)[:n_terms, :n_terms] * np.outer(self.sizes, self.sizes)
-        influence = -np.sqrt(factor) * (by_segment @ inverse)[:, :n_terms] * self.sizes
-        return 0.5 * (cov + cov.T), influence
+        influences = [-np.sqrt(factor) * (score @ inverse)[:, :n_terms] * self.sizes for score in scores]
+        return 0.5 * (cov + cov.T), influences
 
     def report(self, solution: _Solution) -> dict[str, Any]:
         """For the provenance."""
@@ -324,6 +331,12 @@ class _Problem:
         }
 
 
+def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:
+    """Width of the bins of time in which residuals are added up, s: a block, or a sampling step."""
+    steps = [float(np.median(np.diff(s.times))) for s in segments if len(s.times) > 1]
+    return float(max(BLOCK * model.particulars["length"] / model.particulars["speed"], *steps, 0.0))
+
+
 def _term_sizes(samples: Samples, equation: str) -> Floats:
     """Coefficients whose terms would make up the whole change of a velocity, shape (n_terms,)."""
     whole = np.sqrt(np.mean(samples.targets[equation] ** 2))
@@ -331,23 +344,15 @@ def _term_sizes(samples: Samples, equation: str) -> Floats:
     return np.asarray(whole / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny)
 
 
-def _scores(shooting: Shooting, segments: Sequence[Segment], width: float) -> tuple[list[Floats], Floats]:
-    """Scores of each trial in bins of time, arrays of shape (n_bins, n), and of each segment."""
+def _scores(shooting: Shooting, segments: Sequence[Segment], width: float) -> list[Floats]:
+    """Scores of each trial in bins of time, arrays of shape (n_bins, n_parameters)."""
     size = shooting.jacobian.shape[1]
-    by_segment = np.zeros((len(segments), size))
     bins: dict[int, dict[int, Floats]] = {}
-    for k, segment in enumerate(segments):
-        rows = shooting.rows[k]
+    for segment, rows in zip(segments, shooting.rows, strict=False):
         scores = shooting.jacobian[rows] * shooting.residuals[rows][:, None]
         blocks = scores.reshape(len(segment.times), -1, size).sum(axis=1)
-        by_segment[k] = blocks.sum(axis=0)
         own = bins.setdefault(segment.trial, {})
-        width = max(width, float(np.median(np.diff(segment.times))) if len(segment.times) > 1 else width)
         for index, block in zip(np.floor(segment.times / width).astype(int).tolist(), blocks, strict=True):
             own[index] = own.get(index, np.zeros(size)) + block
-    scores_of_trials = []
-    for own in bins.values():
-        low, high = min(own), max(own)
-        empty = np.zeros(size)
-        scores_of_trials.append(np.array([own.get(i, empty) for i in range(low, high + 1)]))
-    return scores_of_trials, by_segment
+    empty = np.zeros(size)
+    return [np.array([own.get(i, empty) for i in range(min(own), max(own) + 1)]) for own in bins.values()]

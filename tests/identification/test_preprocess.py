@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from identification.preprocess import _Reinsch, noise_level, smooth
+from identification.preprocess import noise_level, smooth
+from identification.preprocess.spline import Reinsch
 
 
 def signal(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -35,5 +36,5 @@ def test_smoothing_takes_away_more_than_half_of_the_noise() -> None:
 def test_smoothing_spline_is_that_of_scipy() -> None:
     t, _, values = signal(0.05)
     np.testing.assert_allclose(
-        _Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
+        Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
     )
