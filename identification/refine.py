@@ -20,7 +20,7 @@ from scipy.optimize import least_squares
 from identification.guard import reasons_unstable
 from identification.guarded_fit import GuardedFit
 from identification.samples import Samples
-from identification.segments import BLOCK, Segment, Shooter, Shooting, compared_channels, cut
+from identification.segments import BLOCK, Segment, Shooter, Shooting, about_mean, compared_channels, cut
 from identification.uncertainty import newey_west
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -53,7 +53,8 @@ class Refinement:
         Strength of the pull toward the start: relative cost of a coefficient whose term changes by the whole
         acceleration (root mean squares over the trials).
     rudder_offsets : bool
-        Whether each trial has a rudder offset of its own, known beforehand to a degree.
+        Whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
+        the mean of them: its own terms tell the neutral helm.
     extra_trials : sequence of Trial
         Further trials that the refinement alone sees, such as turns of a reference ship.
     extra_weight : float
@@ -252,8 +253,8 @@ class _Problem:
                 jacobian,
                 method="trf",
                 x_scale="jac",
-                ftol=1e-8,
-                xtol=1e-8,
+                ftol=1e-6,
+                xtol=1e-6,
                 max_nfev=30,
             )
             evaluations += found.nfev
@@ -320,7 +321,7 @@ class _Problem:
     def report(self, solution: _Solution) -> dict[str, Any]:
         """For the provenance."""
         names = [trial.name for trial in self.trials]
-        offsets = np.degrees(solution.parameters[len(self.sizes) :]).tolist()
+        offsets = np.degrees(about_mean(solution.parameters[len(self.sizes) :])).tolist()
         return {
             "segments": self.own,
             "cost_before": solution.costs[0],

@@ -221,7 +221,8 @@ class Shooter:
         Parameters
         ----------
         parameters : array of shape (n_coefficients + n_trials,)
-            Coefficients by `term_sizes`, then offsets of the rudder, rad (where there are any).
+            Coefficients by `term_sizes`, then offsets of the rudder, rad (where there are any), of which only
+            the differences from their mean matter.
         segments : sequence of Segment
         scales : array of shape (n_channels,)
             Residuals that count as 1.
@@ -235,8 +236,10 @@ class Shooter:
         """
         residuals, jacobians, moves, rows = [], [], [], []
         n_terms, at = len(self.sizes), 0
+        offsets = about_mean(parameters[n_terms:])
+        shares = about_mean(np.eye(len(offsets)))
         for segment in segments:
-            offset = parameters[n_terms + segment.trial] if self._has_offset(segment, n_trials) else 0.0
+            offset = offsets[segment.trial] if self._has_offset(segment, n_trials) else 0.0
             nominal, slopes = self._slopes(parameters[:n_terms], offset, segment)
             counts = np.diff(segment.blocks, append=len(segment.measured))
             factor = np.sqrt(segment.weight * counts)[:, None] / scales
@@ -247,7 +250,7 @@ class Shooter:
             jacobian = np.zeros((len(value), len(parameters)))
             jacobian[:, :n_terms] = slope[:, :n_terms]
             if self._has_offset(segment, n_trials):
-                jacobian[:, n_terms + segment.trial] = slope[:, n_terms]
+                jacobian[:, n_terms:] = np.outer(slope[:, n_terms], shares[segment.trial])
             residuals.append(value)
             jacobians.append(jacobian)
             moves.append(move)
@@ -292,8 +295,14 @@ class Shooter:
             self.sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
             found = out.reshape(len(out), layout.N_STATE, layout.LANES)[:, self.columns]
             nominal = found[:, :, 0]
-            slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP
+            with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+                slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP
         return nominal, slopes
+
+
+def about_mean(values: Floats) -> Floats:
+    """Values less their mean along the first axis."""
+    return values - values.mean(axis=0) if len(values) else values
 
 
 def _averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
