@@ -87,7 +87,7 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     transitions = _integrators(h)
     observation = np.eye(3)[[HEADING.index(name) for name in names]]
     start = np.array([trial[name][0] if name in trial else 0.0 for name in HEADING] + [0.0])
-    spread = np.array([1.0, 1e-2, 1.0]) if "psi" in trial else np.array([0.0, 1e-2, 1.0])
+    spread = np.array([1.0, 1e-2, 1.0])
     measured = np.column_stack([trial[name] for name in names])
     variances = _variances(trial, names)
 
@@ -108,15 +108,16 @@ def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]
     if not _noisy(trial, names) and not current:
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
-    transitions = _plane_transitions(h, psi, current)
-    observation = np.eye(8)[[PLANE.index(name) for name in names]]
-    start = np.zeros(8)
+    size = 8 if current else 6
+    transitions = _plane_transitions(h, psi, current)[:, :size, :size]
+    observation = np.eye(size)[[PLANE.index(name) for name in names]]
+    start = np.zeros(size)
     start[:4] = [trial[name][0] if name in trial else 0.0 for name in PLANE]
-    spread = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2 if current else 0.0] * 2)
+    spread = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2] * 2)[:size]
     measured = np.column_stack([trial[name] for name in names])
     variances = _variances(trial, names)
     walk = _random_walk(h)
-    shape = np.zeros((len(h), 8, 8))
+    shape = np.zeros((len(h), size, size))
     for first in (2, 3):
         axes = np.array([first, first + 2])
         shape[:, axes[:, None], axes] = walk[:, 1:, 1:]
@@ -130,7 +131,7 @@ def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]
 
     states = _at_best_roughness(run, len(psi), _first_guess(trial, "u" if "u" in trial else "x")).states
     columns = (*PLANE, "udot", "vdot", "current_north", "current_east")
-    return dict(zip(columns, states.T, strict=True))
+    return dict(zip(columns, states.T, strict=False))
 
 
 def _at_best_roughness(run: Callable[[float, slice, bool], Smoothed], n: int, guess: float) -> Smoothed:
