@@ -138,36 +138,41 @@ def trials_command(
     out: Annotated[
         Path | None, typer.Option(metavar="PLOTS.HTML", help="Write figures to this file.")
     ] = None,
+    draws: Annotated[
+        int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
+    ] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
     as_json: Json = False,
 ) -> None:
-    """Put a model through zigzags and turning circles and judge it by the IMO criteria."""
-    from dataclasses import asdict
+    """Put a model through the standard manoeuvres and judge it by the IMO criteria.
 
-    from agents.standard_trials import check_page, criteria_of, standard_trials, write_page
-    from agents.terminal import criteria_table, manoeuvre_table, print_json
+    Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
+    indices of an identified model come with their 95 % intervals.
+    """
+    from agents.standard_trials import check_page, standard_trials, write_page
+    from agents.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
     from agents.terminal import out as console
     from shipgym.models import load_model
 
     ship = load_model(model)
     if out is not None:
         check_page(out)
-    runs = standard_trials(ship)
-    criteria = criteria_of(ship)
+    with progress_bars(not as_json) as progress:
+        tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
+        found = standard_trials(ship, draws, seed, tell)
     if out is not None:
-        write_page(ship, runs, criteria, out)
-    indices = {name: run.indices for name, run in runs.items()}
+        write_page(ship, found, out)
     if as_json:
-        print_json(
-            {
-                "model": ship.name,
-                "manoeuvres": indices,
-                "imo": {name: asdict(criterion) for name, criterion in criteria.items()},
-            }
-        )
+        print_json({"model": ship.name, "seed": seed, **found.to_dict()})
         return
-    console.print(manoeuvre_table(indices))
+    console.print(manoeuvre_table(found.indices))
     console.print()
-    console.print(criteria_table(criteria))
+    console.print(criteria_table(found.criteria))
+    for name, criterion in found.criteria.items():
+        if criterion.note:
+            console.print(f"{name}: {criterion.note}", soft_wrap=True)
+    for name, reason in found.refused.items():
+        warn(f"no {name}: {reason}")
     if out is not None:
         console.print(f"\nwritten: {out}", soft_wrap=True)
 
@@ -212,9 +217,7 @@ def autopilot_command(
         found = result.verification.manoeuvres
         console.print(prediction_table(result.identification))
         console.print()
-        nominal = {name: spread.nominal for name, spread in found.criteria.items()}
-        passing = {name: spread.probability for name, spread in found.criteria.items()}
-        console.print(criteria_table(nominal, passing))
+        console.print(criteria_table(found.criteria))
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
         console.print(ranking_table(result))
         console.print()
@@ -226,6 +229,44 @@ def autopilot_command(
         warn(f"no {name.upper()} autopilot: {reason}")
     if not as_json:
         console.print(f"report: {report}", soft_wrap=True)
+
+
+@app.command("reproduce")
+@answered
+def reproduce_command(
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020 or all.")
+    ],
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
+
+    Exits with 1 if an aim is missed.
+    """
+    from agents.reproduction import missed, page, papers_of, reproduce, terminal_table
+    from agents.terminal import err, print_json
+    from agents.terminal import out as console
+    from shipgym.whole_file import write_text
+
+    names = papers_of(paper)
+    with err.status("starting") as status:
+        results = reproduce(names, tell=status.update)
+    if markdown is not None:
+        write_text(page(results), markdown)
+    if as_json:
+        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
+    else:
+        for name, rows in results.items():
+            console.print(terminal_table(name, rows))
+            console.print()
+        if markdown is not None:
+            console.print(f"written: {markdown}", soft_wrap=True)
+    late = missed(results)
+    if late:
+        _fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
 
 
 @app.command("doctor")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from shipgym.envs.course_keeping_task import RATE_WEIGHT
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
-from shipgym.models.linear import StraightRunning, linearise, straight_running
+from shipgym.models.linear import StraightRunning, linearise, nomoto_of, straight_running
 
 Floats = NDArray[np.float64]
 
@@ -95,16 +95,19 @@ def rate_weight(model: ShipModel) -> float:
     return float(RATE_WEIGHT * length_time(model) ** 2 + (FULL_RATE_ERROR / model.steering.rate) ** 2)
 
 
-def sample_ship(model: ShipModel, dt: float) -> SampledShip:
+def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> SampledShip:
     """The linearised ship with its steering gear, sampled with the command held (zero-order hold).
 
-    A gear without lag is taken to reach its order within the interval.
+    A gear without lag is taken to reach its order within the interval. Of a table with a memory of yaw the
+    memory stands in the place of sway.
 
     Parameters
     ----------
     model : ShipModel
     dt : float
         Control interval, s.
+    first_order : bool
+        Whether yaw is reduced to K / (1 + T s), without sway or memory.
 
     Returns
     -------
@@ -119,6 +122,10 @@ def sample_ship(model: ShipModel, dt: float) -> SampledShip:
 
     about = straight_running(model)
     steering, rudder = linearise(model, about)
+    if first_order:
+        form = nomoto_of(steering, rudder)
+        steering = np.diag([-1.0 / length_time(model), -1.0 / form.T])
+        rudder = np.array([[0.0], [form.rudder_effect]])
     lag = model.steering.time_constant
     n = RUDDER + 1
     A, B = np.zeros((n, n)), np.zeros((n, 1))

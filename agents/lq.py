@@ -47,7 +47,8 @@ class LQ(Controller):
         """Design on a model, about straight running.
 
         The weights are those of the environment's reward, with that of the rudder rate raised for the
-        gear's limit (`rate_weight`). The reward has none on the integral of the error; it is given the one
+        gear's limit (`rate_weight`). A ship with a memory of yaw, which nothing measures, is designed for as
+        one of first order. The reward has none on the integral of the error; it is given the one
         with which an offset decays over about `integral_lengths` ship lengths, at hardly any cost.
 
         Parameters
@@ -72,7 +73,8 @@ class LQ(Controller):
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         ship = sample_ship(model, interval)
         weight = rate_weight(model)
-        gain = lq_gain(ship, weight, integral_lengths * length_time(model))
+        reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
+        gain = lq_gain(reduced, weight, integral_lengths * length_time(model))
         return cls.designed(
             model,
             ship,

@@ -45,6 +45,9 @@ TITLES = {
     "imo": "IMO criteria",
     "zigzags": "Zigzags",
     "circles": "Turning circles",
+    "spirals": "Spirals",
+    "pull-outs": "Pull-outs",
+    "stops": "Stopping and acceleration",
 }
 
 
@@ -173,11 +176,11 @@ def card(label: str, value: object, detail: object) -> Html:
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
     criteria = found.manoeuvres.criteria
-    missed = [CRITERIA[name].lower() for name, spread in criteria.items() if not spread.nominal.passed]
+    missed = [CRITERIA[name].lower() for name, spread in criteria.items() if not spread.passed]
     unsure = [
         CRITERIA[name].lower()
         for name, spread in criteria.items()
-        if spread.nominal.passed and spread.probability < SURE
+        if spread.passed and (spread.share_passed or 0.0) < SURE
     ]
     imo = f"The model is stable but misses the IMO criterion of {', '.join(missed)}."
     if not missed:
@@ -199,7 +202,9 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
     """The box on top: ship, data, quality of the fit, IMO criteria, best autopilot."""
     best = found.pilots[0]
     spreads = found.manoeuvres.criteria.values()
-    doubts = any(spread.probability < SURE for spread in spreads) or bool(found.manoeuvres.unstable.any())
+    doubts = any((spread.share_passed or 0.0) < SURE for spread in spreads) or bool(
+        found.manoeuvres.unstable.any()
+    )
     lost = bool(np.any(best.flights.terminated))
     cards = [
         ship_card(result),
@@ -276,10 +281,11 @@ def quality_card(result: AutopilotResult) -> Html:
 def imo_card(found: Verification) -> Html:
     """The criteria that pass, and the least certain one."""
     spreads = found.manoeuvres.criteria
-    sure = sum(spread.probability >= SURE for spread in spreads.values())
-    least = min(spreads, key=lambda name: spreads[name].probability)
+    sure = sum((spread.share_passed or 0.0) >= SURE for spread in spreads.values())
+    least = min(spreads, key=lambda name: spreads[name].share_passed or 0.0)
     detail = Html(
-        f"pass with at least 95 %; lowest: {CRITERIA[least].lower()}, {percent(spreads[least].probability)}"
+        f"pass with at least 95 %; lowest: {CRITERIA[least].lower()}, "
+        f"{percent(spreads[least].share_passed or 0.0)}"
     )
     return card("IMO criteria", f"{sure} of {len(spreads)}", detail)
 

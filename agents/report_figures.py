@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.spread import CriterionSpread, ManoeuvreSpread
+from agents.spread import ManoeuvreSpread
+from shipgym.manoeuvres import Criterion
 from shipgym.plots import (
     AXES,
     GRID,
@@ -21,7 +22,9 @@ from shipgym.plots import (
     compact,
     graph_objects,
     layout,
+    line,
     subplots,
+    translucent,
 )
 from shipgym.trial import Trial
 
@@ -42,21 +45,8 @@ CRITERIA = {
     "overshoot_1_10_10": "First overshoot (10/10)",
     "overshoot_2_10_10": "Second overshoot (10/10)",
     "overshoot_1_20_20": "First overshoot (20/20)",
+    "stopping": "Track reach, full astern stop",
 }
-
-
-def translucent(colour: str, opacity: float) -> str:
-    """A colour "#rrggbb" with an opacity, as CSS knows it."""
-    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    return f"rgba({red},{green},{blue},{opacity})"
-
-
-def line(x: Any, y: Any, name: str, colour: str, width: float = 1.9, **more: Any) -> Any:
-    """A line that appears once in the legend whatever the number of panels."""
-    return graph_objects().Scatter(
-        x=compact(x), y=compact(y), name=name, legendgroup=name, mode="lines",
-        line={"color": colour, "width": width}, **more,
-    )  # fmt: skip
 
 
 def band(t: Floats, values: Floats, name: str, colour: str, showlegend: bool = False) -> list[Any]:
@@ -149,13 +139,14 @@ def _add_paths(figure: Figure, measured: Trial, predicted: Trial | None) -> None
         figure.update_yaxes(axis(aside_axis, autorange="reversed"), **place)
 
 
-def criteria_figure(criteria: Mapping[str, CriterionSpread]) -> Figure:
+def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     """Each criterion of every draw as a share of its limit, one row each, the limit at 100 per cent."""
     go = graph_objects()
     figure = go.Figure()
     jitter = np.random.default_rng(0)
     for row, spread in enumerate(criteria.values()):
-        share = 100.0 * spread.values[np.isfinite(spread.values)] / spread.nominal.limit
+        values = np.empty(0) if spread.drawn is None else spread.drawn.values
+        share = 100.0 * values[np.isfinite(values)] / spread.limit
         heights = row + jitter.uniform(-0.22, 0.22, len(share))
         figure.add_trace(
             go.Scatter(
@@ -164,8 +155,8 @@ def criteria_figure(criteria: Mapping[str, CriterionSpread]) -> Figure:
                 marker={"color": translucent(MODEL, 0.3), "size": 5},
             )
         )  # fmt: skip
-        if spread.nominal.value is not None:
-            nominal = [100.0 * spread.nominal.value / spread.nominal.limit] * 2
+        if spread.value is not None:
+            nominal = [100.0 * spread.value / spread.limit] * 2
             figure.add_trace(
                 line(
                     nominal, [row - 0.32, row + 0.32], "identified model", MEASURED, 2.2, showlegend=row == 0

@@ -85,17 +85,16 @@ def criteria_table(found: Verification) -> Html:
     """One row for each criterion."""
     rows = []
     for name, spread in found.manoeuvres.criteria.items():
-        nominal = spread.nominal
-        low, high = spread.quantiles(*BAND)
+        low, high = (None, None) if spread.drawn is None else spread.drawn.quantiles(*BAND)
         rows.append(
             [
-                Html(f"{CRITERIA[name]}<br><span class=sub>{html(nominal.source)}</span>"),
-                badge("passes", "good") if nominal.passed else badge("fails", "bad"),
-                fixed(nominal.value, 2),
+                Html(f"{CRITERIA[name]}<br><span class=sub>{html(spread.source)}</span>"),
+                badge("passes", "good") if spread.passed else badge("fails", "bad"),
+                fixed(spread.value, 2),
                 Html(f"{fixed(low, 2)} to {fixed(high, 2)}"),
-                Html(f"≤ {fixed(nominal.limit, 1)}"),
-                nominal.unit,
-                probability(spread.probability),
+                Html(f"≤ {fixed(spread.limit, 1)}"),
+                spread.unit,
+                probability(spread.share_passed or 0.0),
             ]
         )
     return table(
@@ -110,7 +109,8 @@ def criteria_table(found: Verification) -> Html:
         ],
         rows,
         text_columns=2,
-        caption="The worse of both sides. Stopping ability (5.3.4) needs an engine astern and is not judged.",
+        caption="The worse of both sides. Stopping ability (5.3.4) is judged where the ship's equations "
+        "hold for a shaft astern.",
     )
 
 

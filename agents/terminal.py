@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from agents.autopilot import Progress
     from agents.autopilot_result import AutopilotResult
     from identification import IdentificationResult
-    from shipgym.manoeuvres import Criterion
+    from shipgym.manoeuvres import Criterion, IndexInterval
 
 WIDTH_WITHOUT_TERMINAL = 110
 
@@ -26,7 +26,7 @@ out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITH
 err = Console(stderr=True, highlight=False)
 
 
-def _table(title: str) -> Table:
+def plain_table(title: str) -> Table:
     """A table without lines, its title to the left."""
     return Table(
         title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
@@ -82,7 +82,7 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
 
 def prediction_table(result: IdentificationResult) -> Table:
     """Errors of the open-loop simulation of each trial, and its indices."""
-    table = _table("Open-loop simulation of the trials: root mean square errors")
+    table = plain_table("Open-loop simulation of the trials: root mean square errors")
     table.add_column("trial", overflow="fold")
     table.add_column("use")
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
@@ -111,43 +111,66 @@ def _indices(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def manoeuvre_table(rows: Mapping[str, Mapping[str, float | None]]) -> Table:
-    """Indices of manoeuvres, one line each."""
-    table = _table("Manoeuvres from service speed in deep water")
+def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]]) -> Table:
+    """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
+    drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
+    table = plain_table("Manoeuvres from service speed in deep water")
     table.add_column("manoeuvre")
     table.add_column("index")
     table.add_column("value", justify="right")
+    if drawn:
+        table.add_column("95 % interval", justify="right")
+        table.add_column("draws without value", justify="right")
     for manoeuvre, indices in rows.items():
-        for k, (name, value) in enumerate(indices.items()):
-            table.add_row(manoeuvre if k == 0 else "", name, _number(value, 2))
+        for k, (name, index) in enumerate(indices.items()):
+            cells = [manoeuvre if k == 0 else "", name, _number(index.value, 2)]
+            if drawn:
+                cells += [_interval(index.interval), str(index.n_ran_away + index.n_never_reached)]
+            table.add_row(*cells)
     return table
 
 
-def criteria_table(
-    criteria: Mapping[str, Criterion], probabilities: Mapping[str, float] | None = None
-) -> Table:
-    """IMO criteria, with the probability of passing where it is known."""
-    table = _table("IMO criteria, resolution MSC.137(76)")
+def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
+    """IMO criteria, with interval and probability of passing where there are models drawn."""
+    drawn = any(criterion.share_passed is not None for criterion in criteria.values())
+    table = plain_table("IMO criteria, resolution MSC.137(76)")
     table.add_column("criterion")
-    for heading in ("value", "limit"):
+    for heading in ("value", *(["95 % interval"] if drawn else []), "limit"):
         table.add_column(heading, justify="right")
     for heading in ("unit", "verdict"):
         table.add_column(heading)
-    if probabilities is not None:
-        table.add_column("probability of passing", justify="right")
+    if drawn:
+        table.add_column("draws that pass", justify="right")
+    table.add_column("paragraph")
     for name, criterion in criteria.items():
-        verdict = "[green]passes[/]" if criterion.passed else "[red]fails[/]"
-        cells = [name, _number(criterion.value, 2), _number(criterion.limit, 2), criterion.unit, verdict]
-        if probabilities is not None:
-            cells.append(f"{100.0 * probabilities[name]:.1f} %")
-        table.add_row(*cells)
+        cells = [
+            _number(criterion.value, 2),
+            _number(criterion.limit, 2),
+            criterion.unit,
+            _verdict(criterion),
+        ]
+        if drawn:
+            cells.insert(1, _interval(criterion.interval))
+            share = criterion.share_passed
+            cells.append("-" if share is None else f"{100.0 * share:.1f} %")
+        table.add_row(name, *cells, criterion.source.rpartition(" ")[2])
     return table
+
+
+def _verdict(criterion: Criterion) -> str:
+    if criterion.passed is None:
+        return "not assessable"
+    return "[green]passes[/]" if criterion.passed else "[red]fails[/]"
+
+
+def _interval(interval: tuple[float, float] | None) -> str:
+    return "-" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
 def ranking_table(result: AutopilotResult) -> Table:
     """Autopilots over the models drawn, the best first."""
     metrics = result.metrics
-    table = _table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
+    table = plain_table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
     table.add_column("autopilot")
     headings = (
         "cost, mean", "cost, 95 %", "heading rmse, deg", "rudder, deg/min", "gain margin",

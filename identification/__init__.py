@@ -6,20 +6,93 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from identification.cross_validation import cross_validate
+    from identification.experiment import Advice, advise
+    from identification.following import Course, follow
+    from identification.forces import ForceRegression, force_regression, identify_forces
     from identification.lssvm import LSSVM, TruncatedLSSVM
     from identification.pipeline import IdentificationResult, identify
+    from identification.polynomial import polynomial_coefficients
+    from identification.recursive import (
+        MultiInnovationLeastSquares,
+        RecursiveLeastSquares,
+        StochasticGradient,
+    )
+    from identification.reduction import Reduction, backward_elimination, forward_selection, sensitivity
     from identification.samples import Samples, build_samples
+    from identification.tuning import (
+        ArtificialBeeColony,
+        DifferentialEvolution,
+        GridSearch,
+        ParticleSwarm,
+        SearchResult,
+        TunedLSSVM,
+        minimise,
+    )
 
 _HOME = {
-    "LSSVM": "identification.lssvm",
+    "Advice": "identification.experiment",
+    "ArtificialBeeColony": "identification.tuning",
+    "Course": "identification.following",
+    "DifferentialEvolution": "identification.tuning",
+    "ForceRegression": "identification.forces",
+    "GridSearch": "identification.tuning",
     "IdentificationResult": "identification.pipeline",
+    "LSSVM": "identification.lssvm",
+    "MultiInnovationLeastSquares": "identification.recursive",
+    "ParticleSwarm": "identification.tuning",
+    "RecursiveLeastSquares": "identification.recursive",
+    "Reduction": "identification.reduction",
     "Samples": "identification.samples",
+    "SearchResult": "identification.tuning",
+    "StochasticGradient": "identification.recursive",
     "TruncatedLSSVM": "identification.lssvm",
+    "TunedLSSVM": "identification.tuning",
+    "advise": "identification.experiment",
+    "backward_elimination": "identification.reduction",
     "build_samples": "identification.samples",
+    "cross_validate": "identification.cross_validation",
+    "follow": "identification.following",
+    "force_regression": "identification.forces",
+    "forward_selection": "identification.reduction",
     "identify": "identification.pipeline",
+    "identify_forces": "identification.forces",
+    "minimise": "identification.tuning",
+    "polynomial_coefficients": "identification.polynomial",
+    "sensitivity": "identification.reduction",
 }
 
-__all__ = ["LSSVM", "IdentificationResult", "Samples", "TruncatedLSSVM", "build_samples", "identify"]
+__all__ = [
+    "LSSVM",
+    "Advice",
+    "ArtificialBeeColony",
+    "Course",
+    "DifferentialEvolution",
+    "ForceRegression",
+    "GridSearch",
+    "IdentificationResult",
+    "MultiInnovationLeastSquares",
+    "ParticleSwarm",
+    "RecursiveLeastSquares",
+    "Reduction",
+    "Samples",
+    "SearchResult",
+    "StochasticGradient",
+    "TruncatedLSSVM",
+    "TunedLSSVM",
+    "advise",
+    "backward_elimination",
+    "build_samples",
+    "cross_validate",
+    "follow",
+    "force_regression",
+    "forward_selection",
+    "identify",
+    "identify_forces",
+    "minimise",
+    "polynomial_coefficients",
+    "sensitivity",
+]
 
 
 def __getattr__(name: str) -> Any:

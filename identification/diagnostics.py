@@ -77,6 +77,11 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     InputError
         For no trial, a missing channel, times that nearly coincide, or rudders that never move.
     """
+    if structure.captive:
+        raise InputError(
+            f"structure: '{structure.name}' found, which is identified from captive tests with the channels "
+            "X, Y, N, expected one for free-running trials; use identification.identify_forces"
+        )
     if not trials:
         raise InputError(
             'trials: none is marked use = "fit", expected at least one; mark the trials to identify from'
@@ -128,7 +133,7 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
     InputError
         Naming the shortest trial.
     """
-    terms = max(len(structure.terms(q)) for q in structure.equations)
+    terms = max(len(structure.regression_names(q)) for q in structure.regressed)
     if len(samples) <= terms:
         shortest = min(trials, key=len)
         raise InputError(
@@ -161,7 +166,7 @@ def diagnose(
     apart = _without_overlap(samples)
     found = {}
     for q, machine in machines.items():
-        names = structure.names(q)
+        names = structure.regression_names(q)
         features, target, error = samples.features[q], samples.targets[q], errors[q]
         size = np.sqrt(np.mean(features**2, axis=0))
         scaled = features / np.where(size > 0.0, size, 1.0)

@@ -37,6 +37,7 @@ QUICKEST = 3.0
 #: The shaft turns somewhat slower under its load.
 HARD_TURN = {
     "speed": 0.47, "drift": np.radians(20.5), "yaw_rate": 0.8, "rudder": np.radians(35.0), "shaft": 0.9,
+    "heel": np.radians(5.0),
 }  # fmt: skip
 
 #: Strengths of the penalty tried in turn: rms error allowed in the regression, relative to what the terms
@@ -55,11 +56,17 @@ def hard_turn_features(
         "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
         "delta": HARD_TURN["rudder"],
         "n": HARD_TURN["shaft"] * shaft_speed,
+        "p": HARD_TURN["heel"] * HARD_TURN["speed"] * particulars["speed"] / particulars["length"],
+        "phi": HARD_TURN["heel"],
     }
     channels = {name: np.array([state[name]]) for name in structure.required_channels}
-    return {
+    sizes = {
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }
+    if "q" in sizes:
+        memory = sizes.pop("q") * particulars["length"] / speed
+        sizes["r"] = np.concatenate([sizes["r"], memory])
+    return sizes
 
 
 def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:

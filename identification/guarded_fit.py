@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from identification.coefficients import with_accelerations
 from identification.guard import STRENGTHS, hard_turn_features, reasons_unstable
 from identification.machine import Machine
 from identification.methods import FitTask, Method, fit_held
 from identification.samples import Samples
-from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.trial import Trial
 
@@ -74,10 +72,7 @@ def guarded_fit(
     InputError
         For settings that the method does not know.
     """
-    try:
-        machines = method.machines(settings, FitTask(samples, blank, trials))
-    except TypeError as error:
-        raise InputError(f"settings: {', '.join(settings)} found, method {method.name!r}: {error}") from None
+    machines = method.machines(settings, FitTask(samples, blank, trials))
     model = with_coefficients(blank, machines)
     reasons = reasons_unstable(model, trials)
     if not reasons:
@@ -97,6 +92,4 @@ def guarded_fit(
 
 def with_coefficients(blank: ShipModel, machines: Mapping[str, Machine]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
-    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
-    values = np.linalg.solve(matrix, np.concatenate([machines[q].coef_ for q in blank.table.equations]))
-    return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))
+    return with_accelerations(blank, {q: machine.coef_ for q, machine in machines.items()})

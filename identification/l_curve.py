@@ -88,7 +88,8 @@ def corner_rank(curve: LCurve, n_samples: int) -> int:
     dropped = np.arange(full - 1, -1, -1)
     quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - SIGNIFICANCE)
     allowed = 1.0 + dropped / freedom * quantile
-    adequate = residual**2 <= allowed * max(residual[-1] ** 2, floor**2)
+    squared = residual * residual  # once: as array and as number it may differ in the last bit
+    adequate = squared <= allowed * max(squared[-1], floor**2)
     return int(np.flatnonzero(adequate[corner - 1 :])[0]) + corner
 
 
@@ -111,3 +112,23 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
     with np.errstate(divide="ignore"):
         score = np.where(freedom > 0, curve.residual_norm**2 / np.maximum(freedom, 1) ** 2, np.inf)
     return int(np.argmin(score)) + 1
+
+
+def variance_rank(singular_values: Floats, share: float) -> int:
+    """Least rank that holds a share of the variance of the features, as principal component regression does.
+
+    Parameters
+    ----------
+    singular_values : array of shape (n_ranks,)
+        Of the scaled features, descending.
+    share : float
+        0 to 1.
+
+    Returns
+    -------
+    int
+        1 to n_ranks.
+    """
+    held = np.cumsum(singular_values**2)
+    # the last sum is compared with itself, so that a share of 1 keeps all
+    return min(int(np.searchsorted(held, share * held[-1])) + 1, len(held))

@@ -1,12 +1,15 @@
 """Least-squares support vector machines for regression, the linear kernel in primal form.
 
-With a linear kernel the machine is ridge regression with a free intercept. One thin singular value
+With a linear kernel the machine is ridge regression with a free intercept. One singular value
 decomposition of the centred and scaled features, X = U S V', gives the coefficients for every C:
-V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system.
+V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system, which
+`dense_dual` keeps as printed.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from numbers import Real
 from typing import Any, Self
 
 import numpy as np
@@ -17,13 +20,15 @@ from sklearn.metrics.pairwise import pairwise_kernels
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.decomposition import Decomposition, centre_and_scale, decompose
-from identification.l_curve import corner_rank, gcv_rank, l_curve
+from identification.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
+from identification.robust import reweighted
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
 
 KERNELS = ("linear", "rbf", "poly")
-SELECTIONS = ("l-curve", "gcv", "full")
+SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
 NEARLY_ONE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
 
 
@@ -49,6 +54,9 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Of the poly kernel.
     coef0 : float
         Of the poly kernel.
+    robust : bool
+        Whether outliers lose their influence: samples are weighted by their residuals and fitted again until
+        the weights settle (weighted LS-SVM, Suykens et al. 2002).
 
     Attributes
     ----------
@@ -66,6 +74,10 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         From the residuals and the effective degrees of freedom (linear kernel).
     dual_coef_ : array of shape (n_samples,)
         Lagrange multipliers (rbf and poly kernels).
+    support_ : array of shape (n_samples, n_features)
+        Centred and scaled samples that the multipliers belong to (rbf and poly kernels).
+    weights_ : array of shape (n_samples,)
+        Of the samples; 1 but for outliers.
     n_features_in_ : int
         Number of features.
     """
@@ -79,6 +91,7 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         gamma: float | None = None,
         degree: int = 3,
         coef0: float = 1.0,
+        robust: bool = False,
     ) -> None:
         self.C = C
         self.kernel = kernel
@@ -87,6 +100,7 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.gamma = gamma
         self.degree = degree
         self.coef0 = coef0
+        self.robust = robust
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples.
@@ -102,22 +116,25 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         -------
         self
         """
-        _check_choice("kernel", self.kernel, KERNELS)
-        _check_positive("C", self.C)
-        X, y = _validated(self, X, y)
-        if self.kernel == "linear":
-            problem = decompose(X, y, self.scale, self.fit_intercept)
-            _take(self, problem, problem.filters(self.C, len(problem.singular_values)))
-        else:
-            self._fit_dual(X, y)
+        check_choice(self.kernel, KERNELS, "kernel")
+        check_weight(self.C)
+        X, y = validated(self, X, y)
+        fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
+        self.weights_ = fit_weighted(lambda weights: fit_once(X, y, weights), y, self.robust)
         return self
 
-    def _fit_dual(self, X: Floats, y: Floats) -> None:
+    def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        return take(self, problem, problem.filters(self.C, len(problem.singular_values)), X, y, weights)
+
+    def _fit_dual(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
         if not np.isfinite(self.C):
             raise InputError(f"C: {self.C} found, expected a finite number with kernel {self.kernel!r}")
-        self._centre, self._scale = centre_and_scale(X, self.scale, self.fit_intercept)
-        self._samples = (X - self._centre) / self._scale
-        factor = cho_factor(self._kernel(self._samples) + np.eye(len(y)) / self.C)
+        self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
+        self.support_ = (X - self.centre_) / self.scale_
+        ridge = np.full(len(y), 1.0 / self.C) if weights is None else 1.0 / (self.C * weights)
+        kernel = self._kernel(self.support_)
+        factor = cho_factor(kernel + np.diag(ridge))
         if self.fit_intercept:  # two solves eliminate b from the bordered system
             eta, nu = cho_solve(factor, np.column_stack([np.ones(len(y)), y])).T
             self.intercept_ = float(nu.sum() / eta.sum())
@@ -125,12 +142,14 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         else:
             self.intercept_ = 0.0
             self.dual_coef_ = cho_solve(factor, y)
+        residual: Floats = y - kernel @ self.dual_coef_ - self.intercept_
+        return residual
 
     def _kernel(self, X: Floats) -> Floats:
         options: dict[str, Any] = {"gamma": self.gamma}
         if self.kernel == "poly":
             options |= {"degree": self.degree, "coef0": self.coef0}
-        kernel: Floats = pairwise_kernels(X, self._samples, metric=self.kernel, **options)
+        kernel: Floats = pairwise_kernels(X, self.support_, metric=self.kernel, **options)
         return kernel
 
     def predict(self, X: ArrayLike) -> Floats:
@@ -151,7 +170,7 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         if self.kernel == "linear":
             prediction = features @ self.coef_
         else:
-            prediction = self._kernel((features - self._centre) / self._scale) @ self.dual_coef_
+            prediction = self._kernel((features - self.centre_) / self.scale_) @ self.dual_coef_
         prediction += self.intercept_
         return prediction
 
@@ -168,16 +187,22 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Weight of the errors; infinity truncates without penalty.
     rank : int or None
         Number of directions to keep; None leaves it to `selection`.
-    selection : {"l-curve", "gcv", "full"}
-        Corner of the L-curve, generalised cross-validation, or every direction that rounding leaves.
+    selection : {"l-curve", "gcv", "explained-variance", "full"}
+        Corner of the L-curve, generalised cross-validation, as many directions as hold the share
+        `explained_variance` of the features, or every direction that rounding leaves.
     scale : bool or array-like of shape (n_features,)
         As in `LSSVM`.
     fit_intercept : bool
         As in `LSSVM`.
+    explained_variance : float
+        Share of the variance of the scaled features that is to be kept, above 0 and at most 1.
+    robust : bool
+        As in `LSSVM`.
 
     Attributes
     ----------
-    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_, n_features_in_
+    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_, weights_,
+    n_features_in_
         As in `LSSVM`.
     rank_ : int
         Number of directions kept.
@@ -196,12 +221,16 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         selection: str = "l-curve",
         scale: bool | ArrayLike = True,
         fit_intercept: bool = True,
+        explained_variance: float = 0.9999,
+        robust: bool = False,
     ) -> None:
         self.C = C
         self.rank = rank
         self.selection = selection
         self.scale = scale
         self.fit_intercept = fit_intercept
+        self.explained_variance = explained_variance
+        self.robust = robust
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples.
@@ -217,12 +246,20 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         -------
         self
         """
-        _check_choice("selection", self.selection, SELECTIONS)
-        _check_positive("C", self.C)
+        check_choice(self.selection, SELECTIONS, "selection")
+        check_weight(self.C)
         if self.rank is not None and self.rank < 1:
             raise InputError(f"rank: {self.rank} found, expected at least 1, or None")
-        X, y = _validated(self, X, y)
-        problem = decompose(X, y, self.scale, self.fit_intercept)
+        if not 0.0 < self.explained_variance <= 1.0:
+            raise InputError(
+                f"explained_variance: {self.explained_variance} found, expected a share above 0 and at most 1"
+            )
+        X, y = validated(self, X, y)
+        self.weights_ = fit_weighted(lambda weights: self._fit(X, y, weights), y, self.robust)
+        return self
+
+    def _fit(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
         distinct = problem.numerical_rank
         filters = problem.filters(self.C, distinct)
         self.l_curve_ = l_curve(
@@ -231,21 +268,29 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             filters[:distinct],
             problem.outside + float(np.sum(problem.projections[distinct:] ** 2)),
         )
-        self.rank_ = self._choose(distinct, len(y) - int(self.fit_intercept))
+        self.rank_ = self._choose(problem, distinct)
         filters[self.rank_ :] = 0.0
         self.directions_ = problem.directions
         self.collinear_groups_ = tuple(_members(row) for row in problem.directions[self.rank_ :])
-        _take(self, problem, filters)
-        return self
+        return take(self, problem, filters, X, y, weights)
 
-    def _choose(self, distinct: int, n_samples: int) -> int:
+    @property
+    def collinear_names_(self) -> tuple[tuple[str, ...], ...]:
+        """`collinear_groups_` by name: that of the table's columns, else x0, x1, ..."""
+        check_is_fitted(self)
+        names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])
+        return tuple(tuple(str(names[i]) for i in group) for group in self.collinear_groups_)
+
+    def _choose(self, problem: Decomposition, distinct: int) -> int:
         if self.rank is not None:
             return min(self.rank, distinct)
         if self.selection == "full":
             return distinct
         if self.selection == "l-curve":
-            return corner_rank(self.l_curve_, n_samples)
-        return gcv_rank(self.l_curve_, n_samples)
+            return corner_rank(self.l_curve_, problem.n_free)
+        if self.selection == "gcv":
+            return gcv_rank(self.l_curve_, problem.n_free)
+        return variance_rank(problem.singular_values[:distinct], self.explained_variance)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets of samples.
@@ -265,81 +310,12 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return prediction
 
 
-def dense_dual_solution(
-    X: ArrayLike, y: ArrayLike, C: float, fit_intercept: bool = True
-) -> tuple[Floats, float]:
-    """Coefficients from the dual system as printed, [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
-
-    O(n^3) in the number of samples and less accurate than `LSSVM`: an oracle for tests and benchmarks.
-
-    Parameters
-    ----------
-    X : array-like of shape (n_samples, n_features)
-        Features, not scaled here.
-    y : array-like of shape (n_samples,)
-        Targets.
-    C : float
-        Weight of the errors, finite.
-    fit_intercept : bool
-        Whether b is free or zero.
-
-    Returns
-    -------
-    coef : array of shape (n_features,)
-    intercept : float
-    """
-    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
-    n = len(y)
-    if not fit_intercept:
-        return X.T @ np.linalg.solve(X @ X.T + np.eye(n) / C, y), 0.0
-    solution = np.linalg.solve(_dual_matrix(X, C), np.concatenate([[0.0], y]))
-    return X.T @ solution[1:], float(solution[0])
-
-
-def dense_truncated_solution(X: ArrayLike, y: ArrayLike, C: float, rank: int) -> tuple[Floats, float]:
-    """Coefficients from the dual matrix truncated as printed (Xu 2020, section 3.2).
-
-    Keeps the `rank` largest singular values of the (n + 1, n + 1) matrix; two of them belong to the
-    border, so it answers `TruncatedLSSVM` of two less. An oracle for tests.
-
-    Parameters
-    ----------
-    X : array-like of shape (n_samples, n_features)
-        Features, not scaled here; centre them.
-    y : array-like of shape (n_samples,)
-        Targets.
-    C : float
-        Weight of the errors, finite.
-    rank : int
-        Number of singular values of the dual matrix to keep.
-
-    Returns
-    -------
-    coef : array of shape (n_features,)
-    intercept : float
-    """
-    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
-    left, values, right = np.linalg.svd(_dual_matrix(X, C))
-    projected = left[:, :rank].T @ np.concatenate([[0.0], y])
-    solution = right[:rank].T @ (projected / values[:rank])
-    return X.T @ solution[1:], float(solution[0])
-
-
-def _dual_matrix(X: Floats, C: float) -> Floats:
-    n = len(X)
-    matrix = np.ones((n + 1, n + 1))
-    matrix[0, 0] = 0.0
-    matrix[1:, 1:] = X @ X.T + np.eye(n) / C
-    return matrix
-
-
-def _take(estimator: LSSVM | TruncatedLSSVM, problem: Decomposition, filters: Floats) -> None:
-    """Set the attributes of a linear machine from its filtered decomposition."""
+def take(
+    estimator: Any, problem: Decomposition, filters: Floats, X: Floats, y: Floats, weights: Floats | None
+) -> Floats:
+    """Set the attributes of a linear machine from its filtered decomposition; returns the residuals."""
     scaled = problem.directions.T @ (filters * problem.projections)
     shrink = problem.singular_values * filters
-    residual = problem.outside + float(np.sum(((1.0 - shrink) * problem.projections) ** 2))
-    freedom = problem.n_free - float(np.sum(shrink))
-    estimator.noise_variance_ = residual / freedom if freedom > 0.5 else np.nan
     root = (problem.directions.T * filters) / problem.scale[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = np.where(filters > 0.0, filters / problem.singular_values, 0.0)
@@ -348,7 +324,22 @@ def _take(estimator: LSSVM | TruncatedLSSVM, problem: Decomposition, filters: Fl
     estimator.intercept_ = problem.mean - float(problem.centre @ estimator.coef_)
     estimator.singular_values_ = problem.singular_values
     estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
-    estimator.covariance_ = estimator.noise_variance_ * (root @ root.T)
+    residual: Floats = y - X @ estimator.coef_ - estimator.intercept_
+    freedom = problem.n_free - float(np.sum(shrink))
+    effective = residual if weights is None else residual * weights
+    estimator.noise_variance_ = float(effective @ effective) / freedom if freedom > 0.5 else np.nan
+    # Huber's sandwich: the residuals that count are the weighted ones, the moment is that of all samples
+    spread = 1.0 if weights is None else len(y) / float(weights.sum())
+    estimator.covariance_ = estimator.noise_variance_ * spread * (root @ root.T)
+    return residual
+
+
+def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
+    """Fit once, or until the weights of the samples settle; returns the weights."""
+    if robust:
+        return reweighted(fit, float(np.max(np.abs(y))))
+    fit(None)
+    return np.ones(len(y))
 
 
 def _members(direction: Floats) -> tuple[int, ...]:
@@ -356,18 +347,18 @@ def _members(direction: Floats) -> tuple[int, ...]:
     return tuple(int(i) for i in np.flatnonzero(share >= NEARLY_ONE))
 
 
-def _validated(estimator: LSSVM | TruncatedLSSVM, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+    """Features and targets as arrays of numbers, as scikit-learn checks them."""
     checked: tuple[Floats, Floats] = validate_data(
         estimator, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
     )
     return checked[0], np.asarray(checked[1], dtype=np.float64)
 
 
-def _check_choice(argument: str, value: Any, choices: tuple[str, ...]) -> None:
-    if value not in choices:
-        raise InputError(f"{argument}: {value!r} found, expected one of {', '.join(choices)}")
-
-
-def _check_positive(argument: str, value: float) -> None:
-    if not value > 0:
-        raise InputError(f"{argument}: {value!r} found, expected a number above 0")
+def check_weight(value: Any, argument: str = "C") -> float:
+    """Return a weight of errors: a number above 0, infinity included."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
+        raise InputError(
+            f"{argument}: {value!r} found, expected a number above 0 (infinity gives least squares)"
+        )
+    return float(value)

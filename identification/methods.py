@@ -9,11 +9,17 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import clone
 
+from identification.comparators import LinearSupportVectorMachine
+from identification.free_running import fit_free_running
 from identification.lssvm import LSSVM, TruncatedLSSVM
 from identification.machine import Machine
+from identification.recursive import MultiInnovationLeastSquares, RecursiveLeastSquares, StochasticGradient
 from identification.samples import Samples
-from shipgym.checks import check_choice
+from identification.tuning import Optimiser, TunedLSSVM
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.trial import Trial
 
@@ -71,7 +77,19 @@ class Method:
     refined: bool = False
 
     def machines(self, settings: Mapping[str, Any], task: FitTask) -> Machines:
-        """Machines of all equations, fitted with the settings."""
+        """Machines of all equations, fitted with the settings.
+
+        Raises
+        ------
+        InputError
+            For settings that the method does not know.
+        """
+        try:
+            self.machine(**settings)
+        except TypeError as error:
+            raise InputError(
+                f"settings: {', '.join(settings)} found, method {self.name!r}: {error}"
+            ) from None
         return self.fit(partial(self.machine, **settings), task)
 
 
@@ -87,12 +105,58 @@ def _tls_svm(**settings: Any) -> Machine:
     return TruncatedLSSVM(fit_intercept=False, **settings)
 
 
+def _ridge(alpha: float = 1e-6, **settings: Any) -> Machine:
+    """Ridge regression as scikit-learn has it: its penalty is 1 / C, on columns as they are by default."""
+    alpha = check_number(alpha, "alpha", at_least=0.0)
+    settings = {"scale": False, **settings}
+    return LSSVM(C=1.0 / alpha if alpha else np.inf, fit_intercept=False, **settings)
+
+
+def _tuned(optimiser: str | Optimiser, **settings: Any) -> Machine:
+    return TunedLSSVM(optimiser=optimiser, fit_intercept=False, **settings)
+
+
+def _support_vectors(**settings: Any) -> Machine:
+    return LinearSupportVectorMachine(fit_intercept=False, **settings)
+
+
+def searched(make: Callable[[], Machine], task: FitTask) -> Machines:
+    """Fit machines that choose their own C, which may look at trials: as blocks, or by simulating them."""
+    template, samples = make(), task.samples
+    assert isinstance(template, TunedLSSVM)
+    if template.objective == "free-running":
+        return dict(fit_free_running(template, samples, task.blank, task.trials))
+    return {
+        q: clone(template).fit(samples.features[q], samples.targets[q], samples.trial)
+        for q in samples.features
+    }
+
+
+def _nisg(omega: float = 0.5, **settings: Any) -> Machine:
+    return StochasticGradient(omega=omega, **settings)
+
+
+def _mils(**settings: Any) -> Machine:
+    return MultiInnovationLeastSquares(inverse_free=False, **settings)
+
+
 METHODS = {
     method.name: method
     for method in (
         Method("ls", _least_squares, regularised=False),
+        Method("ridge", _ridge, regularised=True),
         Method("ls-svm", _ls_svm, regularised=True),
         Method("tls-svm", _tls_svm, regularised=True),
+        Method("cv-lssvr", partial(_tuned, optimiser="grid"), regularised=True, fit=searched),
+        Method("pso-lssvr", partial(_tuned, optimiser="pso"), regularised=True, fit=searched),
+        Method("abc-lssvr", partial(_tuned, optimiser="abc"), regularised=True, fit=searched),
+        Method("de-lssvr", partial(_tuned, optimiser="de"), regularised=True, fit=searched),
+        Method("svr", _support_vectors, regularised=True),
+        Method("rls", RecursiveLeastSquares, regularised=False),
+        Method("sg", StochasticGradient, regularised=False),
+        Method("nisg", _nisg, regularised=False),
+        Method("mils", _mils, regularised=False),
+        Method("tmils", MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _tls_svm, regularised=True, refined=True),
     )
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, field, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from identification.preprocess import repaired
 from identification.refine import Refined, refine, split_settings
 from identification.samples import Samples, build_samples
 from identification.threads import on_one_thread
+from identification.tuning import SearchResult
 from identification.uncertainty import coefficient_covariance, joint_covariance
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -54,6 +55,8 @@ class IdentificationResult:
         Of each equation: those of `u`, `v`, `r` that the structure has.
     predictions : dict of str to Trial or None
         The open-loop predictions by trial; None where the model ran away.
+    searches : dict of str to SearchResult
+        How the settings of each equation were found, for methods that search; the variable is log10 C.
     """
 
     model: ShipModel
@@ -61,6 +64,7 @@ class IdentificationResult:
     metrics: dict[str, Any]
     diagnostics: dict[str, EquationDiagnostics]
     predictions: dict[str, Trial | None]
+    searches: dict[str, SearchResult] = field(default_factory=dict)
 
     @property
     def coefficients(self) -> dict[str, float]:
@@ -132,6 +136,7 @@ def identify(
     repair: bool = False,
     uncertainty: str = "analytic",
     guarded: bool = True,
+    hold_out: Sequence[str] = (),
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -145,8 +150,12 @@ def identify(
         that know the shaft speed.
     structure : str
         Terms of the model: a name of `shipgym.list_structures`.
-    method : {"tls-svm", "ls-svm", "ls", "output-error"}
-        Truncated LS-SVM, LS-SVM, least squares, or refinement of a truncated LS-SVM by simulation.
+    method : str
+        A name of `identification.methods.METHODS`: truncated LS-SVM (`tls-svm`), LS-SVM of given C (`ls-svm`)
+        or of one found by grid, particle swarm, bee colony or differential evolution (`cv-lssvr`,
+        `pso-lssvr`, `abc-lssvr`, `de-lssvr`), or scikit-learn's least squares, ridge and support
+        vector regression (`ls`, `ridge`, `svr`), or refinement of a
+        truncated LS-SVM by simulation (`output-error`).
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
@@ -174,9 +183,11 @@ def identify(
     guarded : bool
         Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
         is large in a hard turn and invisible in the data. The provenance tells what was done.
+    hold_out : sequence of str
+        Names of trials that are predicted only, as if they were marked `validate`.
     **settings
-        Of the machine: `rank`, `selection`, `C`, `scale`; of "output-error" also those of
-        `refine.Refinement`.
+        Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
+        `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
 
     Returns
     -------
@@ -189,6 +200,7 @@ def identify(
     """
     chosen, table = get_method(method), get_structure(structure)
     check_choice(uncertainty, UNCERTAINTIES, "uncertainty")
+    trials = _held_out(trials, hold_out)
     used = [repaired(trial) if repair else trial for trial in _used(trials)]
     check_trials(used, table)
     ship = _ship(particulars, used, table)
@@ -265,6 +277,7 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": regression.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
+        **_searched(fit),
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
@@ -273,6 +286,12 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
             for trial in used
         ],
     }
+
+
+def _searched(fit: GuardedFit) -> dict[str, Any]:
+    """What a search chose for each equation; nothing for methods that do not search."""
+    chosen = {q: m.chosen_ for q, m in fit.machines.items() if hasattr(m, "chosen_")}
+    return {"search": chosen} if chosen else {}
 
 
 def _judged(
@@ -290,7 +309,17 @@ def _judged(
         },
         diagnostics=diagnose(fit.machines, regression, model.table),
         predictions=predictions,
+        searches={q: m.search_ for q, m in fit.machines.items() if hasattr(m, "search_")},
     )
+
+
+def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only."""
+    known = [trial.name for trial in trials]
+    wanted = [names] if isinstance(names, str) else list(names)
+    for name in wanted:
+        check_choice(name, known, "hold_out")
+    return [trial.with_(use="validate") if trial.name in wanted else trial for trial in trials]
 
 
 def _used(trials: Sequence[Trial]) -> list[Trial]:
@@ -352,4 +381,6 @@ def _plain(value: Any) -> Any:
     """A setting as JSON knows it."""
     if isinstance(value, float) and not np.isfinite(value):
         return None
+    if is_dataclass(value) and not isinstance(value, type):
+        return {"kind": type(value).__name__, **asdict(value)}
     return np.asarray(value).tolist() if isinstance(value, np.ndarray | list | tuple) else value

@@ -18,6 +18,7 @@ from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import median_filter
 
 from identification import preprocess
+from identification.memory import eliminated, twice_integrated
 from identification.rudder import Rudder, rebuild, straight
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -46,7 +47,7 @@ class Samples:
     Attributes
     ----------
     features : dict of str to array of shape (n_rows, n_terms)
-        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`).
+        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
     targets : dict of str to array of shape (n_rows,)
         Change of the velocity over the window.
     start : array of shape (n_rows,)
@@ -140,8 +141,8 @@ def build_samples(
             if len(piece) > steps
         ]
     return Samples(
-        {q: np.concatenate([part.features[q] for part in parts]) for q in structure.equations},
-        {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.equations},
+        {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
+        {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
         np.concatenate([part.start for part in parts]),
         np.concatenate([part.duration for part in parts]),
         np.concatenate([part.trial for part in parts]),
@@ -239,13 +240,17 @@ def _one_trial(
     if samples == "spline":
         noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
         rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)
-        integrals = _spline_integrals(t, channels, structure, terms, rudder)
+        integrals, moments = _spline_integrals(t, channels, structure, terms, rudder)
     else:
-        integrals = {}
+        integrals, moments = {}, {}
         for q in structure.equations:
             values = terms(q, channels)
             mean = values[:-1] if samples == "euler" else 0.5 * (values[:-1] + values[1:])
             integrals[q] = mean * np.diff(t)[:, None]
+            moments[q] = 0.5 * integrals[q] * np.diff(t)[:, None]
+    if "q" in integrals:
+        memory = twice_integrated(t, integrals.pop("q"), moments["q"])
+        integrals["r"] = np.hstack([integrals["r"], memory])
     first = np.arange(0, len(t) - window, max(window // 2, 1))
     last = first + window
     features, targets = {}, {}
@@ -253,7 +258,8 @@ def _one_trial(
         summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
         features[q] = steps if window == 1 else summed[last] - summed[first]
         targets[q] = channels[q][last] - channels[q][first]
-    return Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+    part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+    return eliminated(part) if "q" in structure.equations else part
 
 
 def _spline_integrals(
@@ -262,8 +268,11 @@ def _spline_integrals(
     structure: Structure,
     terms: Callable[[str, Channels], Floats],
     rudder: Rudder,
-) -> dict[str, Floats]:
-    """Integral of the terms over each sampling step, arrays of shape (n_samples - 1, n_terms)."""
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Integral of the terms over each sampling step, arrays of shape (n_samples - 1, n_terms).
+
+    And their first moments about the end of the step.
+    """
     edges = np.union1d(t, rudder.corners)
     middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
     times = middle[:, None] + half[:, None] * NODES
@@ -272,12 +281,14 @@ def _spline_integrals(
         at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
     step = np.searchsorted(t, middle, side="right") - 1
     starts = np.flatnonzero(np.diff(step, prepend=-1))
-    integrals = {}
+    weights = half[:, None] * WEIGHTS
+    to_end = t[step + 1][:, None] - times
+    integrals, moments = {}, {}
     for q in structure.equations:
         values = terms(q, at_nodes).reshape(*times.shape, -1)
-        pieces = half[:, None] * np.einsum("ijk,j->ik", values, WEIGHTS)
-        integrals[q] = np.add.reduceat(pieces, starts, axis=0)
-    return integrals
+        integrals[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights), starts, axis=0)
+        moments[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights * to_end), starts, axis=0)
+    return integrals, moments
 
 
 def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:

@@ -207,6 +207,7 @@ class Shooter:
         self.sail = model.kernel("segments").sail
         ship = model.particulars
         units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
+        units["p"] = units["r"]
         self.units = np.array([units[name] for name in channels])
 
     def shoot(

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
 PRIME = 1e-5
 WIDTH = 100
+EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
 
 
 def summary_table(result: IdentificationResult) -> str:
@@ -28,6 +29,8 @@ def summary_table(result: IdentificationResult) -> str:
         f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
     )
     console.print(_coefficients(result), _inertia(result), _equations(result))
+    for line in _undetermined(result):
+        console.print(line, highlight=False)
     file = console.file
     assert isinstance(file, StringIO)
     return file.getvalue()
@@ -80,7 +83,7 @@ def _equations(result: IdentificationResult) -> Table:
         table.add_column(heading, justify="right")
     for name, fit in result.diagnostics.items():
         table.add_row(
-            {"u": "surge", "v": "sway", "r": "yaw"}.get(name, name),
+            EQUATIONS.get(name, name),
             str(fit.samples),
             str(fit.terms),
             str(fit.rank),
@@ -89,3 +92,13 @@ def _equations(result: IdentificationResult) -> Table:
             f"{fit.residual_rms:.2e}",
         )
     return table
+
+
+def _undetermined(result: IdentificationResult) -> list[str]:
+    """For each equation the terms that the data do not tell apart, of directions that the fit left out."""
+    return [
+        f"{EQUATIONS.get(name, name)}: not told apart by the data, their combination was left out: "
+        + "; ".join(", ".join(group) for group in fit.dropped)
+        for name, fit in result.diagnostics.items()
+        if fit.dropped
+    ]

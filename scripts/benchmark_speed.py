@@ -17,18 +17,27 @@ from dataclasses import asdict, dataclass
 import gymnasium
 import numpy as np
 import typer
+from numpy.typing import NDArray
+from numpy_ships import numpy_step
 from rich.console import Console
 from rich.table import Table
 
 import shipgym
-from identification import TruncatedLSSVM, identify
-from identification.lssvm import dense_dual_solution
+from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
+from identification.dense_dual import dense_dual_solution
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
 
+Floats = NDArray[np.float64]
+
 MODEL = "mariner-tls-svm"
+#: Ships whose bare physics is timed, and the aim for them.
+FLEET = {
+    "mariner": "40 M steps/s, ", "container": "15 M steps/s, ", "tanker": "", "kvlcc2": "",
+}  # fmt: skip
 STEPS_IN_PYTHON = """
 import os, sys, time
 import gymnasium, numpy as np, shipgym
@@ -131,19 +140,102 @@ def batched_environment(n_envs: int) -> Row:
     )
 
 
-def truncated_fit(n_samples: int = 6000, n_terms: int = 15) -> Row:
-    """TLS-SVM in primal form against the dense dual system of LS-SVM."""
+def batched_physics(name: str, n_ships: int, aim: str) -> Row:
+    """Runge-Kutta steps of the bare ship, one core, against the same equations on NumPy arrays."""
+    model = shipgym.load_model(name)
+    random = np.random.default_rng(0)
+    rudders = np.radians(30.0) * random.uniform(-1.0, 1.0, n_ships)
+    states = np.repeat(model.kernel_states(model.service_state[None]), n_ships, axis=0)
+    commands = np.column_stack([rudders, np.full(n_ships, model.service_shaft_speed)])
+    tiles, ships = n_ships // layout.LANES, model.ship_tile()[None]
+    tiled, orders = (
+        np.ascontiguousarray(a.reshape(tiles, layout.LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)
+        for a in (states, commands)
+    )
+    h, steps = 0.01 * model.particulars["length"] / model.particulars["speed"], 200
+    advance, on_arrays = model.kernel("fleet").advance_batch, numpy_step(model)
+    columns, shafts = tuple(np.ascontiguousarray(states.T)), np.ascontiguousarray(commands[:, 1])
+    compiled = steps * n_ships / best_time(lambda: advance(tiled, orders, h, steps, ships))
+    plain = n_ships / best_time(lambda: on_arrays(columns, rudders, shafts, h), 20)
+    return Row(
+        f"physics of {n_ships} ships, {name}",
+        f"{compiled / 1e6:.1f} M steps/s",
+        f"NumPy {plain / 1e6:.2f} M steps/s",
+        compiled / plain,
+        f"{aim}10 times",
+    )
+
+
+def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
+    """Correlated features and noisy targets."""
     random = np.random.default_rng(0)
     X = random.standard_normal((n_samples, n_terms)) @ random.standard_normal((n_terms, n_terms))
-    y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
-    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 20)
-    dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 1)
+    return X, X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
+
+
+def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
+    """TLS-SVM in primal form, its L-curve included, against the dense dual system of LS-SVM."""
+    X, y = made_up_regression(n_samples, n_terms)
+    primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 200)
+    dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 3 if n_samples < 3000 else 1)
     return Row(
         f"TLS-SVM fit, {n_samples} samples, {n_terms} terms",
-        f"{primal * 1e3:.1f} ms",
+        f"{primal * 1e3:.2f} ms",
         f"dense dual solve {dense:.2f} s",
         dense / primal,
-        "1000 times",
+        aim,
+    )
+
+
+def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -> Row:
+    """Search for C by the bee colony of Zhu 2018 (20 sources, 30 rounds), against ten times the samples."""
+
+    def least(n: int) -> float:
+        X, y = made_up_regression(n, n_terms)
+        machine = TunedLSSVM(optimiser=ArtificialBeeColony(20, 30, 20), objective=objective)
+        return best_time(lambda: machine.fit(X, y), 50)
+
+    once, tenfold = least(n_samples), least(10 * n_samples)
+    return Row(
+        f"bee colony, {objective} error, {n_samples} samples",
+        f"{once * 1e3:.1f} ms",
+        f"{10 * n_samples} samples {tenfold * 1e3:.1f} ms",
+        tenfold / once,
+        "10 ms, ratio at most 10",
+    )
+
+
+def zigzag_run() -> Row:
+    """A 20/20 zigzag of 600 s at 0.1 s, the Trial included."""
+    ship = shipgym.load_model(MODEL)
+    shipgym.manoeuvres.zigzag(ship, 20.0, 20.0)
+    seconds = best_time(lambda: shipgym.manoeuvres.zigzag(ship, 20.0, 20.0), 20)
+    return Row("zigzag 20/20, 600 s at 0.1 s", f"{1e3 * seconds:.1f} ms", "", None, "5 ms")
+
+
+def recursive_updates(n_samples: int = 50_000, n_terms: int = 15) -> Row:
+    """Recursive least squares with forgetting, sample by sample, against the same update in NumPy."""
+    random = np.random.default_rng(0)
+    X = random.standard_normal((n_samples, n_terms))
+    y = X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
+    machine = RecursiveLeastSquares(forgetting=0.999).update(X[:100], y[:100])
+
+    def in_numpy(n: int = 2000) -> None:
+        theta, P = np.zeros(n_terms), 1e6 * np.eye(n_terms)
+        for phi, target in zip(X[:n], y[:n], strict=True):
+            gain = P @ phi
+            gain /= 0.999 + phi @ gain
+            theta += gain * (target - phi @ theta)
+            P = (P - np.outer(gain, phi @ P)) / 0.999
+
+    compiled = n_samples / best_time(lambda: machine.update(X, y))
+    plain = 2000 / best_time(in_numpy)
+    return Row(
+        f"recursive least squares, {n_terms} coefficients",
+        f"{compiled / 1e6:.2f} M updates/s",
+        f"NumPy {plain / 1e6:.3f} M updates/s",
+        compiled / plain,
+        "1 M updates/s",
     )
 
 
@@ -194,7 +286,12 @@ def main(as_json: bool = typer.Option(False, "--json", help="Print JSON instead 
     rows = [
         single_environment(),
         *(batched_environment(n) for n in (64, 1024, 4096)),
-        truncated_fit(),
+        *(batched_physics(ship, n, aim) for ship, aim in FLEET.items() for n in (1024, 4096)),
+        truncated_fit(1800, "500 times"),
+        truncated_fit(6000, "5000 times"),
+        *(bee_colony_search(objective) for objective in ("training", "k-fold")),
+        zigzag_run(),
+        recursive_updates(),
         refinement(),
         *start_up(),
     ]

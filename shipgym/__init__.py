@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from shipgym import manoeuvres, plots, towing_tank
+    from shipgym import manoeuvres, plots, towing_tank, weather
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
     from shipgym.models.scaling import scale_model
+    from shipgym.models.stability import StraightLineStability, straight_line_stability
     from shipgym.particulars import Particulars
     from shipgym.ship_file import ShipFile
     from shipgym.steering import SteeringGear
     from shipgym.trial import Trial
+    from shipgym.weather.conditions import Current, Waves, Weather, Wind, sea_states
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "Current": "shipgym.weather.conditions",
     "InputError": "shipgym.errors",
     "ManoeuvreError": "shipgym.errors",
     "ModelCheck": "shipgym.models.checker",
@@ -31,19 +34,26 @@ _HOME = {
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
     "SteeringGear": "shipgym.steering",
+    "StraightLineStability": "shipgym.models.stability",
     "Trial": "shipgym.trial",
     "UnstableModelError": "shipgym.errors",
+    "Waves": "shipgym.weather.conditions",
+    "Weather": "shipgym.weather.conditions",
+    "Wind": "shipgym.weather.conditions",
     "check_ship_model": "shipgym.models.checker",
     "list_models": "shipgym.models",
     "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
     "register_structure": "shipgym.models",
     "scale_model": "shipgym.models.scaling",
+    "straight_line_stability": "shipgym.models.stability",
+    "sea_states": "shipgym.weather.conditions",
 }
 
-_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank")
+_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank", "weather")
 
 __all__ = [
+    "Current",
     "InputError",
     "ManoeuvreError",
     "ModelCheck",
@@ -51,8 +61,12 @@ __all__ = [
     "ShipFile",
     "ShipModel",
     "SteeringGear",
+    "StraightLineStability",
     "Trial",
     "UnstableModelError",
+    "Waves",
+    "Weather",
+    "Wind",
     "check_ship_model",
     "list_models",
     "list_structures",
@@ -61,7 +75,10 @@ __all__ = [
     "plots",
     "register_structure",
     "scale_model",
+    "sea_states",
+    "straight_line_stability",
     "towing_tank",
+    "weather",
 ]
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from shipgym.checks import check_table
 from shipgym.errors import InputError
+from shipgym.whole_file import write_text
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
@@ -52,11 +52,4 @@ def write_json(fields: Mapping[str, Any], path: Path) -> None:
     InputError
         If the folder does not exist or cannot be written.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    try:
-        draft.write_text(json.dumps(fields, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    finally:
-        draft.unlink(missing_ok=True)
+    write_text(json.dumps(fields, indent=1, allow_nan=False) + "\n", path)

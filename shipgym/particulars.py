@@ -24,6 +24,13 @@ _LIMITS: dict[str, tuple[float | None, float | None]] = {  # open bounds
     "speed": (0.0, 50.0),
     "rudder_area": (0.0, None),
     "propeller_diameter": (0.0, None),
+    "length_overall": (0.0, None),
+    "frontal_area": (0.0, None),
+    "lateral_area": (0.0, None),
+    "lateral_centroid": (None, None),
+    "lateral_centroid_height": (0.0, None),
+    "metacentric_height": (0.0, None),
+    "roll_period": (0.0, 200.0),
     "water_density": (500.0, 1500.0),
     "X_udot": (-1.0, 0.0),
     "Y_vdot": (-1.0, 0.0),
@@ -42,7 +49,12 @@ _HINTS: dict[str, str] = {
 }
 
 #: Largest share of the length that each of these can be.
-_SHARES_OF_LENGTH = {"beam": 1.0, "draught": 0.5, "xg": 0.5, "yaw_gyradius": 0.7, "propeller_diameter": 0.5}
+_SHARES_OF_LENGTH = {
+    "beam": 1.0, "draught": 0.5, "xg": 0.5, "yaw_gyradius": 0.7, "propeller_diameter": 0.5,
+    "length_overall": 2.0, "lateral_centroid": 0.5, "lateral_centroid_height": 0.5, "metacentric_height": 0.2,
+}  # fmt: skip
+#: Largest share of length * length that each of these areas can be.
+_SHARES_OF_SQUARE = {"frontal_area": 0.5, "lateral_area": 0.5}
 
 
 @dataclass(frozen=True)
@@ -73,6 +85,18 @@ class Particulars(Mapping[str, Any]):
         Movable area, m2.
     propeller_diameter : float, optional
         m.
+    length_overall : float, optional
+        m.
+    frontal_area, lateral_area : float, optional
+        Projected areas above the water seen from ahead and from the side, m2.
+    lateral_centroid : float, optional
+        Centroid of the lateral area forward of midship, m.
+    lateral_centroid_height : float, optional
+        Centroid of the lateral area above the water, m.
+    metacentric_height : float, optional
+        Transverse, GM, m.
+    roll_period : float, optional
+        Natural period of roll, s.
     water_density : float, optional
         kg/m3.
     X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot : float, optional
@@ -98,6 +122,13 @@ class Particulars(Mapping[str, Any]):
     speed: float | None = None
     rudder_area: float | None = None
     propeller_diameter: float | None = None
+    length_overall: float | None = None
+    frontal_area: float | None = None
+    lateral_area: float | None = None
+    lateral_centroid: float | None = None
+    lateral_centroid_height: float | None = None
+    metacentric_height: float | None = None
+    roll_period: float | None = None
     water_density: float | None = None
     X_udot: float | None = None
     Y_vdot: float | None = None
@@ -324,6 +355,12 @@ def _check_together(values: Mapping[str, float], where: str) -> None:
             raise InputError(
                 f"{where} {name}: {values[name]:g} found with length {length:g}, expected at most {share:g} "
                 "of the length; check the units (m)"
+            )
+    for name, share in _SHARES_OF_SQUARE.items():
+        if name in values and values[name] > share * length * length:
+            raise InputError(
+                f"{where} {name}: {values[name]:g} found with length {length:g}, expected at most {share:g} "
+                "of the length squared; check the units (m2)"
             )
     if "mass" in values:
         low, high, reason = _mass_range(values)

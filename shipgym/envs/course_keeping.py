@@ -186,7 +186,10 @@ class CourseKeepingEngine:
     def physical_state(self) -> dict[str, Floats]:
         """State and set-point in SI units by name, each of shape (num_envs,)."""
         offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
-        state = {name: self.outcome(offsets[name]) for name in self.model.state_names}
+        state = {
+            name: self.outcome(offsets[row])
+            for name, row in zip(self.model.state_names, self.model.kernel_names, strict=True)
+        }
         return {**state, "set_point": self.outcome(rows.SET_POINT)}
 
 

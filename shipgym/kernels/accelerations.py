@@ -8,6 +8,7 @@ from .compiling import inlined
 
 ROLL = False  # whether the ship has a rolling motion
 SHAFT = False  # whether the speed of its shaft is a state; if not, it is what is commanded
+MEMORY = False  # whether, in a ship without roll, the row of the roll rate keeps a memory of yaw
 
 
 @inlined

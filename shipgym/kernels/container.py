@@ -59,16 +59,11 @@ COEFFICIENTS = (
 def hull(linear: float, v: float, r: float, f: float, vvv: float, rrr: float, vvr: float, vrr: float,
          vvf: float, vff: float, rrf: float, rff: float) -> float:  # fmt: skip
     """Linear part plus the cubic polynomial in sway, yaw rate and heel."""
+    vv, rr, ff = v * v, r * r, f * f
     return (
-        linear
-        + vvv * v * v * v
-        + rrr * r * r * r
-        + vvr * v * v * r
-        + vrr * v * r * r
-        + vvf * v * v * f
-        + vff * v * f * f
-        + rrf * r * r * f
-        + rff * r * f * f
+        (linear + vv * (vvv * v + vvr * r + vvf * f))
+        + rr * (rrr * r + vrr * v + rrf * f)
+        + ff * (vff * v + rff * r)
     )
 
 
@@ -88,22 +83,23 @@ def accelerations(
     """Accelerations in surge, sway, yaw and roll (see `accelerations.py` of this folder)."""
     L = LENGTH
     U = sqrt(u * u + v * v)
-    u_, v_, r_, p_, f = u / U, v / U, r * L / U, p * L / U, phi
+    per_U = 1.0 / U  # divisions are what costs
+    u_, v_, r_, p_, f = u * per_U, v * per_U, r * L * per_U, p * L * per_U, phi
 
     inflow = v_ + xp * r_
     u_P = u_ * ((1.0 - wp) + tau * (inflow * inflow + c_pv * v_ + c_pr * r_))
     J = u_P * U / (n * DIAMETER)
     K_T = 0.527 - 0.455 * J
-    thrust = 2.0 * DIAMETER**4 * K_T * n * fabs(n) / (U * U * L * L)
+    thrust = (2.0 * DIAMETER**4 / (L * L)) * K_T * n * fabs(n) * per_U * per_U
 
     v_R = gamma * v_ + c_Rr * r_ + c_Rrrr * r_ * r_ * r_ + c_Rrrv * r_ * r_ * v_
-    u_R = u_P * epsilon * sqrt(1.0 + 8.0 * kappa * K_T / (pi * J * J))
+    u_R = u_P * epsilon * sqrt(1.0 + (8.0 * kappa / pi) * K_T / (J * J))
     sine, cosine = sin_cos(delta)
     # (u_R^2 + v_R^2) sin(delta + atan(v_R / u_R)), without the arc
     normal = sqrt(u_R * u_R + v_R * v_R) * (sine * fabs(u_R) + cosine * v_R * copysign(1.0, u_R))
-    F_N = -6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25) * (RUDDER_AREA / (L * L)) * normal
+    F_N = (-6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25) * (RUDDER_AREA / (L * L))) * normal
 
-    righting = GRAVITY * VOLUME / (0.5 * L * L * U * U) * GM / L
+    righting = (GRAVITY * VOLUME / (0.5 * L * L) * GM / L) * per_U * per_U
     X = (
         X_uu * u_ * u_ + (1.0 - t) * thrust + X_vr * v_ * r_ + X_vv * v_ * v_ + X_rr * r_ * r_ + X_ff * f * f
         + c_RX * F_N * sine + (m + my) * v_ * r_
@@ -126,11 +122,11 @@ def accelerations(
 
     # sway, roll and yaw are coupled by the symmetric [[a, b, c], [b, d, 0], [c, 0, e]]
     a, b, c, d, e = m + my, -my * ly, my * alpha_y, Ix + Jx, Iz + Jz
-    vdot = (d * e * Y - b * e * K - c * d * N) / (a * d * e - b * b * e - c * c * d)
-    pdot = (K - b * vdot) / d
-    rdot = (N - c * vdot) / e
-    linear, angular = U * U / L, U * U / (L * L)
-    return X / (m + mx) * linear, vdot * linear, rdot * angular, pdot * angular
+    vdot = (d * e * Y - b * e * K - c * d * N) * (1.0 / (a * d * e - b * b * e - c * c * d))
+    pdot = (K - b * vdot) * (1.0 / d)
+    rdot = (N - c * vdot) * (1.0 / e)
+    linear, angular = U * U * (1.0 / L), U * U * (1.0 / (L * L))
+    return X * (1.0 / (m + mx)) * linear, vdot * linear, rdot * angular, pdot * angular
 
 
 @inlined

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from . import accelerations as equations
 from .accelerations import ROLL, SHAFT
 from .compiling import inlined, kernel, rare
 from .course_keeping_rows import (
@@ -70,6 +71,8 @@ from .layout import (
 from .motion import clip, runge_kutta, runs_away
 from .random import uniform
 from .trigonometry import sin_cos, wrap
+
+KEEPS_P = ROLL or getattr(equations, "MEMORY", False)  # the row holds a roll rate or a memory of yaw
 
 
 @inlined
@@ -162,7 +165,7 @@ def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
             state[U + lane],
             state[V + lane],
             state[R + lane],
-            state[P + lane] if ROLL else 0.0,
+            state[P + lane] if KEEPS_P else 0.0,
             state[PHI + lane] if ROLL else 0.0,
             state[DELTA + lane],
             state[N + lane] if SHAFT else 0.0,
@@ -177,8 +180,9 @@ def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
         state[U + lane] = pick(stays, old[3], new[3])
         state[V + lane] = pick(stays, old[4], new[4])
         state[R + lane] = pick(stays, old[5], new[5])
-        if ROLL:
+        if KEEPS_P:
             state[P + lane] = pick(stays, old[6], new[6])
+        if ROLL:
             state[PHI + lane] = pick(stays, old[7], new[7])
         state[DELTA + lane] = pick(stays, old[8], new[8])
         if SHAFT:

@@ -8,11 +8,11 @@ drift at another point and has another law for the wake.
 
 from __future__ import annotations
 
-from math import asin, atan2, exp, fabs, pi, sqrt
+from math import fabs, pi, sqrt
 from typing import Any
 
 from .compiling import inlined
-from .trigonometry import sin_cos
+from .trigonometry import arctan2, exponential, sin_cos
 
 ROLL = False
 SHAFT = False
@@ -51,10 +51,10 @@ def wake(drift: float, turn: float) -> float:
     """Wake fraction at the propeller."""
     if PACKAGE_FORM:
         angle = drift - x_P_package * turn
-        return w_P0 * exp(-4.0 * angle * angle)
+        return w_P0 * exponential(-4.0 * angle * angle)
     angle = drift - x_P * turn
     side = C_2_starboard if angle >= 0.0 else C_2_port
-    return 1.0 - (1.0 - w_P0) * (1.0 + (1.0 - exp(-C_1 * fabs(angle))) * (side - 1.0))
+    return 1.0 - (1.0 - w_P0) * (1.0 + (1.0 - exponential(-C_1 * fabs(angle))) * (side - 1.0))
 
 
 @inlined
@@ -74,11 +74,12 @@ def accelerations(
     if PACKAGE_FORM:
         at = v - r * xG
         U = sqrt(u * u + at * at)
-        drift = asin(-at / U)
+        drift = arctan2(-at, fabs(u))  # the arc sine of -at / U
     else:
         U = sqrt(u * u + v * v)
-        drift = atan2(-v, u)
-    v_, r_ = v / U, r * L / U
+        drift = arctan2(-v, u)
+    per_U = 1.0 / U
+    v_, r_ = v * per_U, r * L * per_U
 
     w_P = wake(drift, r_)
     J = u * (1.0 - w_P) / (n * D_P)
@@ -88,7 +89,7 @@ def accelerations(
     beta_R = drift - l_R * r_
     v_R = U * (gamma_minus if beta_R < 0.0 else gamma_plus) * beta_R
     eta = D_P / H_R
-    race = 1.0 + kappa * (sqrt(1.0 + 8.0 * K_T / (pi * J * J)) - 1.0)
+    race = 1.0 + kappa * (sqrt(1.0 + (8.0 / pi) * K_T / (J * J)) - 1.0)
     u_R = epsilon * u * (1.0 - w_P) * sqrt(eta * race * race + 1.0 - eta)
     sine, cosine = sin_cos(delta)
     # (u_R^2 + v_R^2) sin(delta - atan2(v_R, u_R)), without the arc
@@ -111,10 +112,10 @@ def accelerations(
     m = volume
     m_x, m_y = mx * 0.5 * L * L * d, my * 0.5 * L * L * d
     inertia = m * (0.25 * L) ** 2 + xG * xG * m + Jz * 0.5 * L**4 * d
-    udot = (X + (m + m_y) * v * r + xG * m * r * r) / (m + m_x)
+    udot = (X + (m + m_y) * v * r + xG * m * r * r) * (1.0 / (m + m_x))
     sway, yaw = Y - (m + m_x) * u * r, N - xG * m * u * r
-    vdot = (inertia * sway - xG * m * yaw) / ((m + m_y) * inertia - (xG * m) ** 2)
-    rdot = (yaw - xG * m * vdot) / inertia
+    vdot = (inertia * sway - xG * m * yaw) * (1.0 / ((m + m_y) * inertia - (xG * m) ** 2))
+    rdot = (yaw - xG * m * vdot) * (1.0 / inertia)
     return udot, vdot, rdot, 0.0
 
 

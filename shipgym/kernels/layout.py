@@ -21,7 +21,8 @@ def row(offset: int) -> int:
     return offset // LANES
 
 
-# state of a ship; roll (P, PHI) and shaft (N) stay 0 in ships that have none
+# state of a ship; roll (P, PHI) and shaft (N) stay 0 in ships that have none; a table with a memory of yaw
+# keeps it in P
 STATE_NAMES = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
 N_STATE = 10
 X, Y, PSI, U, V, R, P, PHI, DELTA, N = offsets(0, N_STATE)

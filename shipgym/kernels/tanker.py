@@ -7,10 +7,11 @@ The source's rudder is positive to port; here it is turned.
 
 from __future__ import annotations
 
-from math import atan, fabs
+from math import fabs
 from typing import Any
 
 from .compiling import inlined
+from .trigonometry import arctan
 
 ROLL = False
 SHAFT = True
@@ -57,25 +58,27 @@ def accelerations(
     L = LENGTH
     d = -delta
     z = DRAUGHT / (depth - DRAUGHT)
-    beta = atan(v / u)
-    gT = T_uu * u * u / L + T_un * u * n + L * T_nn * fabs(n) * n
+    beta = arctan(v / u)
+    gT = (T_uu / L) * u * u + T_un * u * n + L * T_nn * fabs(n) * n
     cc = max(c_un * u * n + c_nn * n * n, 0.0)
     drift = cc * fabs(beta) * beta * fabs(d)
     uvz = Y_uvz * (1.0 - VERY_SHALLOW / z) if z >= VERY_SHALLOW else 0.0
 
     X = (
         (X_uu * u * u + X_vv * v * v + X_ccdd * cc * d * d + X_ccbd * cc * beta * d
-         + X_uuz * u * u * z + X_vvzz * v * v * z * z) / L
+         + X_uuz * u * u * z + X_vvzz * v * v * z * z) * (1.0 / L)
         + (d11 + X_vrz * z) * v * r + (1.0 - t) * gT
     )  # fmt: skip
     Y = (
         (Y_uv * u * v + Y_vv * fabs(v) * v + Y_ccd * cc * d + Y_ccbbd * drift
-         + uvz * u * v * z + Y_vvz * fabs(v) * v * z + Y_ccbbdz * drift * z) / L
+         + uvz * u * v * z + Y_vvz * fabs(v) * v * z + Y_ccbbdz * drift * z) * (1.0 / L)
         + (d22 + Y_urz * z) * u * r + Y_T * gT
     )  # fmt: skip
     N = (
-        (N_uv * u * v + N_ccd * cc * d + N_ccbbd * drift + N_uvz * u * v * z + N_ccbbdz * drift * z) / (L * L)
-        + (N_vr * fabs(v) * r + d33 * u * r + N_urz * u * r * z + N_vrz * fabs(v) * r * z + N_T * gT) / L
+        (N_uv * u * v + N_ccd * cc * d + N_ccbbd * drift + N_uvz * u * v * z + N_ccbbdz * drift * z)
+        * (1.0 / (L * L))
+        + (N_vr * fabs(v) * r + d33 * u * r + N_urz * u * r * z + N_vrz * fabs(v) * r * z + N_T * gT)
+        * (1.0 / L)
     )  # fmt: skip
     return X / (m11 - X_udotz * z), Y / (m22 - Y_vdotz * z), N / (m33 - N_rdotz * z), 0.0
 
@@ -83,4 +86,4 @@ def accelerations(
 @inlined
 def shaft_acceleration(n: float, command: float, ship: Any, lane: int) -> float:
     """Lag of the shaft."""
-    return (min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT) - n) / SHAFT_LAG
+    return (min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT) - n) * (1.0 / SHAFT_LAG)

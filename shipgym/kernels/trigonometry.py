@@ -1,19 +1,30 @@
-"""Sine and cosine that a vectorised loop can hold.
+"""Sine, cosine, exponential and arc tangent that a vectorised loop can hold.
 
+Calls into the C library would stop the loop over lanes from being vectorised. Sine and cosine:
 Cody-Waite reduction to [-pi/4, pi/4] and the minimax polynomials of fdlibm (`k_sin.c`, `k_cos.c`,
-Sun Microsystems 1993); error below 2e-16 for |x| < 1e5. Calls into the C library would stop the loop
-over lanes from being vectorised.
+Sun Microsystems 1993); error below 2e-16 for |x| < 1e5. Exponential: the same reduction to
+[-ln 2 / 2, ln 2 / 2] and the polynomial of `e_exp.c`. Arc tangent: reduction to |x| < 0.66 and the rational
+function of the Cephes library (`atan.c`, Moshier 1995).
 """
 
 from __future__ import annotations
 
-from math import floor, pi
+from math import copysign, fabs, floor, pi
+
+import numpy as np
 
 from .compiling import inlined
 
 TWO_OVER_PI = 2.0 / pi
 HALF_PI_HIGH = 1.57079632673412561417e00
 HALF_PI_LOW = 6.07710050650619224932e-11
+PER_LN_2 = 1.44269504088896338700e00
+LN_2_HIGH = 6.93147180369123816490e-01
+LN_2_LOW = 1.90821492927058770002e-10
+LOWEST, HIGHEST = -746.0, 710.0  # exponents beyond which the exponential is 0 or infinite
+EXPONENT = 4503599627370496.0 + 1023.0  # added to a whole number: its biased exponent in the lowest bits
+TAN_3_PI_OVER_8 = 2.41421356237309504880
+HALF_PI_REST = 6.12323399573676588613e-17  # pi / 2 less its double
 
 
 @inlined
@@ -73,3 +84,73 @@ def sin_cos(x: float) -> tuple[float, float]:
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     return angle - 2.0 * pi * floor(angle / (2.0 * pi) + 0.5)
+
+
+@inlined
+def power_of_two(k: float) -> float:
+    """2 to the power of a whole number in [-1022, 1023]."""
+    bits = np.float64(k + EXPONENT).view(np.int64) << 52
+    return np.int64(bits).view(np.float64)
+
+
+@inlined
+def exponential(x: float) -> float:
+    """Exponential of x; 0 and infinity beyond the range of numbers."""
+    within = min(max(x, LOWEST), HIGHEST)
+    k = floor(within * PER_LN_2 + 0.5)
+    high = within - k * LN_2_HIGH
+    low = k * LN_2_LOW
+    y = high - low
+    z = y * y
+    c = y - z * (
+        1.66666666666666019037e-01
+        + z
+        * (
+            -2.77777777770155933842e-03
+            + z
+            * (
+                6.61375632143793436117e-05
+                + z * (-1.65339022054652515390e-06 + z * 4.13813679705723846039e-08)
+            )
+        )
+    )
+    mantissa = 1.0 - ((low - y * c / (2.0 - c)) - high)
+    half = floor(0.5 * k)  # in two steps, for the subnormal numbers
+    value = mantissa * power_of_two(half) * power_of_two(k - half)
+    return value if x == x else x
+
+
+@inlined
+def arctan2(y: float, x: float) -> float:
+    """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
+    a, b = fabs(y), fabs(x)
+    steep = a > TAN_3_PI_OVER_8 * b
+    middling = a > 0.66 * b
+    above = -b if steep else (a - b if middling else a)
+    below = a if steep else (a + b if middling else b)
+    q = above / (below if below > 0.0 else 1.0)
+    z = q * q
+    p = -6.485021904942025371773e01 + z * (
+        -1.228866684490136173410e02
+        + z
+        * (-7.500855792314704667340e01 + z * (-1.615753718733365076637e01 + z * -8.750608600031904122785e-01))
+    )
+    d = 1.945506571482613964425e02 + z * (
+        4.853903996359136964868e02
+        + z
+        * (
+            4.328810604912902668951e02
+            + z * (1.650270098316988542046e02 + z * (2.485846490142306297962e01 + z))
+        )
+    )
+    arc = q + q * (z * p / d)
+    quarters = 0.5 if steep else (0.25 if middling else 0.0)
+    angle = quarters * pi + (arc + 2.0 * quarters * HALF_PI_REST)
+    if_behind = pi - (angle - 2.0 * HALF_PI_REST)
+    return copysign(if_behind if copysign(1.0, x) < 0.0 else angle, y)
+
+
+@inlined
+def arctan(x: float) -> float:
+    """Angle in [-pi/2, pi/2] whose tangent is x, rad."""
+    return arctan2(x, 1.0)

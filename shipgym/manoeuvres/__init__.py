@@ -7,6 +7,7 @@ from shipgym.manoeuvres.excitation import (
     shaft_speed_steps,
 )
 from shipgym.manoeuvres.imo import Criterion, imo_assessment
+from shipgym.manoeuvres.intervals import IndexInterval, index_intervals
 from shipgym.manoeuvres.pull_outs import PullOutIndices, pull_out, pull_out_indices
 from shipgym.manoeuvres.spirals import (
     Spiral,
@@ -16,11 +17,13 @@ from shipgym.manoeuvres.spirals import (
     spiral_from_trial,
     spiral_indices,
 )
+from shipgym.manoeuvres.standard import Manoeuvre, standard_manoeuvres
 from shipgym.manoeuvres.stopping import (
     AccelerationIndices,
     StoppingIndices,
     acceleration,
     acceleration_indices,
+    crash_stop,
     stopping,
     stopping_indices,
 )
@@ -30,6 +33,8 @@ from shipgym.manoeuvres.zigzags import ZigzagIndices, switch_heading_deg, zigzag
 __all__ = [
     "AccelerationIndices",
     "Criterion",
+    "IndexInterval",
+    "Manoeuvre",
     "PullOutIndices",
     "Spiral",
     "SpiralIndices",
@@ -38,8 +43,10 @@ __all__ = [
     "ZigzagIndices",
     "acceleration",
     "acceleration_indices",
+    "crash_stop",
     "direct_spiral",
     "imo_assessment",
+    "index_intervals",
     "multi_sine_rudder",
     "prbs_rudder",
     "pull_out",
@@ -49,6 +56,7 @@ __all__ = [
     "shaft_speed_steps",
     "spiral_from_trial",
     "spiral_indices",
+    "standard_manoeuvres",
     "stopping",
     "stopping_indices",
     "switch_heading_deg",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,12 +41,12 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     usual = ARRIVED * np.percentile(np.abs(delta), 75)
     side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
     arrived = np.flatnonzero((side != 0) & (t >= start))
+    changes = np.flatnonzero(np.diff(side[arrived]))
     turns = []
-    for before, after in pairwise(arrived):
-        if side[before] != side[after]:
-            moving = slice(before, after + 1)
-            ordered = "delta_command" in trial.channels
-            turns.append(float(t[after]) if ordered else departure(t[moving], delta[moving]))
+    for before, after in zip(arrived[changes], arrived[changes + 1], strict=True):
+        moving = slice(before, after + 1)
+        ordered = "delta_command" in trial.channels
+        turns.append(float(t[after]) if ordered else departure(t[moving], delta[moving]))
     return start, turns
 
 

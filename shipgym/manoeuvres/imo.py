@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from shipgym.errors import ManoeuvreError, UnstableModelError
-from shipgym.manoeuvres.turning import TurningIndices, turning_circle, turning_indices
-from shipgym.manoeuvres.zigzags import ZigzagIndices, zigzag, zigzag_indices
+from shipgym.checks import check_number
+from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of, worst
+from shipgym.manoeuvres.standard import Manoeuvre, speed_changes, turning_circles, zigzags
 from shipgym.models.ship_model import ShipModel
 
-STEPS_PER_LENGTH = 50  # simulation steps in the time to travel one ship length
+DRAWS = 100  # of an identified ship
+STOPPING_LIMIT = 15.0  # ship lengths
+LARGE_DISPLACEMENT = (
+    "where large displacement makes 15 lengths impracticable, the Administration may allow up to 20"
+)
 
 
 @dataclass(frozen=True)
@@ -25,53 +30,131 @@ class Criterion:
         In `unit`; None where the manoeuvre never got so far.
     limit : float
         Largest value allowed.
-    passed : bool
+    passed : bool or None
+        None where the ship's equations do not allow the test; `note` says why.
     unit : str
         "ship lengths" or "deg".
     source : str
         Paragraph of the annex of MSC.137(76).
+    drawn : IndexInterval or None
+        The value over models drawn from the posterior of an identified ship.
+    note : str
+        What else is to be known.
     """
 
     value: float | None
     limit: float
-    passed: bool
+    passed: bool | None
     unit: str
     source: str
+    drawn: IndexInterval | None = None
+    note: str = ""
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """95 % interval over the draws (`IndexInterval.interval`)."""
+        return None if self.drawn is None else self.drawn.interval
+
+    @property
+    def share_passed(self) -> float | None:
+        """Share of the draws that pass; those that run away or never get so far do not."""
+        if self.drawn is None or not len(self.drawn.values):
+            return None
+        return float(np.mean(self.drawn.values <= self.limit))  # NaN is not
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON knows it."""
+        told: dict[str, Any] = {
+            "value": self.value,
+            "limit": self.limit,
+            "passed": self.passed,
+            "unit": self.unit,
+            "source": self.source,
+        }
+        if self.note:
+            told["note"] = self.note
+        if self.drawn is not None and len(self.drawn.values):
+            low, median, high = self.drawn.quantiles(0.05, 0.5, 0.95)
+            told |= {"probability": self.share_passed, "interval_95": self.interval}
+            told |= {"quantile_05": low, "median": median, "quantile_95": high}
+            told |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
+            told |= {"without_value": int(np.isnan(self.drawn.values).sum())}
+        return told
 
 
-def imo_assessment(model: ShipModel) -> dict[str, Criterion]:
-    """Judge a ship by MSC.137(76): turning ability, initial turning, yaw checking and course keeping.
+def imo_assessment(
+    model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
+) -> dict[str, Criterion]:
+    """Judge a ship by MSC.137(76): turning, initial turning, yaw checking, course keeping and stopping.
 
     Simulated from service speed in deep water: turning circles with 35 degrees of rudder, or the
-    rudder's limit where that is less, and zigzags 10/10 and 20/20, each to both sides. Stopping ability
-    (paragraph 5.3.4) needs an engine astern and is not judged.
+    rudder's limit where that is less, and zigzags 10/10 and 20/20, each to both sides; a full astern stop
+    where the ship's equations hold for a shaft astern.
 
     Parameters
     ----------
     model : ShipModel
         The ship.
+    n_draws : int, optional
+        Models drawn from the covariance of an identified ship, to tell how certain each verdict is; by
+        default 100, and none for a ship without covariance.
+    seed : int or Generator
+        Of the draw.
 
     Returns
     -------
     dict of str to Criterion
         `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`, `overshoot_2_10_10`,
-        `overshoot_1_20_20`.
+        `overshoot_1_20_20`, `stopping`.
+
+    Raises
+    ------
+    InputError
+        If draws are asked for and the model has no covariance.
     """
-    seconds_per_length = model.particulars["length"] / model.particulars["speed"]
-    dt = seconds_per_length / STEPS_PER_LENGTH
-    full = min(35.0, model.steering.rudder_limit_deg)
-    duration = 40.0 * seconds_per_length
-    circles = [_turn(model, side * full, duration, dt) for side in (1, -1)]
-    tens = [_zigzag(model, 10.0, port_first, duration, dt) for port_first in (False, True)]
-    twenties = [_zigzag(model, 20.0, port_first, duration, dt) for port_first in (False, True)]
-    first, second = overshoot_limits_deg(seconds_per_length)
+    usual = 0 if model.covariance is None else DRAWS
+    count = int(check_number(usual if n_draws is None else n_draws, "n_draws", at_least=0))
+    draws = model.sample(count, seed) if count else []
+    return assess_draws(model, draws)
+
+
+def assess_draws(
+    model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
+) -> dict[str, Criterion]:
+    """The criteria of a model, with their spread over models drawn; `progress` is told the draws done."""
+    needed = imo_manoeuvres(model)
+    own = {name: attempt(test.judge, model)[0] or test.nothing for name, test in needed.items()}
+    judged = {name: test.judge for name, test in needed.items()}
+    return judge_imo(model, intervals_of(own, draws, judged, progress))
+
+
+def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
+    """The standard manoeuvres that the criteria need."""
+    stops = {name: stop for name, stop in speed_changes(model).items() if name == "crash stop"}
+    return turning_circles(model) | zigzags(model) | stops
+
+
+def judge_imo(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]) -> dict[str, Criterion]:
+    """The criteria of a ship from the indices of her standard manoeuvres, by their names.
+
+    A manoeuvre that never got so far fails its criteria.
+    """
+    first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
+
+    def judged(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
+        runs = [run for name, run in found.items() if name.startswith(manoeuvre)]
+        return _judge(runs, index, limit, unit, paragraph)
+
     return {
-        "advance": _judge(circles, "advance_lengths", 4.5, "ship lengths", "5.3.1"),
-        "tactical_diameter": _judge(circles, "tactical_diameter_lengths", 5.0, "ship lengths", "5.3.1"),
-        "initial_turning": _judge(tens, "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
-        "overshoot_1_10_10": _judge(tens, "overshoot_1_deg", first, "deg", "5.3.3.1"),
-        "overshoot_2_10_10": _judge(tens, "overshoot_2_deg", second, "deg", "5.3.3.2"),
-        "overshoot_1_20_20": _judge(twenties, "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
+        "advance": judged("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
+        "tactical_diameter": judged(
+            "turning circle", "tactical_diameter_lengths", 5.0, "ship lengths", "5.3.1"
+        ),
+        "initial_turning": judged("zigzag 10/10", "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
+        "overshoot_1_10_10": judged("zigzag 10/10", "overshoot_1_deg", first, "deg", "5.3.3.1"),
+        "overshoot_2_10_10": judged("zigzag 10/10", "overshoot_2_deg", second, "deg", "5.3.3.2"),
+        "overshoot_1_20_20": judged("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
+        "stopping": _stopping(model, found.get("crash stop")),
     }
 
 
@@ -82,30 +165,28 @@ def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
     return float(first), float(second)
 
 
-def _turn(model: ShipModel, rudder_deg: float, duration: float, dt: float) -> TurningIndices | None:
-    """Indices of a turning circle, None where the ship runs away."""
-    try:
-        return turning_indices(turning_circle(model, rudder_deg, duration, dt))
-    except UnstableModelError:
-        return None
-
-
-def _zigzag(
-    model: ShipModel, angle_deg: float, port_first: bool, duration: float, dt: float
-) -> ZigzagIndices | None:
-    """Indices of a zigzag with rudder and heading of one angle, None where it fails or the ship runs away."""
-    try:
-        return zigzag_indices(zigzag(model, angle_deg, angle_deg, port_first, duration, dt))
-    except (ManoeuvreError, UnstableModelError):
-        return None
-
-
 def _judge(
-    runs: Sequence[TurningIndices | ZigzagIndices | None], index: str, limit: float, unit: str, paragraph: str
+    runs: Sequence[Mapping[str, IndexInterval]],
+    index: str,
+    limit: float,
+    unit: str,
+    paragraph: str,
+    note: str = "",
 ) -> Criterion:
     """The worst value of some runs against its limit; a run that never got so far fails it."""
-    values = [None if run is None else getattr(run, index) for run in runs]
-    reached = [value for value in values if value is not None]
-    worst = max(reached) if len(reached) == len(values) else None
-    passed = worst is not None and worst <= limit
-    return Criterion(worst, limit, passed, unit, f"MSC.137(76), annex, {paragraph}")
+    drawn = worst([run[index] for run in runs])
+    passed = drawn.value is not None and drawn.value <= limit
+    return Criterion(drawn.value, limit, passed, unit, f"MSC.137(76), annex, {paragraph}", drawn, note)
+
+
+def _stopping(model: ShipModel, stop: Mapping[str, IndexInterval] | None) -> Criterion:
+    """The full astern stopping test."""
+    if stop is not None:
+        return _judge(
+            [stop], "track_reach_lengths", STOPPING_LIMIT, "ship lengths", "5.3.4", LARGE_DISPLACEMENT
+        )
+    why = "its equations hold for a shaft turning ahead only"
+    if "n" not in model.command_names:
+        why = "its thrust is inside its surge coefficients, so it cannot be ordered astern"
+    note = f"not assessable: {why}"
+    return Criterion(None, STOPPING_LIMIT, None, "ship lengths", "MSC.137(76), annex, 5.3.4", None, note)

@@ -64,10 +64,13 @@ class SpiralIndices:
         on a straight course. A direct spiral knows it to within its rudder steps.
     loop_height_deg_s : float
         Difference of both yaw rates in the middle of the loop, degrees per second.
+    loop_middle_deg : float
+        Rudder in the middle of the loop, degrees; of a stable ship that with which she sails straight.
     """
 
     loop_width_deg: float
     loop_height_deg_s: float
+    loop_middle_deg: float
 
 
 def direct_spiral(
@@ -254,8 +257,8 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
     return SpiralIndices(*find(spiral.rudder_deg, spiral.yaw_rate_deg_s))
 
 
-def _direct_loop(angles: Floats, rates: Floats) -> tuple[float, float]:
-    """Width, deg, and height, deg/s: the way to port changes side at another rudder than the way back."""
+def _direct_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
+    """Width, deg, height, deg/s, and middle, deg: each way changes side at another rudder."""
     turn = int(np.argmin(angles) if np.argmax(angles) < np.argmin(angles) else np.argmax(angles))
     there = np.array([angles[: turn + 1], rates[: turn + 1]])
     back = np.array([angles[turn:], rates[turn:]])
@@ -267,7 +270,7 @@ def _direct_loop(angles: Floats, rates: Floats) -> tuple[float, float]:
     width = max(to_starboard - to_port, 0.0)
     middle = 0.5 * (to_starboard + to_port)
     height = float(np.interp(middle, *falling) - np.interp(middle, *rising))
-    return width, max(height, 0.0)
+    return width, max(height, 0.0), middle
 
 
 def _changes_side(way: Floats, last: bool) -> float:
@@ -280,8 +283,8 @@ def _changes_side(way: Floats, last: bool) -> float:
     return float(np.interp(0.0, rates[k : k + 2], angles[k : k + 2]))
 
 
-def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float]:
-    """Width, deg, and height, deg/s, of the fold in the curve of rudder over yaw rate."""
+def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
+    """Width, deg, height, deg/s, and middle, deg, of the fold in the curve of rudder over yaw rate."""
     from scipy.interpolate import Akima1DInterpolator
 
     order = np.argsort(rates)
@@ -291,7 +294,7 @@ def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float]:
     low = int(np.argmax(highest - curve))
     width = float(highest[low] - curve[low])
     if width == 0.0:
-        return 0.0, 0.0
+        return 0.0, 0.0, float(np.interp(0.0, fine, curve))
     middle = 0.5 * (highest[low] + curve[low])
     inside = fine[np.flatnonzero(np.diff(np.sign(curve - middle)))]
-    return width, float(np.ptp(inside))
+    return width, float(np.ptp(inside)), float(middle)

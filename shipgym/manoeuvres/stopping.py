@@ -133,13 +133,28 @@ def _stopping_order(model: ShipModel, shaft_speed: float) -> float:
     order = check_number(
         shaft_speed, "shaft_speed", at_least=-1.5 * service, below=service, hint="less than at service speed"
     )
-    astern = isinstance(model.dynamics, Equations) and model.dynamics.astern
-    if order < 0.0 and not astern:
+    if order < 0.0 and not goes_astern(model):
         raise InputError(
             f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r} holds for a "
             "shaft turning ahead only; expected a number >= 0, or a ship like 'tanker'"
         )
     return order if "n" in model.state_names or order != 0.0 else CREEP * service
+
+
+def goes_astern(model: ShipModel) -> bool:
+    """Whether the equations of a ship hold for a shaft that turns astern."""
+    return isinstance(model.dynamics, Equations) and model.dynamics.astern
+
+
+def crash_stop(model: ShipModel) -> Trial:
+    """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
+
+    Raises
+    ------
+    InputError
+        For a ship whose equations do not hold astern.
+    """
+    return stopping(model, -shaft_of(model), speed_ratio=0.0)
 
 
 def stopping_indices(

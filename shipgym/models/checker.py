@@ -23,6 +23,10 @@ Floats = NDArray[np.float64]
 SAMPLES = 512
 #: Range of the states looked at, in service speed, service speed by length and rudder limit.
 SURGE, SWAY, YAW_RATE, RUDDER = (0.2, 1.1), 0.3, 0.8, 1.0
+ROLL_RATE, HEEL, MEMORY = 0.5, np.radians(15.0), 0.5  # the memory of yaw by (service speed by length)^2
+RATES = ("u", "v", "r", "p", "q")
+ANGULAR = ("r", "p", "q")
+CAPSIZED = np.radians(60.0)
 STEP = 0.02  # of the time to sail a ship length
 STRAIGHT_LENGTHS, TURN_LENGTHS = 30.0, 40.0
 SMALL_RUDDER = np.radians(5.0)
@@ -114,17 +118,25 @@ def _states(model: ShipModel) -> dict[str, Floats]:
         "u": u,
         "v": SWAY * u * random.uniform(-1.0, 1.0, SAMPLES),
         "r": YAW_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
+        "p": ROLL_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
+        "phi": HEEL * random.uniform(-1.0, 1.0, SAMPLES),
+        "q": MEMORY * (speed / length) ** 2 * random.uniform(-1.0, 1.0, SAMPLES),
         "delta": delta,
         "n": np.full(SAMPLES, model.service_shaft_speed),
     }
 
 
+def _rates(model: ShipModel) -> list[str]:
+    """Velocities of the model, and its memory of yaw: what has an acceleration."""
+    return [name for name in RATES if name in model.state_names]
+
+
 def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
-    """Accelerations udot, vdot, rdot, shape (n, 3)."""
+    """Accelerations in the order of `_rates`, shape (n, n_rates)."""
     zero = np.zeros(SAMPLES)
     states = np.stack([channels.get(name, zero) for name in model.state_names], axis=-1)
     commands = np.stack([channels[name] for name in model.command_names], axis=-1)
-    which = [model.state_names.index(name) for name in ("u", "v", "r")]
+    which = [model.state_names.index(name) for name in _rates(model)]
     return model.derivatives(states, commands)[:, which]
 
 
@@ -133,10 +145,11 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     found = _accelerations(model, channels)
     if not np.all(np.isfinite(found)):
         row, axis = np.argwhere(~np.isfinite(found))[0]
-        state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in ("u", "v", "r", "delta"))
+        known = [name for name in (*RATES, "phi", "delta") if name in model.state_names]
+        state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
         yield (
-            f"derivatives: {found[row, axis]} found for the acceleration of '{'uvr'[axis]}' at {state} "
-            "(SI units), expected a number; look for coefficients that are far too large"
+            f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
+            f"{state} (SI units), expected a number; look for coefficients that are far too large"
         )
         return
     if isinstance(model.dynamics, Structure):
@@ -151,26 +164,33 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
 
 
 def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats]) -> Floats:
-    """Accelerations as sums of the table's terms, shape (n, 3)."""
+    """Accelerations as sums of the table's terms, shape (n, n_rates)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     shaft = model.service_shaft_speed
     theta = table.kernel_coefficients(model.coefficients, model.particulars, shaft)
-    accelerations = np.zeros((SAMPLES, 3))
-    accelerations[:, 1:] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
+    rates = _rates(model)
+    accelerations = np.zeros((SAMPLES, len(rates)))
+    accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
     row = 0
     for equation, terms in table.equations.items():
         features = table.features(equation, channels, model.particulars, shaft)
-        accelerations[:, "uvr".index(equation)] = features @ theta[row : row + len(terms)]
+        accelerations[:, rates.index(equation)] = features @ theta[row : row + len(terms)]
         row += len(terms)
+    if "q" in rates:
+        accelerations[:, rates.index("r")] += channels["q"]
     return accelerations
 
 
 def _asymmetry(model: ShipModel) -> float:
     """Difference of the accelerations from their mirror image over their size, all in the prime system."""
     channels = _states(model)
-    mirrored = channels | {name: -channels[name] for name in ("v", "r", "delta")}
-    ours, image = _accelerations(model, channels), _accelerations(model, mirrored) * [1.0, -1.0, -1.0]
-    unit = [1.0, 1.0, model.particulars["length"]]
+    odd = ("v", "r", "p", "phi", "q", "delta")
+    mirrored = channels | {name: -channels[name] for name in odd}
+    rates = _rates(model)
+    sign = [-1.0 if name in odd else 1.0 for name in rates]
+    ours, image = _accelerations(model, channels), _accelerations(model, mirrored) * sign
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    unit = [(length if q in ANGULAR else 1.0) * (length / speed if q == "q" else 1.0) for q in rates]
     difference, size = (ours - image) * unit, (ours * unit)
     total = float(np.sqrt(np.mean(size**2)))
     return float(np.sqrt(np.mean(difference**2))) / (2.0 * total) if total > 0.0 else 0.0
@@ -193,7 +213,14 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
     }
     for name, sail in courses.items():
         try:
-            sail()
+            trial = sail()
+            heel = float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
+            if not heel < CAPSIZED:
+                yield (
+                    f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than "
+                    f"{np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose coefficient of phi "
+                    "rights the ship where it is negative; identify it from trials with more roll"
+                )
         except UnstableModelError as error:
             yield f"{name}: {error}; identify it from trials with larger rudder angles, or with fewer terms"
 

@@ -38,6 +38,7 @@ def container(rudder_limit_deg: float = 35.0) -> ShipModel:
             speed=8.376672395256,
             rudder_area=numbers.RUDDER_AREA,
             propeller_diameter=numbers.DIAMETER,
+            metacentric_height=numbers.GM,
             water_density=1025.0,
             X_udot=-numbers.mx,
             Y_vdot=-numbers.my,

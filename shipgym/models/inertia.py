@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.models.shared_structure import SharedStructure
 from shipgym.models.ship_model import ShipModel
 
 Floats = NDArray[np.float64]
@@ -62,6 +63,10 @@ def _prime_mass(model: ShipModel) -> float:
 def _particulars(model: ShipModel) -> Floats:
     p = model.particulars.completed()
     unit, L = _prime_mass(model), p.length
+    if isinstance(model.dynamics, SharedStructure):
+        arms = np.array([1.0, 1.0, L])
+        added = model.dynamics.inertia(model.coefficients, p) * np.outer(arms, arms)
+        return unit * np.hstack([added, np.zeros((3, 1))])
     m, static = p.mass_prime, p.mass_prime * p.xg_prime
     prime = np.zeros((3, 4))
     prime[0, 0] = m - p.require("X_udot")

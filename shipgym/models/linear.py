@@ -25,7 +25,14 @@ SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed wh
 LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
 LARGEST_SWAY = 0.5  # over service speed, likewise
 AT_REST = 1e-8  # prime acceleration that is none
-BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "n": "n"}  # rate that each unknown brings to 0
+BALANCED_BY = {
+    "u": "u",
+    "v": "v",
+    "delta": "r",
+    "phi": "p",
+    "q": "q",
+    "n": "n",
+}  # rate that each unknown brings to 0
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,8 @@ class StraightRunning:
         Rad, starboard down; 0 where the model knows no roll.
     shaft_speed : float
         1/s; 0 where the model's shaft has no dynamics.
+    memory : float
+        Yaw acceleration that a table with a memory `q` keeps, rad/s^2.
     """
 
     surge: float
@@ -49,6 +58,7 @@ class StraightRunning:
     rudder: float
     heel: float = 0.0
     shaft_speed: float = 0.0
+    memory: float = 0.0
 
     def state(self, model: ShipModel) -> Floats:
         """The state vector, in the order of `model.state_names`, shape (n_state,)."""
@@ -58,6 +68,7 @@ class StraightRunning:
             "delta": self.rudder,
             "phi": self.heel,
             "n": self.shaft_speed,
+            "q": self.memory,
         }
         return np.array([values.get(name, 0.0) for name in model.state_names])
 
@@ -122,7 +133,8 @@ def straight_running(model: ShipModel) -> StraightRunning:
             f"{np.degrees(LARGEST_RUDDER):.0f} deg of rudder at {model.particulars['speed']:g} m/s; identify "
             f"it from trials that turn to both sides, or check the sign of the rudder"
         )
-    return StraightRunning(found["u"], found["v"], found["delta"], found.get("phi", 0.0), found.get("n", 0.0))
+    others = (found.get(name, 0.0) for name in ("phi", "n", "q"))
+    return StraightRunning(found["u"], found["v"], found["delta"], *others)
 
 
 def _balance(model: ShipModel, unknowns: list[str]) -> dict[str, float] | None:
@@ -156,6 +168,7 @@ def _scales(model: ShipModel) -> Floats:
         "v": speed,
         "r": speed / length,
         "p": speed / length,
+        "q": (speed / length) ** 2,
         "n": model.service_shaft_speed or 1.0,
     }
     return np.array([units.get(name, 1.0) for name in model.state_names])
@@ -169,33 +182,41 @@ def _rates(model: ShipModel, states: Floats) -> Floats:
     return np.asarray(model.derivatives(states, commands) * time / _scales(model))
 
 
-def linearise(model: ShipModel, at: StraightRunning) -> tuple[Floats, Floats]:
-    """Linear steering dynamics about a state without yaw rate, by central differences.
+def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Floats, Floats]:
+    """Linear steering dynamics about a state without yaw rate, by differences.
 
     Speed and shaft are held. Roll, where the model knows it, is taken to follow at once. Where even the
-    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken.
+    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken,
+    unless a side is given.
 
     Parameters
     ----------
     model : ShipModel
     at : StraightRunning
         The state about which small deviations are taken.
+    side : {0, 1, -1}
+        Of both sides the mean, or turns to starboard (1: drift to port, yaw rate to starboard), or to port.
 
     Returns
     -------
     A : array of shape (2, 2)
     B : array of shape (2, 1)
-        d/dt (v, r) = A (v, r) + B delta, deviations in SI units, delta positive to starboard.
+        d/dt (v, r) = A (v, r) + B delta, deviations in SI units, delta positive to starboard; the memory q of
+        yaw stands in place of v in a table that has one, because its ship does not drift.
     """
-    names = ("v", "r", *(name for name in ("p", "phi") if name in model.state_names))
+    first = "q" if "q" in model.state_names else "v"
+    names = (first, "r", *(name for name in ("p", "phi") if name in model.state_names))
     varied = [model.state_names.index(name) for name in (*names, "delta")]
     n = len(names)
     scales = _scales(model)
     steps = np.zeros((n + 1, len(scales)))
     steps[range(n + 1), varied] = STEP * scales[varied]
+    if side:
+        steps *= side * np.array([-1.0] + n * [1.0])[:, None]
     state = at.state(model)
-    change = (_rates(model, state + steps) - _rates(model, state - steps))[:, varied[:n]]
-    jacobian = change.T / (2.0 * STEP)
+    behind = state - (0.0 if side else 1.0) * steps
+    change = (_rates(model, state + steps) - _rates(model, behind))[:, varied[:n]]
+    jacobian = change.T / (STEP * (side * np.array([-1.0] + n * [1.0]) if side else 2.0))
     if n > 2:
         follows = np.linalg.solve(jacobian[2:, 2:n], jacobian[2:][:, [0, 1, n]])
         jacobian = jacobian[:2][:, [0, 1, n]] - jacobian[:2, 2:n] @ follows

@@ -4,9 +4,10 @@ Format 1:
 
     format         1
     name           text
-    structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r": [{"name",
-                   "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be absent, or
-                   for a reference ship {"name", "source"}
+    structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r" | "p" | "q":
+                   [{"name", "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be
+                   absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
+                   [{"coefficient", "name", "powers", "sign"}, ...]}}; for a reference ship {"name", "source"}
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s
@@ -31,8 +32,9 @@ from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models.envelope import CHANNELS, Envelope
 from shipgym.models.equations import EQUATIONS, Equations
+from shipgym.models.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.models.ship_model import ShipModel
-from shipgym.models.structures import FORCE_OF_EQUATION, SYMBOLS, Structure
+from shipgym.models.structures import EQUATION_NAMES, SYMBOLS, Structure
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
 
@@ -117,7 +119,9 @@ def _normalisation(dynamics: Structure | Equations) -> str:
 def _dynamics(value: Any, where: str) -> Structure | Equations:
     """A table of terms, or the name of a reference ship's equations."""
     table = check_table(value, where)
-    check_keys(table, ("name", "source", "normalisation", "quantity", "equations"), where)
+    check_keys(table, ("name", "source", "normalisation", "quantity", "equations", "shares"), where)
+    if "shares" in table:
+        return _shared(table, where)
     if "equations" in table:
         return _structure(table, where)
     return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
@@ -125,7 +129,7 @@ def _dynamics(value: Any, where: str) -> Structure | Equations:
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
     equations = check_table(table.get("equations"), f"{where}.equations")
-    check_keys(equations, FORCE_OF_EQUATION, f"{where}.equations")
+    check_keys(equations, EQUATION_NAMES, f"{where}.equations")
     for equation, terms in equations.items():
         if not isinstance(terms, list) or not terms:
             raise InputError(f"{where}.equations.{equation}: expected a list of terms")
@@ -138,6 +142,28 @@ def _structure(table: Mapping[str, Any], where: str) -> Structure:
     check_text(table.get("source"), f"{where}.source")
     check_text(table.get("name"), f"{where}.name")
     return Structure.from_dict(table)
+
+
+def _shared(table: Mapping[str, Any], where: str) -> Structure:
+    """A table for the forces of captive tests."""
+    shares = check_table(table["shares"], f"{where}.shares")
+    check_keys(shares, AXES, f"{where}.shares")
+    known = (*SYMBOLS, *ACCELERATIONS)
+    for axis in AXES:
+        listed = shares.get(axis)
+        if not isinstance(listed, list) or not listed:
+            raise InputError(f"{where}.shares.{axis}: expected a list of shares")
+        for i, entry in enumerate(listed):
+            place = f"{where}.shares.{axis}[{i}]"
+            share = check_table(entry, place)
+            check_keys(share, ("coefficient", "name", "powers", "sign"), place)
+            for name in ("coefficient", "name"):
+                check_text(share.get(name), f"{place}.{name}")
+            check_keys(check_table(share.get("powers"), f"{place}.powers"), known, f"{place}.powers")
+            check_number(share.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
+    check_text(table.get("source"), f"{where}.source")
+    check_text(table.get("name"), f"{where}.name")
+    return SharedStructure.from_dict(table)
 
 
 def _coefficients(value: Any, structure: Structure | Equations, where: str) -> dict[str, float]:

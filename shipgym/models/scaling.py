@@ -24,6 +24,8 @@ Floats = NDArray[np.float64]
 #: Powers of the length with which the particulars grow; those without unit stay.
 GROWTH = {
     "beam": 1, "draught": 1, "xg": 1, "yaw_gyradius": 1, "rudder_area": 2, "propeller_diameter": 1,
+    "length_overall": 1, "frontal_area": 2, "lateral_area": 2, "lateral_centroid": 1,
+    "lateral_centroid_height": 1, "metacentric_height": 1, "roll_period": 0.5,
 }  # fmt: skip
 
 
@@ -60,7 +62,8 @@ def scale_model(
     Notes
     -----
     Froude's law: speed as the root of the length, so that gravity and inertia stay in proportion (ITTC
-    Recommended Procedure 7.5-02-06-01).
+    Recommended Procedure 7.5-02-06-01). At another Froude number the righting moment of a table with roll,
+    which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
     if not isinstance(table, Structure):

@@ -209,7 +209,12 @@ class ShipModel:
 
     @cached_property
     def _columns(self) -> list[int]:
-        return [layout.STATE_NAMES.index(name) for name in self.state_names]
+        return [layout.STATE_NAMES.index(name) for name in self.kernel_names]
+
+    @property
+    def kernel_names(self) -> tuple[str, ...]:
+        """Names of the kernels' columns of its state; the memory `q` of yaw lies where others keep roll."""
+        return tuple("p" if name == "q" else name for name in self.state_names)
 
     def simulate(
         self, commands: ArrayLike, dt: float, state: ArrayLike | None = None, water_depth: float = np.inf

@@ -8,12 +8,13 @@ from typing import Any
 from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
 from shipgym.models.equations import EQUATIONS
-from shipgym.models.term_table import FORCE_OF_EQUATION, Structure
+from shipgym.models.pmm import PMM18, PMM38
+from shipgym.models.term_table import EQUATION_NAMES, FORCE_OF_EQUATION, Structure
 from shipgym.models.terms import SYMBOLS, Term, prime_terms, read_terms
 
 __all__ = [
-    "ABKOWITZ", "FORCE_OF_EQUATION", "STRUCTURES", "SYMBOLS", "Structure", "Term", "get_structure",
-    "list_structures", "prime_terms", "read_terms", "register_structure",
+    "ABKOWITZ", "EQUATION_NAMES", "FORCE_OF_EQUATION", "STRUCTURES", "SYMBOLS", "Structure", "Term",
+    "get_structure", "list_structures", "prime_terms", "read_terms", "register_structure",
 ]  # fmt: skip
 
 ZHU = "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship dynamics"
@@ -49,6 +50,15 @@ NORRBIN = accelerations(
     f"Norrbin 1963, T rdot + n1 r + n3 r^3 = K delta as rdot on r, r^3, delta; {ZHU}, equation 4.14; "
     "Song 2020, equation 3-1",
     r="r, r^3, delta",
+)
+NOMOTO2 = accelerations(
+    "nomoto2",
+    "Nomoto 1957, T1 T2 rddot + (T1 + T2) rdot + r = K (delta + T3 deltadot); "
+    f"{ZHU}, equation 4.12 (the dot "
+    "of the printed last term is lost); as rdot = c_r r + c_d delta + q, qdot = e_r r + e_d delta, where "
+    "c_r = -(1/T1 + 1/T2), c_d = K T3 / (T1 T2), e_r = -1 / (T1 T2), e_d = K / (T1 T2)",
+    r="r, delta",
+    q="r, delta",
 )
 LINEAR_STEERING = accelerations(
     "linear-steering",
@@ -99,11 +109,25 @@ CUBIC = accelerations(
     r=CUBIC_STEERING,
 )
 
-STRUCTURES = {
+RUDDER_4DOF = "n^2 delta, n u delta, n^2 delta^3"
+MMG_4DOF = accelerations(
+    "mmg4dof",
+    "Song 2020, Nonlinear innovation identification for ship maneuvering modeling via the full-scale trial "
+    "data, equation 4-2 and Table 4-2: surge, sway, yaw and roll; thrust and normal force of the rudder, "
+    "whose data are not printed, as n^2, n u and as n^2 delta, n u delta, n^2 delta^3; u r of sway and phi "
+    "of roll, taken for known there, are terms",
+    normalisation="service",
+    u="u^2, u^3, v^2, r^2, v r, u v^2, u v phi^2, n^2, n u, n^2 delta^2",
+    v="u v, u r, u p, u^2 v, r^3, v r^2, v^2 r, u v p^2, u r p^2, |v| v, |r| v, |v| r, |r| r, " + RUDDER_4DOF,
+    r="u v, u p, u phi, u^2 r, u^2 v, v^3, r^3, v r^2, v^2 r, u r p^2, |r| v, |v| v, " + RUDDER_4DOF,
+    p="p, phi, u v, u r, u^2 v, v^3, v^2 r, v r^2, u v phi^2, u r phi^2, |v| v, " + RUDDER_4DOF,
+)
+
+STRUCTURES: dict[str, Structure] = {
     structure.name: structure
     for structure in (
-        NOMOTO, NORRBIN, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
-        ABKOWITZ, CUBIC,
+        NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
+        ABKOWITZ, CUBIC, MMG_4DOF, PMM38, PMM18,
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)
@@ -141,7 +165,8 @@ def register_structure(
     name : str
         By which `identify` and `ShipModel` are to know it.
     equations : dict of str to str
-        Formulas of surge `u`, sway `v` and yaw `r`, or some of them, separated by commas: symbols side by
+        Formulas of surge `u`, sway `v`, yaw `r`, roll `p` and the memory `q` of yaw (see `Structure`), or
+        some of them, separated by commas: symbols side by
         side with spaces between, powers after `^`; `du` is the surge speed above service speed, `U` the
         speed through the water: `{"v": "v, r, |v| r, delta", "r": "v, r, v^2 r/U, delta"}`. See `read_terms`.
     source : str

@@ -16,13 +16,16 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.errors import InputError
-from shipgym.models.terms import CHANNEL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, YAW_RATES, Term
+from shipgym.models.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
 from shipgym.particulars import Particulars
 
 Floats = NDArray[np.float64]
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
-ACCELERATION_OF_EQUATION = {"u": "a", "v": "b", "r": "c"}  # as Zhu 2018 names the coefficients
+#: As Zhu 2018 names the coefficients of surge, sway and yaw; roll, and the memory of yaw, go on from there.
+ACCELERATION_OF_EQUATION = {"u": "a", "v": "b", "r": "c", "p": "d", "q": "e"}
+EQUATION_NAMES = tuple(ACCELERATION_OF_EQUATION)
+ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
 NORMALISATIONS = ("prime", "service", "si")
 QUANTITIES = ("force", "acceleration")
 ALWAYS_MEASURED = frozenset(("u", "v", "r", "delta"))
@@ -30,10 +33,14 @@ ALWAYS_MEASURED = frozenset(("u", "v", "r", "delta"))
 
 @dataclass(frozen=True)
 class Structure:
-    """A table of terms for surge, sway and yaw, or some of them.
+    """A table of terms for surge, sway, yaw and roll, or some of them.
 
     Without an equation of surge the ship keeps the speed it has; without one of sway or of yaw it does not
-    drift or turn, and what drift or turn it is given dies out within about a ship length.
+    drift or turn, and what drift or turn it is given dies out within about a ship length; without one of
+    roll it stays upright.
+
+    Yaw may have a memory q: part of its acceleration that builds up, rdot = (terms of `r`) + q and
+    qdot = (terms of `q`). It is the state that makes yaw of second order without sway.
 
     Attributes
     ----------
@@ -42,13 +49,15 @@ class Structure:
     source : str
         Where it was published.
     equations : dict of str to tuple of Term
-        Terms of surge (`u`), sway (`v`) and yaw (`r`), in this order.
+        Terms of surge (`u`), sway (`v`), yaw (`r`), roll (`p`) and of the memory of yaw (`q`), in this
+        order; roll and memory of accelerations only, and not both.
     normalisation : {"prime", "service", "si"}
         Units of the terms and of what they make up. "prime": divided by the instantaneous speed U and the
         length (u/U, rL/U, nL/U; force by rho L^2 U^2 / 2, acceleration by U^2 / L). "service": the same with
         the service speed U0 in place of U, shaft speed divided by that of service. "si": as they are.
     quantity : {"force", "acceleration"}
-        What the terms make up. Accelerations follow from forces by the inertia of the particulars (mass
+        What the terms make up (those of `q` accelerations per time). Accelerations follow from forces by
+        the inertia of the particulars (mass
         and added mass, sway and yaw coupled).
 
     Raises
@@ -69,15 +78,34 @@ class Structure:
         check_text(self.source, f"{where}: source")
         check_choice(self.normalisation, NORMALISATIONS, f"{where}: normalisation")
         check_choice(self.quantity, QUANTITIES, f"{where}: quantity")
-        known = [equation for equation in FORCE_OF_EQUATION if equation in self.equations]
+        known = [equation for equation in EQUATION_NAMES if equation in self.equations]
         if not known or list(self.equations) != known:
             raise InputError(
-                f"{where}: equations {quoted(self.equations)} found, expected some of 'u', 'v', 'r', in this "
-                "order"
+                f"{where}: equations {quoted(self.equations)} found, expected some of "
+                f"{quoted(EQUATION_NAMES)}, in this order"
             )
         for equation, terms in self.equations.items():
             _check_terms(terms, self.normalisation, f"{where}: equations.{equation}")
+        self._check_roll_and_memory(where)
         self._check_inertia(where)
+
+    def _check_roll_and_memory(self, where: str) -> None:
+        rolls, remembers = "p" in self.equations, "q" in self.equations
+        rolling = [symbol for symbol in self.symbols if symbol in ROLL]
+        if rolling and not rolls:
+            raise InputError(
+                f"{where}: symbol '{rolling[0]}' found, expected an equation of roll 'p' beside it; give its "
+                "terms, or leave roll out"
+            )
+        if remembers and ("r" not in self.equations or rolls):
+            raise InputError(
+                f"{where}: equations {quoted(self.equations)} found, expected the memory 'q' of yaw beside "
+                "an equation 'r' and without one of roll 'p'"
+            )
+        if (rolls or remembers) and self.quantity != "acceleration":
+            raise InputError(
+                f"{where}: forces found, expected accelerations in a table with roll 'p' or memory 'q'"
+            )
 
     def _check_inertia(self, where: str) -> None:
         if self.quantity != "force":
@@ -95,7 +123,7 @@ class Structure:
 
     @property
     def prefixes(self) -> Mapping[str, str]:
-        """First letter of the coefficients of each equation: X, Y, N of forces, a, b, c of accelerations."""
+        """First letter of the coefficients of each equation: X, Y, N of forces, a to e of accelerations."""
         return FORCE_OF_EQUATION if self.quantity == "force" else ACCELERATION_OF_EQUATION
 
     def names(self, equation: str) -> tuple[str, ...]:
@@ -117,7 +145,13 @@ class Structure:
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs so that the model can be identified and its envelope be known."""
         channels = {CHANNEL[symbol] for symbol in self.symbols} | ALWAYS_MEASURED
+        channels |= {"p"} & self.equations.keys()
         return tuple(name for name in SYMBOLS if name in channels - {"U"})
+
+    @property
+    def captive(self) -> bool:
+        """Whether it is identified from the forces of captive tests, not from free-running trials."""
+        return False
 
     @property
     def has_rudder(self) -> bool:
@@ -132,7 +166,19 @@ class Structure:
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the state."""
-        return ("x", "y", "psi", "u", "v", "r", "delta")
+        roll = ("p", "phi") if "p" in self.equations else ()
+        memory = ("q",) if "q" in self.equations else ()
+        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
+
+    @property
+    def regressed(self) -> tuple[str, ...]:
+        """Equations that have a regression of their own; the memory's terms belong to that of yaw."""
+        return tuple(equation for equation in self.equations if equation != "q")
+
+    def regression_names(self, equation: str) -> tuple[str, ...]:
+        """Names of the coefficients in the regression of one equation."""
+        memory = self.names("q") if equation == "r" and "q" in self.equations else ()
+        return self.names(equation) + memory
 
     @property
     def shallow_water(self) -> bool:
@@ -154,14 +200,19 @@ class Structure:
         return values
 
     def terms(self, equation: str) -> tuple[Term, ...]:
-        """Terms of the equation of surge `u`, sway `v` or yaw `r`."""
+        """Terms of one equation."""
         return self.equations[equation]
 
     def speed_power(self, equation: str, term: Term) -> int:
-        """Power of U in the feature: in the prime system U^2 less one per velocity, else none."""
+        """Power of U in the feature: in the prime system 2 (memory: 3) less one per velocity, else none."""
         if self.normalisation != "prime":
             return 0
-        return 2 - term.power(*SPEEDS, *YAW_RATES, *SHAFT_SPEEDS)
+        return self._speeds(equation) - term.power(*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
+
+    @staticmethod
+    def _speeds(equation: str) -> int:
+        """Power of the speed in the unit of what an equation makes up."""
+        return 3 if equation == "q" else 2
 
     def feature_scale(self, equation: str, term: Term, length: float, speed: float, shaft: float) -> float:
         """Coefficient of the SI feature that makes the term an acceleration for a coefficient of 1.
@@ -169,7 +220,7 @@ class Structure:
         Parameters
         ----------
         equation : str
-            `u`, `v` or `r`.
+            `u`, `v`, `r`, `p` or `q`.
         term : Term
             One of its terms.
         length, speed, shaft : float
@@ -177,11 +228,11 @@ class Structure:
         """
         if self.normalisation == "si":
             return 1.0
-        lengths = term.power(*YAW_RATES) - (2 if equation == "r" else 1)
+        lengths = term.power(*TURN_RATES) + 1 - self._speeds(equation) - (equation in ANGULAR)
         turns = term.power(*SHAFT_SPEEDS)
         if self.normalisation == "prime":
             return float(length ** float(lengths + turns))
-        speeds = 2 - term.power(*SPEEDS, *YAW_RATES)
+        speeds = self._speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
         return float(length ** float(lengths) * speed ** float(speeds) / (shaft**turns if turns else 1.0))
 
     def features(
@@ -192,7 +243,7 @@ class Structure:
         Parameters
         ----------
         equation : str
-            `u`, `v` or `r`.
+            `u`, `v`, `r`, `p` or `q`.
         channels : mapping of str to array of shape (n_samples,)
             At least those of its terms and u, v; SI units.
         particulars : Particulars

@@ -9,12 +9,16 @@ from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
 # du is the surge speed above service speed, dn the shaft speed above that of service, U the speed through
-# the water; bars stand for absolute values; all in SI units
-SYMBOLS = ("u", "du", "|u|", "v", "|v|", "r", "|r|", "delta", "|delta|", "n", "dn", "|n|", "U")
+# the water, p the roll rate and phi the heel; bars stand for absolute values; all in SI units
+SYMBOLS = (
+    "u", "du", "|u|", "v", "|v|", "r", "|r|", "p", "|p|", "phi", "|phi|", "delta", "|delta|", "n", "dn",
+    "|n|", "U",
+)  # fmt: skip
 SPEEDS = ("u", "du", "|u|", "v", "|v|", "U")
-YAW_RATES = ("r", "|r|")
+TURN_RATES = ("r", "|r|", "p", "|p|")
+ROLL = ("p", "|p|", "phi", "|phi|")
 SHAFT_SPEEDS = ("n", "dn", "|n|")
-SHORT = {"delta": "d", "|delta|": "|d|"}  # in names
+SHORT = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}  # in names
 
 CHANNEL = {symbol: symbol.strip("|") for symbol in SYMBOLS} | {"du": "u", "dn": "n"}
 LARGEST_POWER = 9

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from shipgym.models.structures import FORCE_OF_EQUATION, Structure, Term
+from shipgym.models.structures import EQUATION_NAMES, Structure, Term
 from shipgym.models.terms import CHANNEL
 
 HEADER = '''"""Accelerations of the structure `{name}`, written from its table of terms."""
@@ -12,8 +12,9 @@ HEADER = '''"""Accelerations of the structure `{name}`, written from its table o
 {library}from .compiling import inlined
 from .layout import {rows}
 
-ROLL = False
+ROLL = {roll}
 SHAFT = False
+MEMORY = {memory}
 
 
 @inlined
@@ -25,6 +26,8 @@ def shaft_acceleration(n, command, ship, lane):
 def accelerations(u, v, r, p, phi, delta, n, depth, ship, lane):
 '''
 
+PARTIAL_SUM = 4
+
 #: Where a structure has no equation: the speed stays, and what drift or turn there is dies out within about
 #: a ship length.
 WITHOUT = {
@@ -32,6 +35,7 @@ WITHOUT = {
     "v": "    vdot = -v * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
     "r": "    rdot = -r * (ship[SERVICE_SPEED + lane] / ship[LENGTH + lane])\n",
 }
+MEMORY = "p"  # row of the kernels that keeps the memory of yaw, free in a ship without roll
 
 
 def accelerations_source(structure: Structure) -> str:
@@ -39,9 +43,9 @@ def accelerations_source(structure: Structure) -> str:
     variables: dict[str, str] = {}
     sums = []
     row = 0
-    for equation in FORCE_OF_EQUATION:
+    for equation in EQUATION_NAMES:
         if equation not in structure.equations:
-            sums.append(WITHOUT[equation])
+            sums.append(WITHOUT.get(equation, ""))
             continue
         products = []
         for term in structure.terms(equation):
@@ -49,11 +53,22 @@ def accelerations_source(structure: Structure) -> str:
             variable = variables.setdefault(expression, f"t{len(variables)}")
             products.append(f"ship[COEFFICIENTS + {row} * LANES + lane] * {variable}")
             row += 1
-        joined = "\n        + ".join(products)
+        joined = "\n        + ".join(balanced(products))
         sums.append(f"    {equation}dot = (\n        {joined}\n    )\n")
     assignments = "".join(f"    {name} = {expression}\n" for expression, name in variables.items())
-    body = assignments + "".join(sums) + "    return udot, vdot, rdot, 0.0\n"
+    fourth = "pdot" if "p" in structure.equations else "qdot" if "q" in structure.equations else "0.0"
+    yaw = f"rdot + {MEMORY}" if "q" in structure.equations else "rdot"
+    body = assignments + "".join(sums) + f"    return udot, vdot, {yaw}, {fourth}\n"
     return _header(structure, body) + body
+
+
+def balanced(products: list[str]) -> list[str]:
+    """Sums of at most four products each, in brackets.
+
+    One long sum is a chain in which each addition waits for the one before; partial sums run side by side.
+    """
+    groups = (products[i : i + PARTIAL_SUM] for i in range(0, len(products), PARTIAL_SUM))
+    return [f"({' + '.join(group)})" for group in groups]
 
 
 def product(term: Term, speed_power: int) -> str:
@@ -85,5 +100,8 @@ def _header(structure: Structure, body: str) -> str:
         "    du = u - ship[SERVICE_SPEED + lane]\n": "du" in words,
         "    dn = n - ship[SERVICE_SHAFT + lane]\n": "dn" in words,
     } | {f"    {symbol_variable(symbol)} = fabs({CHANNEL[symbol]})\n": True for symbol in absolute}
-    header = HEADER.format(name=structure.name, library=library, rows=", ".join(rows))
+    header = HEADER.format(
+        name=structure.name, library=library, rows=", ".join(rows), roll="p" in structure.equations,
+        memory="q" in structure.equations,
+    )  # fmt: skip
     return header + "".join(line for line, used in lines.items() if used)

@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel, two_commands
+from shipgym.simulation.orders import checked_orders
 from shipgym.trial import Trial
+from shipgym.units import CHANNELS
 
 Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
@@ -23,14 +25,7 @@ def simulate(
     kind: str | None = None,
 ) -> Trial:
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
-    held = np.asarray(commands, dtype=float)
-    if held.ndim != 2 or held.shape[1] != len(model.command_names) or len(held) < 2:
-        raise InputError(
-            f"commands: shape {held.shape} found, expected (n_steps, {len(model.command_names)}) for "
-            f"{', '.join(model.command_names)}, with at least 2 steps"
-        )
-    if not np.all(np.isfinite(held)):
-        raise InputError(f"commands: row {int(np.argwhere(~np.isfinite(held))[0, 0])} is not finite")
+    held = checked_orders(model, commands)
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     states = np.empty((len(held) + 1, layout.N_STATE))
@@ -76,17 +71,21 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
     t = np.array(trial.t)
     states = np.empty((len(t), layout.N_STATE))
     first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
-    states[0] = model.kernel_states(np.array([first]))[0]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    states[0] = model.kernel_states(_settled(model, np.array([first]), n[:1]))[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
     reached = model.kernel("trajectories").open_loop(
         states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
     )
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
-    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
     return Trial(
-        t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=model.particulars["length"]
+        t,
+        _channels(model, states),
+        name=trial.name,
+        kind=trial.kind,
+        use=trial.use,
+        length=model.particulars["length"],
     )
 
 
@@ -105,10 +104,29 @@ def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
 
 def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
     """States of the kernels and the commands held from each sample on as a Trial."""
-    channels = dict(zip(model.state_names, model.own_states(states).T, strict=True))
+    channels = _channels(model, states)
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
+        if name == "n":
+            channels.setdefault(
+                "n", command
+            )  # a shaft without lag turns as ordered, and is part of the record
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
+
+
+def _channels(model: ShipModel, states: Floats) -> dict[str, Floats]:
+    """What can be recorded of the kernels' states; a memory of yaw cannot."""
+    columns = zip(model.state_names, model.own_states(states).T, strict=True)
+    return {name: column for name, column in columns if name in CHANNELS}
+
+
+def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
+    """States whose memory of yaw, which no trial records, is that of a steady yaw rate."""
+    if "q" in model.state_names:
+        commands = np.stack([states[:, -1], shaft], axis=-1)[:, : len(model.command_names)]
+        rates = model.derivatives(states, commands)
+        states[:, model.state_names.index("q")] = -rates[:, model.state_names.index("r")]
+    return states
 
 
 def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:

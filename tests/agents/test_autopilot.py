@@ -7,10 +7,10 @@ import pytest
 from agents.autopilot import build_autopilot, verify
 from agents.autopilot_result import verification_metrics
 from agents.concerns import concerns
-from agents.spread import CriterionSpread, manoeuvre_spread
+from agents.spread import manoeuvre_spread
 from identification import identify
 from shipgym import InputError, ShipFile, load_model
-from shipgym.manoeuvres import Criterion
+from shipgym.manoeuvres import Criterion, IndexInterval
 
 
 def test_the_folder_holds_report_model_metrics_and_both_autopilots(chain):
@@ -99,7 +99,7 @@ def test_unstable_draws_count_as_failed_and_are_never_dropped():
     wild = type(model)(**{**_fields(model), "coefficients": backwards})
     spread = manoeuvre_spread(model, [model, wild, model, wild])
     assert spread.unstable.tolist() == [False, True, False, True]
-    assert spread.criteria["advance"].probability == 0.5
+    assert spread.criteria["advance"].share_passed == 0.5
     assert len(spread.zigzag_headings) == 2
 
 
@@ -109,11 +109,11 @@ def _fields(model):
 
 
 def test_a_criterion_without_value_has_no_quantile_and_does_not_pass():
-    nominal = Criterion(3.0, 4.5, True, "ship lengths", "5.3.1")
-    spread = CriterionSpread(nominal, np.array([3.0, np.nan]), np.array([True, False]))
-    assert spread.probability == 0.5
-    assert spread.quantiles(0.05, 0.95) == (3.0, 3.0)
-    assert spread.to_dict()["without_value"] == 1
+    drawn = IndexInterval(3.0, np.array([3.0, np.nan]), np.array([False, True]))
+    criterion = Criterion(3.0, 4.5, True, "ship lengths", "5.3.1", drawn)
+    assert criterion.share_passed == 0.5
+    assert criterion.interval == (3.0, 3.0)
+    assert criterion.to_dict()["without_value"] == criterion.to_dict()["ran_away"] == 1
 
 
 def verified(**changes: float) -> dict:

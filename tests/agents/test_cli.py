@@ -144,9 +144,10 @@ def test_an_interruption_leaves_nothing_and_exits_with_130(demo, tmp_path, monke
 def test_trials_tells_indices_and_criteria():
     answer = shipgym("trials", "mariner", "--json")
     told = json.loads(answer.stdout)
-    assert told["manoeuvres"]["zigzag 20/20, starboard first"]["overshoot_1_deg"] == pytest.approx(
-        7.78, abs=0.02
-    )
+    zigzag = told["manoeuvres"]["zigzag 20/20, starboard first"]["overshoot_1_deg"]
+    assert zigzag["value"] == pytest.approx(7.78, abs=0.02)
+    assert zigzag["interval_95"] is None
+    assert told["imo"]["stopping"]["passed"] is None
     assert told["imo"]["tactical_diameter"]["passed"] is False
     assert told["imo"]["advance"]["value"] < 4.5
 
@@ -155,7 +156,7 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.html")
     assert answer.exit_code == 0
     page = (tmp_path / "plots.html").read_text()
-    assert page.count('Plotly.newPlot("plot-') == 5
+    assert page.count('Plotly.newPlot("plot-') == 14
     assert 'src="http' not in page
 
 

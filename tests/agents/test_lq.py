@@ -14,6 +14,7 @@ from agents.lq import lq_gain
 from shipgym.envs.course_keeping_task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.models import load_model
+from shipgym.models.conversions import nomoto, nomoto2_ship
 from shipgym.steering import SteeringGear
 
 MARINER = load_model("mariner")
@@ -26,6 +27,17 @@ def changed(model=MARINER, gear=None, **factors):
 
 
 UNSTABLE = changed(N_v=1.7, N_uv=1.7, gear=SteeringGear(35.0, 2.5))
+
+
+def test_a_ship_of_second_order_is_steered_without_seeing_her_memory():
+    """Mariner in Nomoto's form of second order: no sway to feed back; the margins are of the exact loop."""
+    ship = nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering)
+    controller = LQ.from_model(ship)
+    assert controller.gains["sway"] == 0.0
+    assert controller.margins.gain_margin > 5.0
+    assert controller.margins.phase_margin_deg > 50.0
+    response = step_response(controller, ship, duration=40 * LENGTH_TIME)
+    assert np.degrees(response.heading[0, -1]) == pytest.approx(20.0, abs=1.0)
 
 
 def linear_cost(ship, gain, weight, integral_time, n=20_000):

@@ -5,10 +5,14 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.linalg import solve
-from sklearn.utils.estimator_checks import check_estimator
+from sklearn.kernel_ridge import KernelRidge
+from sklearn.linear_model import Ridge
+from sklearn.utils.estimator_checks import parametrize_with_checks
 
-from identification import LSSVM, TruncatedLSSVM
-from identification.lssvm import dense_dual_solution, dense_truncated_solution
+from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
+from identification.comparators import LinearSupportVectorMachine
+from identification.decomposition import decompose_triangle, triangle
+from identification.dense_dual import dense_dual_solution, dense_truncated_solution
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -22,22 +26,24 @@ def regression(n: int = 300, m: int = 7, noise: float = 0.1, seed: int = 0) -> t
     return X, X @ coefficients + 3.0 + noise * rng.standard_normal(n), coefficients
 
 
-@pytest.mark.parametrize(
-    "estimator",
+@parametrize_with_checks(
     [
         LSSVM(),
+        LSSVM(robust=True),
         LSSVM(kernel="rbf"),
         LSSVM(kernel="poly", C=10.0),
+        LSSVM(kernel="rbf", robust=True),
         TruncatedLSSVM(),
         TruncatedLSSVM(selection="gcv"),
+        TruncatedLSSVM(selection="explained-variance"),
+        TruncatedLSSVM(robust=True),
+        TunedLSSVM(optimiser="grid"),
+        TunedLSSVM(optimiser=ArtificialBeeColony(rounds=3)),
+        LinearSupportVectorMachine(C=10.0),
     ],
-    ids=str,
 )
-def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any) -> None:
-    checks = check_estimator(estimator, on_skip=None, on_fail=None)
-    failed = [(check["check_name"], check["exception"]) for check in checks if check["status"] == "failed"]
-    assert failed == []
-    assert sum(check["status"] == "passed" for check in checks) > 40
+def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any, check: Any) -> None:
+    check(estimator)
 
 
 @pytest.mark.parametrize("C", [0.1, 5.0, 1e6])
@@ -141,6 +147,23 @@ def test_polynomial_kernel_learns_a_quadratic() -> None:
     [
         (LSSVM(kernel="sigmoid"), "kernel: 'sigmoid'"),
         (LSSVM(C=0.0), "C: 0"),
+        (LSSVM(C=-1.0), "C: -1"),
+        (LSSVM(C=np.nan), "C: nan found, expected a number above 0 .infinity gives least squares"),
+        (LSSVM(C="big"), "C: 'big'"),  # type: ignore[arg-type]
+        (TruncatedLSSVM(C=0.0), "C: 0"),
+        (TruncatedLSSVM(explained_variance=0.0), "explained_variance: 0"),
+        (LSSVM(kernel="polly"), "Did you mean 'poly'"),
+        (TunedLSSVM(optimiser="abd"), "optimiser: 'abd'.*Did you mean 'abc'"),
+        (TunedLSSVM(objective="training error"), "objective: 'training error'.*Did you mean 'training'"),
+        (TunedLSSVM(objective="free-running"), "identify"),
+        (TunedLSSVM(bounds=(1.0, 0.1)), "bounds"),
+        (TunedLSSVM(bounds=(0.0, 1.0)), "bounds: 0"),
+        (TunedLSSVM(bounds=(1.0, np.inf)), "bounds"),
+        (TunedLSSVM(bounds=3.0), "bounds: 3"),  # type: ignore[arg-type]
+        (TunedLSSVM(folds=1), "folds: 1"),
+        (TunedLSSVM(folds="trials"), "folds: 'trials' found with 0 trials"),
+        (TunedLSSVM(optimiser=ArtificialBeeColony(sources=1)), "sources: 1"),
+        (LinearSupportVectorMachine(epsilon=-1.0), "epsilon: -1"),
         (LSSVM(kernel="rbf", C=np.inf), "finite"),
         (LSSVM(scale=[1.0, 2.0]), "scale"),
         (TruncatedLSSVM(selection="elbow"), "selection: 'elbow'"),
@@ -151,3 +174,128 @@ def test_wrong_settings_are_named(machine: Any, message: str) -> None:
     X, y, _ = regression()
     with pytest.raises(InputError, match=message):
         machine.fit(X, y)
+
+
+@pytest.mark.parametrize("C", [1e-3, 1.0, 1e4])
+@pytest.mark.parametrize("fit_intercept", [True, False])
+def test_it_is_the_ridge_regression_of_scikit_learn(C: float, fit_intercept: bool) -> None:
+    X, y, _ = regression()
+    oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd").fit(X, y)
+    machine = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
+    np.testing.assert_allclose(machine.coef_, oracle.coef_, rtol=1e-8)
+    assert machine.intercept_ == pytest.approx(oracle.intercept_, rel=1e-8, abs=1e-12)
+
+
+@pytest.mark.parametrize("kernel", ["rbf", "poly"])
+def test_kernels_without_intercept_are_the_kernel_ridge_of_scikit_learn(kernel: str) -> None:
+    X, y, _ = regression(n=80)
+    oracle = KernelRidge(alpha=0.1, kernel=kernel, gamma=0.2, degree=2, coef0=1.0).fit(X, y)
+    machine = LSSVM(
+        C=10.0, kernel=kernel, gamma=0.2, degree=2, coef0=1.0, scale=False, fit_intercept=False
+    ).fit(X, y)
+    np.testing.assert_allclose(machine.predict(X), oracle.predict(X), rtol=1e-8)
+
+
+def test_coefficients_are_read_out_of_a_polynomial_kernel() -> None:
+    x = np.random.default_rng(0).uniform(-1.0, 2.0, (60, 2))
+    y = 1.0 + 2.0 * x[:, 0] - 3.0 * x[:, 0] ** 2 + 0.5 * x[:, 0] * x[:, 1]
+    for scale, fit_intercept in ((True, True), (False, False)):
+        machine = LSSVM(C=1e9, kernel="poly", degree=2, scale=scale, fit_intercept=fit_intercept).fit(x, y)
+        found = polynomial_coefficients(machine)
+        expected = {(0, 0): 1.0, (1, 0): 2.0, (0, 1): 0.0, (2, 0): -3.0, (1, 1): 0.5, (0, 2): 0.0}
+        assert found == {powers: pytest.approx(c, abs=1e-5) for powers, c in expected.items()}
+    with pytest.raises(InputError, match="poly"):
+        polynomial_coefficients(LSSVM().fit(x, y))
+
+
+def with_outliers(seed: int = 0) -> tuple[Floats, Floats, Floats]:
+    X, y, coefficients = regression(seed=seed)
+    rng = np.random.default_rng(seed + 1)
+    rows = rng.choice(len(y), len(y) // 10, replace=False)
+    y[rows] += rng.uniform(10.0, 50.0, len(rows)) * 0.1 * rng.choice([-1.0, 1.0, 1.0], len(rows))
+    return X, y, coefficients
+
+
+@pytest.mark.parametrize("machine", [LSSVM, TruncatedLSSVM])
+def test_robust_fit_is_not_moved_by_outliers(machine: Any) -> None:
+    options = {"selection": "full"} if machine is TruncatedLSSVM else {"C": 1e9}
+    gains = []
+    for seed in range(10):
+        X, y, coefficients = with_outliers(seed)
+        size = np.std(X, axis=0)
+        plain, robust = (
+            np.linalg.norm((machine(robust=on, **options).fit(X, y).coef_ - coefficients) * size)
+            for on in (False, True)
+        )
+        gains.append(plain / robust)
+    assert np.median(gains) > 5.0
+
+
+def test_robust_kernel_fit_is_not_moved_by_outliers() -> None:
+    x = np.linspace(0.0, 6.0, 120)[:, None]
+    truth = np.sin(x[:, 0])
+    y = truth + 0.02 * np.random.default_rng(0).standard_normal(120)
+    y[::11] += 3.0
+    error = {
+        on: np.sqrt(np.mean((LSSVM(C=10.0, kernel="rbf", robust=on).fit(x, y).predict(x) - truth) ** 2))
+        for on in (False, True)
+    }
+    assert error[True] < 0.03 < 0.2 < error[False]
+
+
+def test_robust_fit_of_clean_data_is_the_plain_one() -> None:
+    X, _, coefficients = regression()
+    plain, robust = (LSSVM(C=np.inf, robust=on).fit(X, X @ coefficients) for on in (False, True))
+    np.testing.assert_array_equal(robust.coef_, plain.coef_)
+    np.testing.assert_array_equal(robust.weights_, 1.0)
+
+
+def test_intervals_of_the_robust_fit_cover_the_truth_in_95_per_cent_in_spite_of_outliers() -> None:
+    covered = []
+    for seed in range(150):
+        X, y, coefficients = with_outliers(seed)
+        machine = TruncatedLSSVM(selection="full", robust=True).fit(X, y)
+        covered.append(np.abs(machine.coef_ - coefficients) < 1.96 * np.sqrt(np.diag(machine.covariance_)))
+    assert 0.93 < np.mean(covered) < 0.97
+
+
+def test_weighting_a_sample_by_two_is_having_it_twice() -> None:
+    X, y, _ = regression(n=60)
+    weights = np.ones(60)
+    weights[:10] = 2.0
+    once = decompose_triangle(triangle(X, y, True, weights), 70, False, True)
+    twice = decompose_triangle(triangle(np.vstack([X, X[:10]]), np.append(y, y[:10]), True), 70, False, True)
+    np.testing.assert_allclose(once.singular_values, twice.singular_values, rtol=1e-10)
+    np.testing.assert_allclose(once.centre, twice.centre, rtol=1e-10)
+    assert once.outside == pytest.approx(twice.outside, rel=1e-10)
+
+
+def test_explained_variance_keeps_the_principal_directions() -> None:
+    rng = np.random.default_rng(0)
+    X, _ = np.linalg.qr(rng.standard_normal((100, 3)))
+    X = (X - X.mean(axis=0)) * np.sqrt([90.0, 9.0, 1.0])
+    y = X.sum(axis=1)
+    ranks = [
+        TruncatedLSSVM(selection="explained-variance", explained_variance=share, scale=False).fit(X, y).rank_
+        for share in (0.5, 0.95, 1.0)
+    ]
+    assert ranks == [1, 2, 3]
+
+
+def test_collinear_terms_are_named() -> None:
+    pandas = pytest.importorskip("pandas")
+    X, y, _ = regression(m=3)
+    names = ["v", "r", "v|v|"]
+    table = pandas.DataFrame(np.column_stack([X, 2.0 * X[:, 0]]), columns=[*names, "v again"])
+    assert TruncatedLSSVM(selection="full").fit(table, y).collinear_names_ == (("v", "v again"),)
+    assert TruncatedLSSVM(selection="full").fit(table.to_numpy(), y).collinear_names_ == (("x0", "x3"),)
+
+
+def test_support_vectors_shrug_off_outliers_too() -> None:
+    X, y, coefficients = with_outliers()
+    size = np.std(X, axis=0)
+    machine = LinearSupportVectorMachine(C=10.0).fit(X, y)
+    plain = np.linalg.norm((LSSVM(C=1e9).fit(X, y).coef_ - coefficients) * size)
+    assert np.linalg.norm((machine.coef_ - coefficients) * size) < 0.5 * plain
+    assert machine.weights_[np.argmax(np.abs(y - machine.predict(X)))] < 0.1 < np.median(machine.weights_)
+    assert np.all(np.linalg.eigvalsh(machine.covariance_) > 0.0)

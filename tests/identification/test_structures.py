@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,12 +12,14 @@ import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.models.linear import nomoto
 from shipgym.models.structures import STRUCTURES, get_structure
 
 L, U0, N0 = 160.93, 7.7175, 1.2
 PARTICULARS = Particulars(length=L, speed=U0)  # accelerations need no mass
 GEAR = SteeringGear(35.0, 5.0, 1.0)
-STEERED = [name for name in STRUCTURES if name not in ("abkowitz", "surge", "surge-perturbed")]
+OTHERS = ("abkowitz", "surge", "surge-perturbed", "mmg4dof", "pmm38", "pmm18")
+STEERED = [name for name in STRUCTURES if name not in OTHERS]
 
 LINEAR = {"b_v": -0.06, "b_r": -2.3, "b_d": -0.08, "c_v": -1e-3, "c_r": -0.104, "c_d": 3.7e-3}
 SWAY = {"b_|v|v": -0.02, "b_|r|v": -3.0, "b_|v|r": -0.9, "b_|r|r": -60.0}
@@ -34,6 +38,12 @@ def own(name: str) -> dict[str, float]:
     """Coefficients of a ship of about the Mariner's manners."""
     known = {
         "nomoto": {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0},
+        "nomoto2": {  # K = 0.185 1/s, T1 = 118 s, T2 = 7.8 s, T3 = 18.5 s: Mariner, Fossen 2011, table 7.2
+            "c_r": -1 / 118.0 - 1 / 7.8,
+            "c_d": 0.185 * 18.5 / (118.0 * 7.8),
+            "e_r": -1 / (118.0 * 7.8),
+            "e_d": 0.185 / (118.0 * 7.8),
+        },
         "norrbin": {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0},
         "linear-steering": PRIME,
         "cubic": CUBIC,
@@ -124,7 +134,67 @@ def test_cubic_follows_the_speed_loss_of_the_container_ship() -> None:
     assert rmse["r"] < 0.02 * np.ptp(to_validate["r"])
 
 
-@pytest.mark.parametrize("name", ["nomoto", "cubic"])
+def test_nomoto2_is_the_exact_form_of_a_linear_ship() -> None:
+    """Sway taken out of linear steering leaves K, T1, T2, T3 of her transfer function."""
+    ship = ship_of("linear-steering", PRIME)
+    small = (zigzag(ship, 1.0, 1.0, port, duration=600, dt=0.1) for port in (False, True))
+    runs = [with_constant_speed(recorded(run, f"{i}")) for i, run in enumerate(small)]
+    found, expected = nomoto(identify(runs, "nomoto2", particulars=PARTICULARS).model), nomoto(ship)
+    for name in ("K", "T1", "T2", "T3"):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=0.01), name
+
+
+def with_constant_speed(run: Trial) -> Trial:
+    """The run as its yaw alone shows it."""
+    return Trial(
+        run.t, {**run.channels, "u": np.full(len(run.t), U0), "v": np.zeros(len(run.t))}, name=run.name
+    )
+
+
+def test_time_constants_survive_the_noise_of_a_rate_gyro() -> None:
+    """0.02 deg/s: the regression forms no derivative of the yaw rate."""
+    ship = ship_of("nomoto2", own("nomoto2"))
+    random = np.random.default_rng(0)
+    noisy = [
+        Trial(
+            t.t,
+            {**t.channels, "r": t["r"] + np.radians(0.02) * random.standard_normal(len(t.t))},
+            name=t.name,
+        )
+        for t in zigzags(ship)
+    ]
+    found = nomoto(identify(noisy, "nomoto2", particulars=PARTICULARS).model)
+    np.testing.assert_allclose([found.K, found.T], [0.185, 107.3], rtol=0.02)
+
+
+def test_song_s_regressors_predict_the_rolling_container_ship() -> None:
+    """10/10 zigzags and random rudder to fit, 20/20 predicted open loop, roll and the loss of speed too."""
+    ship = shipgym.load_model("container")
+    angles = np.random.default_rng(0).uniform(-25.0, 25.0, 40)
+    commands = np.tile(ship.service_command, (8000, 1))
+    commands[:, 0] = np.radians(np.repeat(angles, 200))
+    runs = [zigzag(ship, 10, 10, port, duration=600, dt=0.1) for port in (False, True)]
+    runs.append(ship.simulate(commands, 0.1))
+    names = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
+    seen = [
+        Trial(run.t[::5], {c: run[c][::5] for c in names}, name=f"{i}", kind=run.kind)
+        for i, run in enumerate([*runs, zigzag(ship, 20, 20, duration=600, dt=0.1)])
+    ]
+    measured = seen[-1].with_(use="validate")
+    fit = identify([*seen[:-1], measured], "mmg4dof", particulars=ship.particulars)
+    predicted = fit.predictions["3"]
+    assert fit.stable
+    assert predicted is not None
+    for channel, part in {"u": 0.03, "v": 0.02, "r": 0.015, "psi": 0.015, "p": 0.02, "phi": 0.02}.items():
+        error = np.sqrt(np.mean((predicted[channel] - measured[channel]) ** 2))
+        assert error < part * np.ptp(measured[channel]), channel
+    assert [len(fit.model.table.terms(q)) for q in "uvrp"] == [10, 16, 15, 14]
+    assert shipgym.check_ship_model(fit.model).ok
+    capsizing = replace(fit.model, coefficients=fit.coefficients | {"d_f": -fit.coefficients["d_f"]})
+    assert any("heel" in problem for problem in shipgym.check_ship_model(capsizing).problems)
+
+
+@pytest.mark.parametrize("name", ["nomoto", "nomoto2", "cubic"])
 def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
     ship = ship_of(name, own(name))
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)

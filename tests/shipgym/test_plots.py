@@ -4,8 +4,23 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Trial, load_model
-from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.plots import history_figure, path_figure, zigzag_figure
+from shipgym.manoeuvres import (
+    Spiral,
+    prbs_rudder,
+    standard_manoeuvres,
+    turning_circle,
+    turning_indices,
+    zigzag,
+)
+from shipgym.plots import (
+    excitation_figure,
+    history_figure,
+    manoeuvre_figure,
+    path_figure,
+    spiral_figure,
+    turning_figure,
+    zigzag_figure,
+)
 
 
 def values(figure, axis, trace=0):
@@ -71,3 +86,51 @@ def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
     monkeypatch.setitem(__import__("sys").modules, "plotly.graph_objects", None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[report\]'"):
         path_figure({"turn": circle})
+
+
+def test_a_turning_circle_is_drawn_with_its_indices():
+    trial = turning_circle(load_model("mariner"), -35.0, dt=1.0)
+    indices, figure = turning_indices(trial), turning_figure(trial)
+    marks = {trace.name.rsplit(" ", 2)[0]: trace for trace in figure.data}
+    assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(indices.advance_lengths)
+    assert np.ptp(np.asarray(marks["transfer"].x, dtype=float)) == pytest.approx(indices.transfer_lengths)
+    diameter = np.asarray(marks["tactical diameter"].x, dtype=float)
+    assert diameter.min() == pytest.approx(-indices.tactical_diameter_lengths)
+
+
+def test_the_loop_of_a_spiral_is_marked_where_it_is():
+    t = np.arange(3.0)
+    trial = Trial(t, {"delta": t, "r": t})
+    spiral = Spiral(
+        trial, np.array([10, 3, 1, -5, 1, 3, 10.0]), np.array([1, 0.5, -0.5, -1, -0.7, 0.5, 1.0]), "direct"
+    )
+    wide = Spiral(
+        trial, np.array([10, 1, -1, -10, 1, 5, 10.0]), np.array([1, 0.5, -0.5, -1, -0.7, 0.7, 1.0]), "direct"
+    )
+    assert [trace.name for trace in spiral_figure(spiral).data] == ["there", "and back"]
+    loop = spiral_figure(wide).data[-1]
+    assert loop.name == "loop, 3.00 deg wide"
+    assert values(spiral_figure(wide), "x", 2) == pytest.approx([0.0, 3.0])
+
+
+def test_every_manoeuvre_has_its_figure():
+    ship = load_model("tanker")
+    axes = {
+        "zigzag 20/20, port first": "heading change and rudder, deg",
+        "turning circle 35 deg to port": "ahead, ship lengths",
+        "reverse spiral": "yaw rate, deg/s",
+        "pull-out from port": "yaw rate, deg/s",
+        "crash stop": "surge, m/s",
+        "acceleration": "surge, m/s",
+    }
+    known = standard_manoeuvres(ship)
+    for name, title in axes.items():
+        assert manoeuvre_figure(known[name].sail(ship)).layout.yaxis.title.text == title
+    excited = excitation_figure(prbs_rudder(ship, duration=200))
+    assert excited.layout.yaxis.title.text == "rudder order, deg"
+
+
+def test_speed_and_drift_follow_from_surge_and_sway(circle):
+    figure = history_figure({"turn": circle}, ["speed", "drift"])
+    assert values(figure, "y", 0) == pytest.approx(np.hypot(circle["u"], circle["v"]), rel=1e-6)
+    assert values(figure, "y", 1)[-1] > 0.0  # in a turn to starboard the ship moves to port of her heading

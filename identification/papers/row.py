@@ -1,0 +1,67 @@
+"""One line of a reproduction: printed, ours as the paper did it, ours at its best."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Row:
+    """One printed number and what became of it.
+
+    Attributes
+    ----------
+    case : str
+        Table or figure of the paper.
+    quantity : str
+        What was printed, with its unit.
+    printed : float or None
+        The paper's number; None where it shows only a picture.
+    as_paper : float or None
+        Ours by the paper's method; None where its data or settings are not published.
+    best : float or None
+        Ours by the best method that there is here, on the same data.
+    aim : str
+        What `best` (or, for a failure to be shown again, `as_paper`) has to be.
+    met : bool or None
+        Whether it is; None where there is nothing to be met.
+    note : str
+        Why a row cannot be reproduced, a stand-in for data that are not published, or a slip of the paper.
+    """
+
+    case: str
+    quantity: str
+    printed: float | None
+    as_paper: float | None
+    best: float | None
+    aim: str = ""
+    met: bool | None = None
+    note: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row for JSON."""
+        return asdict(self)
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper and how its cases are run again.
+
+    Attributes
+    ----------
+    name : str
+        Short name, as `shipgym reproduce` knows it.
+    citation : str
+        Authors, year, title.
+    what : str
+        One sentence: which cases, on which data.
+    rows : callable
+        Yields the rows, in the order of the paper.
+    """
+
+    name: str
+    citation: str
+    what: str
+    rows: Callable[[], Iterator[Row]]

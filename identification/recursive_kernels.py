@@ -1,0 +1,131 @@
+"""Compiled recursions: one pass over samples in time order, for any number of signals side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import tanh
+from typing import Any, TypeVar
+
+import numpy as np
+from numba import njit
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+_SEMANTICS = {"error_model": "numpy", "cache": True, "nogil": True, "fastmath": {"contract"}}
+
+
+def compiled(function: _Function) -> _Function:
+    """Compile when first called, or read from the on-disk cache."""
+    result: _Function = njit(**_SEMANTICS)(function)
+    return result
+
+
+@compiled
+def innovation(error: float, omega: float) -> float:
+    """The error, or its bounded odd function of slope 1 at 0 (Song 2020, equation 3-7, over omega)."""
+    return tanh(omega * error) / omega if omega > 0.0 else error
+
+
+@compiled
+def forget(P: Any, forgetting: float, ceiling: Any) -> None:
+    """Divide a covariance by the forgetting factor, but let no coefficient forget beyond where it began.
+
+    Rows and columns are stretched alike, so that the matrix stays positive.
+    """
+    m = P.shape[0]
+    free = True
+    for i in range(m):
+        free = free and P[i, i] <= forgetting * ceiling[i]
+    if free:
+        grown = 1.0 / forgetting
+        for i in range(m):
+            for j in range(m):
+                P[i, j] *= grown
+        return
+    full = 1.0 / np.sqrt(forgetting)
+    stretch = np.empty(m)
+    for i in range(m):
+        room = ceiling[i] / P[i, i] if P[i, i] > 0.0 else 1.0
+        stretch[i] = min(full, max(np.sqrt(room), 1.0))
+    for i in range(m):
+        for j in range(m):
+            P[i, j] *= stretch[i] * stretch[j]  # in this order the matrix stays symmetric to the last bit
+
+
+@compiled
+def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) -> None:
+    """Least squares with one more sample; `gain` is scratch."""
+    m = theta.size
+    gain[:] = 0.0
+    for k in range(m):
+        for j in range(m):
+            gain[j] += P[k, j] * phi[k]
+    error, variance = y, 1.0
+    for j in range(m):
+        error -= theta[j] * phi[j]
+        variance += gain[j] * phi[j]
+    step, shrink = innovation(error, omega) / variance, 1.0 / variance
+    for j in range(m):
+        theta[j] += step * gain[j]
+        for k in range(m):
+            P[j, k] -= (gain[j] * gain[k]) * shrink  # symmetric to the last bit
+
+
+@compiled
+def scalar_updates(
+    phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
+    omega: float, course: Any,
+) -> None:  # fmt: skip
+    """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one.
+
+    Rows before `first` are history. `theta`, `P` are changed in place; `course` receives each theta.
+    """
+    m = theta.shape[1]
+    gain = np.empty(m)
+    for t in range(first, phi.shape[0]):
+        for s in range(theta.shape[0]):
+            if forgetting < 1.0:
+                forget(P[s], forgetting, ceiling[s])
+            for i in range(max(t - innovations + 1, 0), t + 1):
+                rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, gain)
+            course[t - first, s] = theta[s]
+
+
+@compiled
+def matrix_updates(
+    phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
+    omega: float, course: Any,
+) -> None:  # fmt: skip
+    """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
+    for t in range(first, phi.shape[0]):
+        low = max(t - innovations + 1, 0)
+        for s in range(theta.shape[0]):
+            if forgetting < 1.0:
+                forget(P[s], forgetting, ceiling[s])
+            Phi = np.ascontiguousarray(phi[low : t + 1, s].T)
+            errors = y[low : t + 1, s] - theta[s] @ Phi
+            for i in range(errors.size):
+                errors[i] = innovation(errors[i], omega)
+            spread = P[s] @ Phi
+            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ spread, np.ascontiguousarray(spread.T)).T
+            theta[s] += np.ascontiguousarray(L) @ errors
+            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(spread.T)
+            P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
+            course[t - first, s] = theta[s]
+
+
+@compiled
+def gradient_updates(
+    phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, course: Any
+) -> None:
+    """Stochastic gradient, theta += phi e / r, r += |phi|^2 (Song 2020, equations 3-3 to 3-8)."""
+    for t in range(phi.shape[0]):
+        for s in range(theta.shape[0]):
+            error, size = y[t, s], 0.0
+            for j in range(theta.shape[1]):
+                error -= theta[s, j] * phi[t, s, j]
+                size += phi[t, s, j] * phi[t, s, j]
+            r[s] = forgetting * r[s] + size
+            step = innovation(error, omega) / r[s] if r[s] > 0.0 else 0.0
+            for j in range(theta.shape[1]):
+                theta[s, j] += step * phi[t, s, j]
+            course[t, s] = theta[s]

@@ -1,0 +1,64 @@
+"""Weights that bound the influence of outliers: weighted LS-SVM."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+INNER, OUTER = 2.5, 3.0  # of the scale of the residuals; full weight up to the first, least from the second
+LEAST_WEIGHT = 1e-4
+MAD = 1.4826  # standard deviation by median absolute deviation, of a normal distribution
+ROUNDING = 64 * np.finfo(float).eps  # of the largest target; residuals below it are not worth weighting
+MOST_ROUNDS = 50
+SETTLED = 1e-3  # change of a weight
+
+
+def hampel_weights(residuals: Floats, largest: float) -> Floats:
+    """Weights of samples by their residuals (Suykens et al. 2002, Neurocomputing 48, eq. 14).
+
+    Parameters
+    ----------
+    residuals : array of shape (n_samples,)
+        Of a fit; their scale is estimated by the median absolute deviation.
+    largest : float
+        Of the targets: residuals of its rounding all have the weight 1.
+
+    Returns
+    -------
+    array of shape (n_samples,)
+        1 within 2.5 scales, 1e-4 beyond 3, straight in between.
+    """
+    scale = MAD * float(np.median(np.abs(residuals - np.median(residuals))))
+    if scale <= ROUNDING * largest:
+        return np.ones(len(residuals))
+    ramp = (OUTER - np.abs(residuals) / scale) / (OUTER - INNER)
+    weights: Floats = np.clip(ramp, LEAST_WEIGHT, 1.0)
+    return weights
+
+
+def reweighted(fit: Callable[[Floats | None], Floats], largest: float) -> Floats:
+    """Fit, weight the samples by their residuals and fit again until the weights settle.
+
+    Parameters
+    ----------
+    fit : callable
+        Fits with given weights (None for equal ones) and returns the residuals.
+    largest : float
+        Of the targets, absolute.
+
+    Returns
+    -------
+    array of shape (n_samples,)
+        Weights of the last fit. After 50 rounds without settling the last ones are taken.
+    """
+    weights = hampel_weights(fit(None), largest)
+    for _ in range(MOST_ROUNDS):
+        previous, weights = weights, hampel_weights(fit(weights), largest)
+        if float(np.max(np.abs(weights - previous))) < SETTLED:
+            return previous
+    fit(weights)
+    return weights

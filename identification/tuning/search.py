@@ -1,0 +1,143 @@
+"""What every optimiser has in common: its signature, its result, and the record of a search."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+#: Values of candidates, an array of shape (n_candidates, n_dimensions) -> (n_candidates,).
+Objective = Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True, eq=False)
+class SearchResult:
+    """The outcome of a search.
+
+    Attributes
+    ----------
+    x : array of shape (n_dimensions,)
+        The best candidate.
+    value : float
+        Its objective.
+    history : array of shape (n_rounds,)
+        Best objective after each round; the first is that of the starting candidates.
+    course : array of shape (n_rounds, n_dimensions)
+        Best candidate after each round.
+    evaluations : int
+        Candidates evaluated.
+    """
+
+    x: Floats
+    value: float
+    history: Floats
+    course: Floats
+    evaluations: int
+
+
+class Optimiser(Protocol):
+    """Minimises an objective within a box."""
+
+    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
+        """Minimise.
+
+        Parameters
+        ----------
+        objective : callable
+            Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
+        bounds : array-like of shape (n_dimensions, 2)
+            Lower and upper bound of each dimension.
+        seed : int
+            The same seed gives the same search.
+
+        Returns
+        -------
+        SearchResult
+        """
+        ...
+
+
+@dataclass(eq=False)
+class Recorder:
+    """Evaluates candidates and keeps the best.
+
+    Attributes
+    ----------
+    objective : callable
+        As of `Optimiser.minimise`.
+    x : array of shape (n_dimensions,)
+        The best candidate so far.
+    value : float
+        Its objective.
+    """
+
+    objective: Objective
+    x: Floats = field(default_factory=lambda: np.empty(0))
+    value: float = np.inf
+    evaluations: int = 0
+    _history: list[float] = field(default_factory=list)
+    _course: list[Floats] = field(default_factory=list)
+
+    def __call__(self, candidates: Floats) -> Floats:
+        """Values of candidates; what is not a number counts as infinitely bad."""
+        values = np.array(self.objective(candidates), dtype=float)
+        if values.shape != (len(candidates),):
+            raise InputError(
+                f"objective: values of shape {values.shape} found for {len(candidates)} candidates, "
+                "expected one value for each row"
+            )
+        values[np.isnan(values)] = np.inf
+        self.evaluations += len(candidates)
+        best = int(np.argmin(values))
+        if values[best] < self.value or not self.x.size:
+            self.x, self.value = candidates[best].copy(), float(values[best])
+        return values
+
+    def end_round(self) -> None:
+        """Write down the best so far."""
+        self._history.append(self.value)
+        self._course.append(self.x)
+
+    def result(self) -> SearchResult:
+        """The search up to now."""
+        return SearchResult(
+            self.x, self.value, np.array(self._history), np.array(self._course), self.evaluations
+        )
+
+
+def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
+    """Lower and upper bounds, arrays of shape (n_dimensions,).
+
+    Raises
+    ------
+    InputError
+        For bounds that are not finite, or of which the lower is not the lower one.
+    """
+    try:
+        box = np.asarray(bounds, dtype=float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
+        ) from None
+    if box.ndim != 2 or box.shape[1] != 2 or not len(box):
+        raise InputError(
+            f"bounds: shape {box.shape} found, expected a lower and an upper bound for each dimension, "
+            "such as [(-2, 12)]"
+        )
+    if not np.all(np.isfinite(box)) or not np.all(box[:, 0] < box[:, 1]):
+        raise InputError(f"bounds: {box.tolist()} found, expected finite numbers, the lower one first")
+    return box[:, 0], box[:, 1]
+
+
+def check_count(value: int, least: int, argument: str) -> int:
+    """Return a count of an optimiser's settings."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{argument}: {value!r} found, expected an integer of at least {least}")
+    return int(value)

@@ -1,0 +1,292 @@
+"""A conformance suite for vector environments, which Gymnasium's own checker refuses to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+
+Episode = list[tuple[Any, Any, Any, Any]]
+SEED = 1234
+STEPS = 200
+STAGGER = 5  # step at which a row is begun anew by hand
+
+
+def check_vector_env(
+    make: Callable[[], VectorEnv[Any, Any, Any]],
+    make_single: Callable[[], gymnasium.Env[Any, Any]] | None = None,
+    n_steps: int = STEPS,
+) -> None:
+    """Check that a vector environment keeps the promises of Gymnasium's interface.
+
+    Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset that its metadata
+    name, wrong actions, and, given single environments, that each row is one of them, bit for bit.
+
+    Parameters
+    ----------
+    make : callable
+        Makes the environment, `lambda: gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=3)`; several
+        environments are made and closed.
+    make_single : callable, optional
+        Makes the single environment that row i equals when it is reset with the seed plus i.
+    n_steps : int
+        Steps taken in each check; let them be enough for some episodes to end.
+
+    Raises
+    ------
+    InputError
+        Naming the first promise that is not kept, what was found and what is expected.
+    """
+    for check in (_check_spaces, _check_reset, _check_steps, _check_seeds, _check_actions, _check_autoreset):
+        env = make()
+        try:
+            check(env, n_steps)
+        finally:
+            env.close()
+    if make_single is not None:
+        _check_rows(make, make_single, n_steps)
+
+
+def _expect(condition: bool, promise: str) -> None:
+    if not condition:
+        raise InputError(f"vector environment: {promise}")
+
+
+def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
+    """How an environment says that it begins the next episode.
+
+    Raises
+    ------
+    InputError
+        If it does not say.
+    """
+    mode = env.metadata.get("autoreset_mode")
+    if not isinstance(mode, AutoresetMode):
+        raise InputError(
+            f"vector environment: metadata['autoreset_mode'] is {mode!r}, expected a member of "
+            "gymnasium.vector.AutoresetMode"
+        )
+    return mode
+
+
+def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    autoreset_mode(env)
+    _expect(
+        isinstance(env.num_envs, int) and env.num_envs >= 1, f"num_envs is {env.num_envs!r}, expected >= 1"
+    )
+    for which in ("observation", "action"):
+        single, batch = getattr(env, f"single_{which}_space"), getattr(env, f"{which}_space")
+        expected = gymnasium.vector.utils.batch_space(single, env.num_envs)
+        _expect(
+            batch == expected, f"{which}_space is {batch}, expected {expected}: single_{which}_space batched"
+        )
+
+
+def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    answer = env.reset(seed=SEED)
+    _expect(
+        isinstance(answer, tuple) and len(answer) == 2,
+        f"reset returned {type(answer)}, expected (observations, infos)",
+    )
+    observations, infos = answer
+    _check_observations(env, observations, "reset")
+    _check_infos(env, infos, "reset")
+
+
+def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    env.action_space.seed(SEED)
+    env.reset(seed=SEED)
+    kept: list[tuple[Any, Any]] = []
+    for _ in range(min(n_steps, 20)):
+        answer = env.step(env.action_space.sample())
+        _expect(len(answer) == 5, f"step returned {len(answer)} values, expected 5")
+        observations, rewards, terminated, truncated, infos = answer
+        _check_observations(env, observations, "step")
+        for name, array, kind in (
+            ("rewards", rewards, np.floating),
+            ("terminated", terminated, np.bool_),
+            ("truncated", truncated, np.bool_),
+        ):
+            found = (getattr(array, "shape", None), getattr(array, "dtype", None))
+            right = found[0] == (env.num_envs,) and np.issubdtype(found[1], kind)
+            _expect(right, f"step: {name} of shape and type {found}, expected ({env.num_envs},) {kind}")
+        _expect(bool(np.all(np.isfinite(rewards))), f"step: rewards {rewards} are not all finite")
+        _check_infos(env, infos, "step")
+        for before, copy in kept:
+            _expect(np.array_equal(before, copy), "step changed an array that an earlier step had returned")
+        kept = [(array, np.copy(array)) for array in (observations, rewards, terminated, truncated)]
+
+
+def _check_observations(env: VectorEnv[Any, Any, Any], observations: Any, where: str) -> None:
+    _expect(
+        observations in env.observation_space,
+        f"{where}: observations {observations} are not in {env.observation_space}",
+    )
+
+
+def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
+    _expect(isinstance(infos, dict), f"{where}: infos are {type(infos)}, expected a dict of arrays")
+    for key, value in infos.items():
+        if key.startswith("_"):
+            continue
+        mask = infos.get(f"_{key}")
+        right = isinstance(mask, np.ndarray) and mask.shape == (env.num_envs,) and mask.dtype == np.bool_
+        _expect(
+            right, f"{where}: infos['_{key}'] is {mask!r}, expected a mask of {env.num_envs} truth values"
+        )
+        if isinstance(value, dict):
+            _check_infos(env, value, f"{where}, {key}")
+        else:
+            length = len(value) if isinstance(value, np.ndarray) else None
+            _expect(
+                length == env.num_envs,
+                f"{where}: infos['{key}'] is {value!r}, expected an entry for each row",
+            )
+
+
+def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    first, again, list_of_seeds, other = (
+        _fly(env, seed, n_steps)
+        for seed in (SEED, SEED, [SEED + i for i in range(env.num_envs)], SEED + 10_000)
+    )
+    _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
+    _expect(
+        _same(first, list_of_seeds),
+        "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])",
+    )
+    _expect(not _same(first[:1], other[:1]), "reset with another seed gave the same first observations")
+
+
+def _fly(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
+    env.action_space.seed(SEED)
+    observations, _ = env.reset(seed=seed)
+    nothing = np.zeros(env.num_envs)
+    course: Episode = [(observations, nothing, nothing, nothing)]
+    for _ in range(n_steps):
+        *outcome, _ = env.step(env.action_space.sample())
+        course.append(tuple(outcome))
+        if autoreset_mode(env) is AutoresetMode.DISABLED and np.any(outcome[2] | outcome[3]):
+            break
+    return course
+
+
+def _same(one: Episode, other: Episode) -> bool:
+    return all(
+        np.array_equal(a, b)
+        for left, right in zip(one, other, strict=True)
+        for a, b in zip(left, right, strict=True)
+    )
+
+
+def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    env.reset(seed=SEED)
+    actions = env.action_space.sample()
+    wrong = [np.concatenate([actions, actions])]
+    if np.issubdtype(actions.dtype, np.floating):
+        wrong.append(np.full_like(actions, np.nan))
+    for bad in wrong:
+        try:
+            env.step(bad)
+        except (ValueError, AssertionError, IndexError):
+            continue
+        raise InputError(f"vector environment: step took actions {bad!r}, expected an error")
+
+
+def _check_autoreset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    mode = autoreset_mode(env)
+    env.action_space.seed(SEED)
+    env.reset(seed=SEED)
+    ended = np.zeros(env.num_envs, dtype=np.bool_)
+    first_row = np.arange(env.num_envs) == 0
+    for step in range(n_steps):
+        observations, rewards, terminated, truncated, infos = env.step(env.action_space.sample())
+        done = terminated | truncated
+        if mode is AutoresetMode.DISABLED and step == STAGGER:  # so that episodes do not all end together
+            done = done | first_row
+        if mode is AutoresetMode.NEXT_STEP:
+            _expect(not np.any(done & ended), "an episode ended in the step that had begun it")
+            _expect(
+                not np.any(rewards[ended]), "the step that begins an episode earned something, expected 0"
+            )
+        elif mode is AutoresetMode.SAME_STEP and np.any(done):
+            _check_final(env, infos, done)
+        elif mode is AutoresetMode.DISABLED and np.any(done):
+            observations = _check_partial_reset(env, observations, done)
+        ended = done
+
+
+def _check_final(env: VectorEnv[Any, Any, Any], infos: dict[str, Any], done: NDArray[np.bool_]) -> None:
+    for key in ("final_obs", "final_info"):
+        _expect(key in infos, f"an episode ended and infos have no '{key}'")
+        mask = infos.get(f"_{key}", np.zeros(0))
+        _expect(np.array_equal(mask, done), f"infos['_{key}'] is {mask}, expected {done}: the ended rows")
+    for i in np.flatnonzero(done):
+        final = infos["final_obs"][i]
+        _expect(
+            final in env.single_observation_space, f"infos['final_obs'][{i}] is {final}, not an observation"
+        )
+
+
+def _check_partial_reset(env: VectorEnv[Any, Any, Any], before: Any, done: NDArray[np.bool_]) -> Any:
+    kept = np.copy(before)
+    after, _ = env.reset(options={"reset_mask": done.copy()})
+    _check_observations(env, after, "reset with a mask")
+    _expect(np.array_equal(after[~done], kept[~done]), "reset with a mask changed rows outside of it")
+    _expect(not np.array_equal(after[done], kept[done]), "reset with a mask left a row within it as it was")
+    return after
+
+
+def _check_rows(
+    make: Callable[[], VectorEnv[Any, Any, Any]],
+    make_single: Callable[[], gymnasium.Env[Any, Any]],
+    n_steps: int,
+) -> None:
+    env = make()
+    singles = [make_single() for _ in range(env.num_envs)]
+    mode = autoreset_mode(env)
+    try:
+        env.action_space.seed(SEED)
+        observations, _ = env.reset(seed=SEED)
+        for i, single in enumerate(singles):
+            expected, _ = single.reset(seed=SEED + i)
+            _expect_row(i, observations[i], expected)
+        ended = np.zeros(env.num_envs, dtype=np.bool_)
+        for _ in range(n_steps):
+            actions = env.action_space.sample()
+            observations, rewards, terminated, truncated, _ = env.step(actions)
+            for i, single in enumerate(singles):
+                expect = _row(single, actions[i], bool(ended[i]), mode)
+                found = (observations[i], rewards[i], terminated[i], truncated[i])
+                for one, other in zip(found, expect, strict=True):
+                    _expect_row(i, one, other)
+            ended = terminated | truncated
+            if mode is AutoresetMode.DISABLED and np.any(ended):
+                break
+    finally:
+        env.close()
+        for single in singles:
+            single.close()
+
+
+def _row(single: gymnasium.Env[Any, Any], action: Any, ended: bool, mode: AutoresetMode) -> tuple[Any, ...]:
+    """What a single environment that is reset by hand shows in place of a row."""
+    if ended and mode is AutoresetMode.NEXT_STEP:
+        observation, _ = single.reset()
+        return observation, 0.0, False, False
+    observation, reward, terminated, truncated, _ = single.step(action)
+    if mode is AutoresetMode.SAME_STEP and (terminated or truncated):
+        observation, _ = single.reset()
+    return observation, reward, terminated, truncated
+
+
+def _expect_row(i: int, found: Any, expected: Any) -> None:
+    _expect(
+        bool(np.array_equal(found, expected)),
+        f"row {i} shows {found}, expected {expected} of the single environment with seed {SEED + i}",
+    )

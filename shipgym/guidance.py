@@ -1,0 +1,228 @@
+"""Paths of waypoints, where a ship stands on them, and the course that leads back: line of sight.
+
+Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3 (line of sight, circle
+of acceptance); Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path following of underactuated
+marine surface vessels in the presence of constant ocean currents (integral line of sight).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+class PathPosition(NamedTuple):
+    """Where ships stand on a leg of a path, arrays of one shape.
+
+    Attributes
+    ----------
+    along : array
+        Distance run since the leg's first waypoint, m.
+    cross_track : array
+        Distance from the leg, m, positive to starboard of it.
+    course : array
+        Direction of the leg, rad.
+    to_go : array
+        Distance left to the leg's last waypoint, along the leg, m.
+    """
+
+    along: Floats
+    cross_track: Floats
+    course: Floats
+    to_go: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Path:
+    """Straight legs from waypoint to waypoint.
+
+    Attributes
+    ----------
+    waypoints : array of shape (n_waypoints, 2)
+        North and east, m.
+
+    Raises
+    ------
+    InputError
+        For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
+    """
+
+    waypoints: Floats
+
+    def __post_init__(self) -> None:
+        points = _waypoints(self.waypoints)
+        points.flags.writeable = False
+        object.__setattr__(self, "waypoints", points)
+
+    @property
+    def n_legs(self) -> int:
+        """Number of legs."""
+        return len(self.waypoints) - 1
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Length of each leg, m, shape (n_legs,)."""
+        lengths: Floats = np.hypot(*np.diff(self.waypoints, axis=0).T)
+        return lengths
+
+    @cached_property
+    def courses(self) -> Floats:
+        """Direction of each leg, rad, shape (n_legs,)."""
+        north, east = np.diff(self.waypoints, axis=0).T
+        courses: Floats = np.arctan2(east, north)
+        return courses
+
+    @cached_property
+    def turns(self) -> Floats:
+        """Change of course at the end of each leg, rad, positive to starboard; 0 at the last."""
+        return np.append(wrapped(np.diff(self.courses)), 0.0)
+
+    @property
+    def length(self) -> float:
+        """Length of the path, m."""
+        return float(self.lengths.sum())
+
+    def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
+        """Where ships stand on given legs.
+
+        Parameters
+        ----------
+        x, y : array-like
+            North and east, m.
+        leg : array-like of int
+            Number of the leg of each ship, from 0.
+
+        Returns
+        -------
+        PathPosition
+        """
+        legs = np.asarray(leg)
+        course = self.courses[legs]
+        north, east = np.asarray(x) - self.waypoints[legs, 0], np.asarray(y) - self.waypoints[legs, 1]
+        along = north * np.cos(course) + east * np.sin(course)
+        across = east * np.cos(course) - north * np.sin(course)
+        return PathPosition(along, across, course, self.lengths[legs] - along)
+
+    def distance(self, x: ArrayLike, y: ArrayLike) -> Floats:
+        """Distance of points from the path, m, of the shape of the points."""
+        north, east = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        legs = np.arange(self.n_legs)
+        where = self.position(north[..., None], east[..., None], legs)
+        beyond = np.maximum(np.maximum(-where.along, where.to_go * -1.0), 0.0)
+        nearest: Floats = np.hypot(where.cross_track, beyond).min(axis=-1)
+        return nearest
+
+
+def line_of_sight(where: PathPosition, lookahead: ArrayLike) -> Floats:
+    """Course towards the point of the leg that lies `lookahead` m ahead (Fossen 2011, 10.3.2).
+
+    Parameters
+    ----------
+    where : PathPosition
+        Of ships on their legs.
+    lookahead : array-like
+        m, above 0.
+
+    Returns
+    -------
+    array
+        rad.
+    """
+    return where.course - np.arctan2(where.cross_track, lookahead)
+
+
+def integral_line_of_sight(
+    where: PathPosition, lookahead: ArrayLike, integral: ArrayLike, gain: float, dt: float
+) -> tuple[Floats, Floats]:
+    """Course that also counters a steady drift, and the integral one interval later (Borhaug 2008, 12).
+
+    Parameters
+    ----------
+    where : PathPosition
+        Of ships on their legs.
+    lookahead : array-like
+        m, above 0.
+    integral : array-like
+        Of the cross-track error, m.
+    gain : float
+        Of the integral, 1/s: sigma of the source over the lookahead.
+    dt : float
+        Interval, s.
+
+    Returns
+    -------
+    course : array
+        rad.
+    integral : array
+        m. It grows slower the further the ship is off, so that it does not wind up.
+    """
+    offset = where.cross_track + np.asarray(integral)
+    rate = gain * np.square(lookahead) * where.cross_track / (np.square(offset) + np.square(lookahead))
+    return where.course - np.arctan2(offset, lookahead), np.asarray(integral) + dt * rate
+
+
+def wrapped(angle: ArrayLike) -> Floats:
+    """The same angle in [-pi, pi)."""
+    values: Floats = (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
+    return values
+
+
+def random_path(
+    random: np.random.Generator, n_legs: int, leg_length: tuple[float, float], largest_turn_deg: float
+) -> Path:
+    """A path from the origin with legs and turns drawn evenly.
+
+    Parameters
+    ----------
+    random : Generator
+        Draws the first course, then for each leg its length and the turn at its end.
+    n_legs : int
+        Number of legs, at least 1.
+    leg_length : tuple of float
+        Least and largest length of a leg, m.
+    largest_turn_deg : float
+        Of course at a waypoint, degrees.
+
+    Returns
+    -------
+    Path
+    """
+    if n_legs < 1:
+        raise InputError(f"n_legs: {n_legs} found, expected at least 1")
+    check_number(leg_length[0], "leg_length", above=0.0, hint="in m")
+    check_number(leg_length[1], "leg_length", at_least=leg_length[0], hint="the least length first")
+    lengths = random.uniform(*leg_length, n_legs)
+    turns = np.radians(largest_turn_deg) * random.uniform(-1.0, 1.0, n_legs - 1)
+    courses = np.cumsum(np.append(random.uniform(-np.pi, np.pi), turns))
+    steps = lengths[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=-1)
+    return Path(np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]))
+
+
+def _waypoints(given: Any) -> Floats:
+    try:
+        points = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 2:
+        raise InputError(
+            f"waypoints: shape {points.shape} found, expected at least 2 rows of north and east in m: (n, 2)"
+        )
+    if not np.all(np.isfinite(points)):
+        row = int(np.argwhere(~np.isfinite(points))[0, 0])
+        raise InputError(f"waypoints: row {row} is {points[row].tolist()}, expected finite numbers in m")
+    repeated = np.flatnonzero(np.all(np.diff(points, axis=0) == 0.0, axis=1))
+    if repeated.size:
+        row = int(repeated[0]) + 1
+        raise InputError(
+            f"waypoints: row {row} repeats {points[row].tolist()} of the row before, expected another point"
+        )
+    return points

@@ -1,0 +1,212 @@
+"""How certain the indices of an identified ship are: its manoeuvres with models drawn from the posterior."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
+from shipgym.manoeuvres.standard import standard_manoeuvres
+from shipgym.models.ship_model import ShipModel
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+LEVELS = (0.025, 0.975)  # of the 95 % interval
+
+#: From a ship to the indices of one of her manoeuvres, a dataclass such as `ZigzagIndices`.
+Judged = Callable[[ShipModel], Any]
+
+
+@dataclass(frozen=True, eq=False)
+class IndexInterval:
+    """One index of a model and of models drawn from its posterior.
+
+    Attributes
+    ----------
+    value : float or None
+        Of the model itself; None where its manoeuvre never got so far.
+    values : array of shape (n_draws,)
+        Of the draws; NaN where one ran away or its manoeuvre never got so far.
+    ran_away : bool array of shape (n_draws,)
+        Draws that ran away in the manoeuvre.
+    """
+
+    value: float | None
+    values: Floats
+    ran_away: Bools
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws that have a value.
+
+        It says nothing of those that ran away or never got so far: see their counts. None where no draw has
+        a value.
+        """
+        low, high = self.quantiles(*LEVELS)
+        return None if low is None or high is None else (low, high)
+
+    @property
+    def n_ran_away(self) -> int:
+        """Draws that ran away."""
+        return int(self.ran_away.sum())
+
+    @property
+    def n_never_reached(self) -> int:
+        """Draws that did not run away, but whose manoeuvre never got so far."""
+        return int((np.isnan(self.values) & ~self.ran_away).sum())
+
+    def quantiles(self, *levels: float) -> tuple[float | None, ...]:
+        """Quantiles over the draws that have a value; None where none has."""
+        reached = self.values[np.isfinite(self.values)]
+        if not len(reached):
+            return (None,) * len(levels)
+        return tuple(float(value) for value in np.quantile(reached, levels))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Value, interval and counts, as JSON knows them."""
+        return {
+            "value": self.value,
+            "interval_95": self.interval,
+            "draws": len(self.values),
+            "ran_away": self.n_ran_away,
+            "never_reached": self.n_never_reached,
+        }
+
+    def __str__(self) -> str:
+        text = "-" if self.value is None else f"{self.value:.4g}"
+        if self.interval is not None:
+            text += f" [{self.interval[0]:.4g}, {self.interval[1]:.4g}]"
+        lost = [
+            f"{count} of {len(self.values)} draws {what}"
+            for count, what in ((self.n_ran_away, "ran away"), (self.n_never_reached, "never got so far"))
+            if count
+        ]
+        return text + (f" ({', '.join(lost)})" if lost else "")
+
+
+def index_intervals(
+    model: ShipModel,
+    manoeuvre: str | Judged = "zigzag 20/20, starboard first",
+    n_draws: int = 200,
+    seed: int | np.random.Generator = 0,
+) -> dict[str, IndexInterval]:
+    """Indices of a manoeuvre with their 95 % intervals over the posterior of an identified model.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a covariance.
+    manoeuvre : str or callable
+        A name of `standard_manoeuvres`, or a function from a ship to the indices of a manoeuvre, such as
+        ``lambda ship: zigzag_indices(zigzag(ship, 15, 10))``.
+    n_draws : int
+        Models drawn (`ShipModel.sample`).
+    seed : int or Generator
+        Of the draw.
+
+    Returns
+    -------
+    dict of str to IndexInterval
+        By the name of the index, units in the names. Draws that run away or never get so far are counted.
+
+    Raises
+    ------
+    InputError
+        For a model without covariance, or a manoeuvre that is not known or that the ship cannot sail.
+    UnstableModelError
+        If the model itself runs away.
+    ManoeuvreError
+        If the model itself never reaches its switch heading or its speed.
+
+    Examples
+    --------
+    >>> from shipgym import load_model, manoeuvres
+    >>> found = manoeuvres.index_intervals(load_model("mariner-tls-svm"), n_draws=50, seed=1)
+    >>> low, high = found["overshoot_1_deg"].interval
+    >>> low < found["overshoot_1_deg"].value < high
+    True
+    """
+    if isinstance(manoeuvre, str):
+        known = standard_manoeuvres(model)
+        judged: Judged = known[check_choice(manoeuvre, tuple(known), "manoeuvre")].judge
+    else:
+        judged = manoeuvre
+    check_number(n_draws, "n_draws", at_least=2)
+    own = {"": asdict(judged(model))}
+    return intervals_of(own, model.sample(int(n_draws), seed), {"": judged})[""]
+
+
+def intervals_of(
+    own: Mapping[str, Mapping[str, float | None]],
+    draws: Sequence[ShipModel],
+    judged: Mapping[str, Judged],
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, dict[str, IndexInterval]]:
+    """Indices of several manoeuvres over the same draws.
+
+    Parameters
+    ----------
+    own : mapping of str to indices
+        Of the model itself, by manoeuvre.
+    draws : sequence of ShipModel
+        Sailed one after the other; with none, the values stand alone.
+    judged : mapping of str to callable
+        From a ship to the indices, by manoeuvre.
+    progress : callable, optional
+        Told the number of draws done.
+
+    Returns
+    -------
+    dict of str to dict of str to IndexInterval
+        By manoeuvre and index.
+    """
+    ran_away = {name: np.zeros(len(draws), dtype=np.bool_) for name in own}
+    values = {name: {index: np.full(len(draws), np.nan) for index in own[name]} for name in own}
+    for k, draw in enumerate(draws):
+        for name in own:
+            indices, ran_away[name][k] = attempt(judged[name], draw)
+            for index, value in indices.items():
+                if value is not None:
+                    values[name][index][k] = value
+        if progress is not None:
+            progress(k + 1)
+    return {
+        name: {
+            index: IndexInterval(value, values[name][index], ran_away[name])
+            for index, value in own[name].items()
+        }
+        for name in own
+    }
+
+
+def attempt(judged: Judged, model: ShipModel) -> tuple[dict[str, float | None], bool]:
+    """Indices of a manoeuvre, none where it never got so far, and whether the ship ran away.
+
+    A spiral of a draw that turns to one side only, or whose rudder has the wrong sign, has no indices either:
+    there the error lies in the draw and not in what the user gave.
+    """
+    try:
+        return asdict(judged(model)), False
+    except UnstableModelError:
+        return {}, True
+    except (ManoeuvreError, InputError):
+        return {}, False
+
+
+def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
+    """The largest of an index over some manoeuvres, for the model and for each draw.
+
+    It has no value where one of the manoeuvres has none.
+    """
+    own = [run.value for run in runs if run.value is not None]
+    return IndexInterval(
+        value=max(own) if len(own) == len(runs) else None,
+        values=np.max([run.values for run in runs], axis=0),
+        ran_away=np.any([run.ran_away for run in runs], axis=0),
+    )

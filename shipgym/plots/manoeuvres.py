@@ -1,0 +1,319 @@
+"""Figures of the standard manoeuvres, each with what its indices are read from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from shipgym.errors import InputError
+from shipgym.manoeuvres.execution import distance_sailed, execute_time, rudder, ship_length
+from shipgym.manoeuvres.pull_outs import pull_out_indices
+from shipgym.manoeuvres.spirals import Spiral, spiral_indices
+from shipgym.manoeuvres.turning import turning_indices
+from shipgym.manoeuvres.zigzags import switch_heading_deg
+from shipgym.plots.style import (
+    GRID,
+    LIMIT,
+    MEASURED,
+    MODEL,
+    MUTED,
+    PALETTE,
+    axis,
+    graph_objects,
+    layout,
+    subplots,
+)
+from shipgym.plots.style import line as drawn
+from shipgym.plots.trials import AXES, history_figure, quantity, thinned
+from shipgym.trial import Trial
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+ROOM_ABOVE = {"l": 62, "r": 18, "t": 66, "b": 48}  # for legend and titles of panels
+EXCITATION = ("delta_command", "delta", "n_command", "n", "psi", "r", "speed", "drift")
+
+
+def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
+    """A zigzag as the field draws it: heading change and rudder over time, with the switch headings.
+
+    Parameters
+    ----------
+    trial : Trial
+        With psi and delta.
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    figure = graph_objects().Figure()
+    heading = np.degrees(trial["psi"] - trial["psi"][0])
+    label = {"hovertemplate": "%{y:.2f} deg"}
+    figure.add_trace(drawn(trial.t, heading, "heading change", MODEL, 2.0, **label))
+    figure.add_trace(drawn(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **label))
+    switch = switch_heading_deg(trial)
+    if switch is not None:
+        ends = [trial.t[0], trial.t[-1]]
+        for side in (switch, -switch):
+            figure.add_trace(
+                drawn(
+                    ends, [side] * 2, "switch heading", LIMIT, 1.1, line_dash="dot", hoverinfo="skip",
+                    showlegend=side > 0,
+                )
+            )  # fmt: skip
+    figure.update_layout(layout(height))
+    figure.update_xaxes(axis("time, s"))
+    figure.update_yaxes(axis("heading change and rudder, deg", zeroline=True, zerolinecolor=GRID))
+    return figure
+
+
+def turning_figure(trial: Trial, length: float | None = None, height: int = 480) -> Figure:
+    """A turning circle seen from above, with advance, transfer and tactical diameter marked.
+
+    Parameters
+    ----------
+    trial : Trial
+        With x, y, psi, u, v, r and delta (or delta_command).
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+        In ship lengths, from the position and along the heading at which the rudder was ordered.
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing, or plotly is not installed.
+    """
+    indices, lpp = turning_indices(trial, length), ship_length(trial, length)
+    start = execute_time(trial)
+    x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
+    north, east = trial["x"] - x0, trial["y"] - y0
+    ahead = (north * np.cos(psi0) + east * np.sin(psi0)) / lpp
+    aside = (east * np.cos(psi0) - north * np.sin(psi0)) / lpp
+    side = 1.0 if trial["psi"][-1] >= psi0 else -1.0
+    figure = graph_objects().Figure()
+    figure.add_trace(drawn(aside, ahead, "path", MODEL, 2.0))
+    advance, transfer, diameter = (
+        indices.advance_lengths, indices.transfer_lengths, indices.tactical_diameter_lengths,
+    )  # fmt: skip
+    if advance is not None and transfer is not None:
+        far = side * transfer
+        _dimension(figure, [far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1])
+        _dimension(figure, [0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2])
+    if diameter is not None:
+        level = float(np.interp(np.pi, side * (trial["psi"] - psi0), ahead))
+        wide = [0.0, side * diameter]
+        _dimension(figure, wide, [level] * 2, f"tactical diameter {diameter:.2f} L", PALETTE[3])
+    figure.update_layout(layout(height, hovermode="closest"))
+    figure.update_xaxes(axis("to starboard, ship lengths", zeroline=True, zerolinecolor=GRID))
+    figure.update_yaxes(
+        axis("ahead, ship lengths", scaleanchor="x", scaleratio=1, zeroline=True, zerolinecolor=GRID)
+    )
+    return figure
+
+
+def _dimension(figure: Figure, x: list[float], y: list[float], name: str, colour: str) -> None:
+    """A measured length as a line with bars at both ends."""
+    across = "line-ew" if x[0] == x[1] else "line-ns"
+    mark = {"symbol": across, "size": 11, "line": {"width": 1.6, "color": colour}}
+    figure.add_trace(
+        drawn(x, y, name, colour, 1.5, marker=mark, hoverinfo="name").update(mode="lines+markers")
+    )
+
+
+def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
+    """Yaw rate over rudder angle of a spiral, with the width of its loop.
+
+    Parameters
+    ----------
+    spiral : Spiral
+        Direct (Dieudonne), there and back in two lines, or reverse (Bech).
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    figure = graph_objects().Figure()
+    angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
+    points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
+    ways = {"reverse spiral": (slice(None), MODEL)}
+    if spiral.method == "direct":
+        turn = int(np.argmin(angles) if np.argmax(angles) < np.argmin(angles) else np.argmax(angles))
+        ways = {"there": (slice(0, turn + 1), MODEL), "and back": (slice(turn, None), PALETTE[1])}
+    for name, (part, colour) in ways.items():
+        way = drawn(angles[part], rates[part], name, colour, 1.6, **points)
+        figure.add_trace(way.update(mode="lines+markers"))
+    try:
+        indices = spiral_indices(spiral)
+        width, middle = indices.loop_width_deg, indices.loop_middle_deg
+    except InputError:  # turns to one side only have no loop to mark
+        width = middle = 0.0
+    step = float(np.abs(np.diff(angles)).min()) if spiral.method == "direct" else 0.0
+    if width > step:
+        name = f"loop, {width:.2f} deg wide"
+        figure.add_trace(
+            drawn([middle - width / 2, middle + width / 2], [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name")
+        )
+    figure.update_layout(layout(height, hovermode="closest"))
+    figure.update_xaxes(axis("rudder, deg", zeroline=True, zerolinecolor=GRID))
+    figure.update_yaxes(axis("yaw rate, deg/s", zeroline=True, zerolinecolor=GRID))
+    return figure
+
+
+def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
+    """Yaw rate of pull-outs over the time since the rudder was put amidships; a stable ship's meet.
+
+    Parameters
+    ----------
+    trials : dict of str to Trial
+        By the label of their line; usually one from each side.
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If there is no pull-out in a trial, or plotly is not installed.
+    """
+    figure = graph_objects().Figure()
+    for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
+        left = pull_out_indices(trial).residual_rate_deg_s
+        angle = np.abs(rudder(trial))
+        release = trial.t[min(int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1, len(trial) - 1)]
+        part = thinned(trial)
+        label = f"{name}: {left:.3f} deg/s left"
+        figure.add_trace(drawn(trial.t[part] - release, np.degrees(trial["r"][part]), label, colour))
+    figure.update_layout(layout(height))
+    figure.update_xaxes(axis("time since the rudder was put amidships, s", zeroline=True, zerolinecolor=GRID))
+    figure.update_yaxes(axis("yaw rate, deg/s", zeroline=True, zerolinecolor=GRID))
+    return figure
+
+
+def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -> Figure:
+    """A stop or an acceleration: surge speed and shaft over time, and speed over the distance sailed.
+
+    Parameters
+    ----------
+    trial : Trial
+        With u and v; n where the ship has a shaft.
+    length : float, optional
+        Ship length between perpendiculars, m; by default the trial's own.
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If a channel or the length is missing, or plotly is not installed.
+    """
+    sailed = distance_sailed(trial) / ship_length(trial, length)
+    part = thinned(trial)
+    shaft = quantity(trial, "n")
+    panels: list[tuple[Any, Any, str, str, str]] = [
+        (sailed, trial["u"], "surge speed", "distance sailed, ship lengths", AXES["u"][0]),
+        (trial.t, trial["u"], "surge speed", "time, s", ""),
+    ]
+    if shaft is not None:
+        panels.append((trial.t, shaft, "shaft", "time, s", AXES["n"][0]))
+    figure = subplots(1, len(panels), horizontal_spacing=0.09)
+    for column, (x, y, name, below, beside) in enumerate(panels, start=1):
+        colour = MODEL if name != "shaft" else MEASURED
+        trace = drawn(x[part], y[part], name, colour, showlegend=column != 2)
+        figure.add_trace(trace, row=1, col=column)
+        figure.update_xaxes(axis(below), row=1, col=column)
+        figure.update_yaxes(axis(beside, zeroline=True, zerolinecolor=GRID), row=1, col=column)
+    figure.update_layout(layout(height, hovermode="closest", margin=ROOM_ABOVE))
+    return figure
+
+
+def excitation_figure(trial: Trial) -> Figure:
+    """A manoeuvre for identification: rudder and shaft orders above what the ship made of them.
+
+    Parameters
+    ----------
+    trial : Trial
+        Such as of `prbs_rudder`, `multi_sine_rudder` or `shaft_speed_steps`.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    figure = history_figure({"simulated": trial}, _excited(trial))
+    figure.update_layout(showlegend=False)
+    return figure
+
+
+def _excited(trial: Trial) -> list[str]:
+    """Quantities worth a panel: orders that change, and the motion."""
+    orders = ("delta_command", "delta", "n_command", "n")
+    values = {name: quantity(trial, name) for name in EXCITATION}
+    return [
+        name
+        for name, value in values.items()
+        if value is not None and (name not in orders or np.ptp(value) > 0.0)
+    ]
+
+
+def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
+    """The figure that suits a manoeuvre, by its kind.
+
+    Parameters
+    ----------
+    sailed : Trial or Spiral
+        Measured or simulated.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+        Time histories where the kind has no figure of its own.
+
+    Raises
+    ------
+    InputError
+        If a channel or the ship's length is missing, or plotly is not installed.
+    """
+    if isinstance(sailed, Spiral):
+        return spiral_figure(sailed)
+    if sailed.kind == "pull-out":
+        return pull_out_figure({sailed.name: sailed})
+    known: dict[str | None, Callable[[Trial], Figure]] = {
+        "zigzag": zigzag_figure, "turning-circle": turning_figure, "straight": speed_figure,
+        "random": excitation_figure,
+    }  # fmt: skip
+    if sailed.kind in known:
+        return known[sailed.kind](sailed)
+    return history_figure({sailed.name: sailed}, ("psi", "delta", "r", "speed", "drift"))

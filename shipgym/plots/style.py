@@ -1,0 +1,124 @@
+"""The style that all figures share, and plotly itself, imported when it is first used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+INK, MUTED, GRID = "#1f2a37", "#64748b", "#e5e9ef"
+MEASURED, MODEL, LIMIT = "#1f2a37", "#1d70b8", "#c2412d"
+PALETTE = (MODEL, "#d9822b", "#0f8a7e", "#a1478f", "#6b7a1e", "#7a5c45")
+FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
+
+
+def graph_objects() -> Any:
+    """The module `plotly.graph_objects`.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    return _plotly("graph_objects")
+
+
+def _plotly(module: str) -> Any:
+    try:
+        return import_module(f"plotly.{module}")
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "plotly is not installed, figures and reports need it: pip install 'shipgym[report]'"
+        ) from error
+
+
+def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: Any) -> Figure:
+    """A figure of panels, rows by columns, with a title above each where given.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    figure = _plotly("subplots").make_subplots(
+        rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
+    )
+    figure.update_annotations(font={"size": 12.5, "color": INK})
+    return figure
+
+
+def layout(height: int, **changes: Any) -> dict[str, Any]:
+    """The layout that all figures share: white, a light grid, the legend above.
+
+    Parameters
+    ----------
+    height : int
+        In pixels; the width is that of the page.
+    **changes : Any
+        Entries of a plotly layout that replace these.
+    """
+    shared = {
+        "height": height,
+        "template": "none",
+        "font": {"family": FONT, "size": 12, "color": INK},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
+        "margin": {"l": 62, "r": 18, "t": 34, "b": 44},
+        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "font": {"size": 12}},
+        "hoverlabel": {"font": {"family": FONT, "size": 12}},
+        "hovermode": "x unified",
+    }
+    return shared | changes
+
+
+def axis(title: str = "", **changes: Any) -> dict[str, Any]:
+    """An axis in the shared style, with its title (quantity and unit)."""
+    shared = {
+        "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
+        "gridcolor": GRID,
+        "zeroline": False,
+        "linecolor": "#c5ccd6",
+        "showline": True,
+        "ticks": "outside",
+        "ticklen": 4,
+        "tickcolor": "#c5ccd6",
+        "tickfont": {"size": 11, "color": MUTED},
+    }
+    return shared | changes
+
+
+def compact(values: ArrayLike) -> NDArray[np.float32]:
+    """Values in single precision: half the size in a file, and as fine as any screen."""
+    return np.asarray(values, dtype=np.float32)
+
+
+def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
+    """Line of each label: measurements thin and dark, the others by the palette in their order."""
+    labels = list(labels)
+    others = [label for label in labels if label != "measured"]
+    styles = {
+        label: {"color": PALETTE[index % len(PALETTE)], "width": 2.0} for index, label in enumerate(others)
+    }
+    return styles | {label: {"color": MEASURED, "width": 1.5} for label in labels if label == "measured"}
+
+
+def translucent(colour: str, opacity: float) -> str:
+    """A colour "#rrggbb" with an opacity, as CSS knows it."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{opacity})"
+
+
+def line(x: ArrayLike, y: ArrayLike, name: str, colour: str, width: float = 1.9, **more: Any) -> Any:
+    """A line that appears once in the legend whatever the number of panels."""
+    return graph_objects().Scatter(
+        x=compact(x), y=compact(y), name=name, legendgroup=name, mode="lines",
+        line={"color": colour, "width": width}, **more,
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Figures of any trial: time histories and paths, measured beside predicted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.plots.style import axis, compact, graph_objects, layout, line_styles, subplots
+from shipgym.trial import Trial
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+#: Axis title and factor from SI of each channel and of what follows from u and v; m/s and degrees.
+AXES: dict[str, tuple[str, float]] = {
+    "x": ("north, m", 1.0),
+    "y": ("east, m", 1.0),
+    "psi": ("heading, deg", 180.0 / np.pi),
+    "u": ("surge, m/s", 1.0),
+    "v": ("sway, m/s", 1.0),
+    "r": ("yaw rate, deg/s", 180.0 / np.pi),
+    "p": ("roll rate, deg/s", 180.0 / np.pi),
+    "phi": ("heel, deg", 180.0 / np.pi),
+    "delta": ("rudder, deg", 180.0 / np.pi),
+    "delta_command": ("rudder order, deg", 180.0 / np.pi),
+    "n": ("shaft, rev/s", 1.0),
+    "n_command": ("shaft order, rev/s", 1.0),
+    "speed": ("speed, m/s", 1.0),
+    "drift": ("drift angle, deg", 180.0 / np.pi),
+}
+
+ROW_HEIGHT = 150  # of one channel's time history, pixels
+MOST_SAMPLES = 3000  # drawn of one line; spirals have many more
+
+
+def quantity(trial: Trial, name: str) -> NDArray[np.float64] | None:
+    """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None where it does not tell.
+
+    The drift angle is positive where the ship moves to port of her heading.
+    """
+    if name in trial.channels:
+        return trial[name]
+    if name not in ("speed", "drift") or "u" not in trial.channels or "v" not in trial.channels:
+        return None
+    u, v = trial["u"], trial["v"]
+    return np.hypot(u, v) if name == "speed" else np.arctan2(-v, u)
+
+
+def thinned(trial: Trial) -> slice:
+    """The samples that a figure draws."""
+    return slice(None, None, max(len(trial) // MOST_SAMPLES, 1))
+
+
+def history_figure(
+    trials: Mapping[str, Trial], channels: Sequence[str] = ("psi", "r", "u", "v", "delta")
+) -> Figure:
+    """Time histories, one panel for each channel, one line for each trial.
+
+    Parameters
+    ----------
+    trials : mapping of str to Trial
+        By the label of their line; one that is called "measured" is drawn dark.
+    channels : sequence of str
+        Channels from the top, or "speed" and "drift"; those that no trial has are left out.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If there is no trial, none has any of the channels, or plotly is not installed.
+    """
+    shown = [name for name in channels if any(quantity(trial, name) is not None for trial in trials.values())]
+    if not shown:
+        raise InputError(f"figure: no trial with any of the channels {', '.join(channels)}")
+    go, styles = graph_objects(), line_styles(trials)
+    figure = subplots(len(shown), 1, shared_xaxes=True, vertical_spacing=0.16 / len(shown))
+    for row, channel in enumerate(shown, start=1):
+        title, factor = AXES[channel]
+        for label, trial in trials.items():
+            values = quantity(trial, channel)
+            if values is None:
+                continue
+            drawn = thinned(trial)
+            figure.add_trace(
+                go.Scatter(
+                    x=compact(trial.t[drawn]),
+                    y=compact(factor * values[drawn]),
+                    name=label,
+                    legendgroup=label,
+                    showlegend=row == 1,
+                    line=styles[label],
+                    hovertemplate="%{y:.3g}",
+                ),
+                row=row,
+                col=1,
+            )
+        figure.update_yaxes(axis(title), row=row, col=1)
+        figure.update_xaxes(axis("time, s" if row == len(shown) else ""), row=row, col=1)
+    figure.update_layout(layout(ROW_HEIGHT * len(shown) + 70))
+    return figure
+
+
+def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
+    """Paths seen from above, north up, both axes to one scale.
+
+    Parameters
+    ----------
+    trials : mapping of str to Trial
+        By the label of their line, each with x and y; others are left out.
+    height : int
+        In pixels.
+
+    Returns
+    -------
+    plotly.graph_objects.Figure
+
+    Raises
+    ------
+    InputError
+        If no trial has a position, or plotly is not installed.
+    """
+    located = {
+        label: trial for label, trial in trials.items() if "x" in trial.channels and "y" in trial.channels
+    }
+    if not located:
+        raise InputError("figure: no trial with the channels x and y")
+    go = graph_objects()
+    figure = go.Figure()
+    styles = line_styles(trials)
+    for label, trial in located.items():
+        figure.add_trace(
+            go.Scatter(
+                x=compact(trial["y"][thinned(trial)]),
+                y=compact(trial["x"][thinned(trial)]),
+                name=label,
+                line=styles[label],
+            )
+        )
+    figure.update_layout(layout(height, hovermode="closest"))
+    figure.update_xaxes(axis(AXES["y"][0]))
+    figure.update_yaxes(axis(AXES["x"][0], scaleanchor="x", scaleratio=1))
+    return figure

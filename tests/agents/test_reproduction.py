@@ -1,0 +1,33 @@
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from agents.cli import app
+from agents.reproduction import missed, page
+from identification.papers import PAPERS, Row
+
+
+def test_a_paper_that_is_not_known_gets_one_message():
+    answer = CliRunner().invoke(app, ["reproduce", "cao2051"])
+    assert answer.exit_code == 2
+    assert "Did you mean 'cao2015'" in answer.stderr
+
+
+def test_rows_for_programs_and_the_page_for_readers(tmp_path):
+    path = tmp_path / "reproduction.md"
+    answer = CliRunner().invoke(app, ["reproduce", "cao2015", "--json", "--markdown", str(path)])
+    assert answer.exit_code == 0
+    rows = json.loads(answer.stdout)["cao2015"]
+    assert len(rows) == 104
+    assert rows[0]["case"] == "Table 2"
+    text = path.read_text()
+    assert "Aims met: 104 of 104" in text
+    assert text.count("| Table 3 |") == 15
+
+
+@pytest.mark.parametrize(("met", "listed"), [(True, 0), (None, 0), (False, 1)])
+def test_only_aims_that_are_missed_fail(met, listed):
+    row = Row("Table 1", "K, 1/s", 0.15, 0.16, 0.15, "within 1 %", met)
+    assert len(missed({PAPERS[0]: [row]})) == listed
+    assert f"{[0, 1][met is True]} of {[0, 1][met is not None]}." in page({PAPERS[0]: [row]})

@@ -1,0 +1,40 @@
+import numpy as np
+import pytest
+
+from identification.papers import get_paper
+from identification.papers.cao2015 import FORCES, as_printed, errors, printed_errors
+
+
+@pytest.fixture(scope="module")
+def rows():
+    return list(get_paper("cao2015").rows())
+
+
+def test_all_forty_derivatives_come_within_one_per_cent(rows):
+    tables = [row for row in rows if row.case.startswith("Table")]
+    assert len(tables) == 80
+    assert all(row.best < 0.1 and row.met for row in tables)
+
+
+def test_predictions_by_the_best_model_are_within_a_thousandth_of_the_span(rows):
+    figures = [row for row in rows if row.case.startswith("Figures")]
+    assert len(figures) == 24
+    assert all(row.best < 0.1 and row.met for row in figures)
+
+
+@pytest.mark.parametrize("samples", ["integral", "euler"])
+def test_their_way_fails_where_and_as_much_as_printed(samples):
+    printed = {name: error for q in FORCES for name, error in printed_errors(samples, q).items()}
+    ours = errors(as_printed(samples))
+    assert printed.keys() == ours.keys()
+    decades = [np.log10((ours[name] + 1.0) / (printed[name] + 1.0)) for name in printed]
+    assert abs(np.median(decades)) < 0.1
+    worst = max(printed, key=printed.get)
+    assert worst == "Y_vdd"
+    assert ours[worst] == pytest.approx(printed[worst], rel=0.1)
+
+
+def test_additional_excitation_pins_the_coefficient_of_the_state_at_one():
+    plain, excited = (as_printed("integral", excitation).coefficients for excitation in (0.0, 0.1))
+    for name in ("Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d", "Y_vvv", "N_vvr"):
+        assert excited[name] == pytest.approx(plain[name], rel=0.02)

@@ -1,0 +1,128 @@
+"""Captive tests: the vectorial PMM models, coefficients shared between equations, added mass among them."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import shipgym
+from identification import identify
+from identification.forces import force_regression, identify_forces
+from shipgym import InputError, Particulars, ShipModel, Trial
+from shipgym.models.pmm import PMM18, PMM38, TABLE_11, xu_ship
+from shipgym.models.structures import get_structure
+from shipgym.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
+
+# a stand-in for what the paper does not print: a coaster's mass
+PARTICULARS = Particulars(
+    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+)
+SHIP = xu_ship(PARTICULARS)
+PRIME_MASS = 0.5 * 1025.0 * 28.9**3
+
+
+@cache
+def tank_tests(noise: float = 0.0, model_inertia: bool = True) -> tuple[Trial, ...]:
+    tank = Tank(noise=noise, model_inertia=model_inertia)
+    runs = [
+        pure_surge(SHIP, 0.5, tank=tank), pure_sway(SHIP, 0.5, tank=tank), pure_sway(SHIP, 1.5, tank=tank),
+        pure_yaw(SHIP, 3.0, tank=tank), pure_yaw(SHIP, 6.0, tank=tank),
+        yaw_with_drift(SHIP, 4.0, 6.0, tank=tank), yaw_with_drift(SHIP, 4.0, -12.0, tank=tank),
+        static_drift(SHIP, [-15.0, -8.0, -4.0, 4.0, 8.0, 15.0], tank=tank),
+    ]  # fmt: skip
+    return tuple(run.with_(name=f"{i}") for i, run in enumerate(runs))
+
+
+def test_the_models_have_the_coefficients_of_the_paper() -> None:
+    """38 in equations 19 to 21 (10, 14, 14), 18 in 39 to 41 (5, 6, 7); the reduced ones among the full."""
+    assert len(PMM38.coefficient_names) == 38
+    assert set(PMM18.coefficient_names) == TABLE_11.keys()
+    assert TABLE_11.keys() < set(PMM38.coefficient_names)
+    for table, counts in ((PMM38, (10, 14, 14)), (PMM18, (5, 6, 7))):
+        owned = [sum(name[0] == letter for name in table.coefficient_names) for letter in "XYN"]
+        assert tuple(owned) == counts
+    assert {"Y_vdot", "Y_rdot"} < set(PMM18.names("u"))
+    assert "X_udot" in PMM18.names("v")
+    assert {"X_udot", "Y_vdot", "Y_rdot"} < set(PMM18.names("r"))
+
+
+def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
+    """Equation 40 with v only: (m' - Y_vdot) vdot' + (m'xG' - Y_rdot) rdot' = Y_uuv + Y_v|v| v'|v'|."""
+    m = 417e3 / PRIME_MASS
+    drift, L, U = 0.1, 28.9, 5.0
+    u, v = np.cos(drift), -np.sin(drift)
+    rates = SHIP.derivatives([0.0, 0.0, 0.0, U * u, U * v, 0.0, 0.0], [0.0])
+    udot, vdot, rdot = rates[3] * L / U**2, rates[4] * L / U**2, rates[5] * (L / U) ** 2
+    c = TABLE_11
+    assert udot == pytest.approx((c["X_uuu"] * u**3 + c["X_uvv"] * u * v * v) / (m - c["X_udot"]))
+    Y = c["Y_uuv"] * u * u * v + c["Y_v|v|"] * v * abs(v)
+    N = (c["Y_vdot"] - c["X_udot"]) * u * v + c["N_uuv"] * u * u * v
+    static, yaw = m * -0.5 / L, m * ((7.2 / L) ** 2 + (0.5 / L) ** 2)
+    assert (m - c["Y_vdot"]) * vdot + (static - c["Y_rdot"]) * rdot == pytest.approx(Y)
+    assert (static - c["N_vdot"]) * vdot + (yaw - c["N_rdot"]) * rdot == pytest.approx(N)
+
+
+@pytest.mark.parametrize("model_inertia", [True, False])
+def test_table_11_is_found_back_from_the_virtual_tank(model_inertia: bool) -> None:
+    """Added mass, and coefficients that stand in three equations, from all tests at once."""
+    model = identify_forces(
+        tank_tests(model_inertia=model_inertia), "pmm18", PARTICULARS, model_inertia=model_inertia
+    )
+    np.testing.assert_allclose(list(model.coefficients.values()), list(SHIP.coefficients.values()), rtol=1e-6)
+
+
+def test_noise_is_told_by_the_standard_errors() -> None:
+    model = identify_forces(tank_tests(noise=0.05), "pmm18", PARTICULARS, method="ls")
+    assert model.covariance is not None
+    errors = np.array(list(model.coefficients.values())) - list(SHIP.coefficients.values())
+    t = errors / np.sqrt(np.diag(model.covariance))
+    assert 0.3 < np.sqrt(np.mean(t**2)) < 2.0
+    assert np.abs(t).max() < 5.0
+
+
+def test_the_full_model_explains_the_tests_but_not_all_its_coefficients() -> None:
+    """With u' = 1 in pure yaw, ur and uur are one: rank below 38, as Tables 3, 6 and 8 of the paper show."""
+    model = identify_forces(tank_tests(), "pmm38", PARTICULARS)
+    assert model.provenance is not None
+    assert model.provenance["rank"] < 38
+    assert min(model.provenance["r_squared"].values()) > 1.0 - 1e-9
+    for name in ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot"):
+        assert model.coefficients[name] == pytest.approx(TABLE_11[name], rel=1e-5), name
+
+
+def test_the_regression_stacks_x_y_and_n() -> None:
+    regression = force_regression(tank_tests(), PMM18, PARTICULARS)
+    assert regression.features.shape == (len(regression), 18)
+    assert np.bincount(regression.equation).tolist() == [len(regression) // 3] * 3
+    truth = np.array(list(SHIP.coefficients.values()))
+    assert min(regression.r_squared(truth).values()) > 1.0 - 1e-9
+    shared = regression.features[:, regression.names.index("Y_vdot")]
+    assert all(np.abs(shared[regression.equation == i]).max() > 0.0 for i in range(3))
+
+
+def test_a_table_of_shares_survives_its_file(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    SHIP.save(tmp_path / "ship.json")
+    again = ShipModel.load(tmp_path / "ship.json")
+    assert again.table == PMM18
+    assert again.coefficients == TABLE_11
+    assert shipgym.check_ship_model(again).ok
+    assert get_structure("pmm38") == type(PMM38).from_dict(PMM38.to_dict())
+    commands = np.zeros((600, 1))
+    start = [0.0, 0.0, 0.0, 5.0, 0.3, 0.05, 0.0]
+    runs = [ship.simulate(commands, 0.1, start) for ship in (SHIP, again)]
+    np.testing.assert_array_equal(runs[0]["u"], runs[1]["u"])
+    assert 0.0 < runs[0]["u"][-1] < 5.0  # nothing drives her
+
+
+def test_trials_of_the_other_kind_are_refused() -> None:
+    free = SHIP.simulate(np.zeros((600, 1)), 0.1)
+    with pytest.raises(InputError, match="'pmm18' found, which is identified from captive tests"):
+        identify([free], "pmm18", particulars=PARTICULARS)
+    with pytest.raises(InputError, match="channel 'X' is missing, structure 'pmm18' needs"):
+        identify_forces([free], "pmm18", PARTICULARS)
+    with pytest.raises(InputError, match="'abkowitz' found, which is identified from free-running trials"):
+        identify_forces(tank_tests(), "abkowitz", PARTICULARS)
+    with pytest.raises(InputError, match="mass of the ship and the added mass"):
+        ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_column()

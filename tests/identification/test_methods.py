@@ -1,0 +1,168 @@
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification import ArtificialBeeColony, cross_validate, identify
+from identification.free_running import free_running_error
+from identification.methods import METHODS
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import zigzag
+
+SEARCHES = ("cv-lssvr", "pso-lssvr", "abc-lssvr", "de-lssvr")
+
+
+def yaw_error(result: Any, trial: str) -> float:
+    rmse = result.metrics["trials"][trial]["rmse"]["r"]
+    assert rmse is not None
+    return float(np.degrees(rmse))
+
+
+@pytest.mark.parametrize("method", ["ridge", *SEARCHES, "svr"])
+def test_every_method_predicts_a_zigzag_it_has_not_seen(
+    noisy_trials: list[Trial], mariner: ShipModel, method: str
+) -> None:
+    fit = identify(noisy_trials, method=method, particulars=mariner.particulars, steering=mariner.steering)
+    assert fit.stable
+    assert yaw_error(fit, "zigzag_15_15") < 0.03
+    assert np.all(np.isfinite(list(fit.standard_errors.values())))
+
+
+def test_searches_tell_what_they_chose(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    colony = ArtificialBeeColony(sources=8, rounds=10)
+    fit = identify(
+        noisy_trials[:2], method="abc-lssvr", particulars=mariner.particulars, optimiser=colony, seed=4
+    )
+    provenance: Any = json.loads(json.dumps(fit.model.provenance))
+    assert provenance["settings"]["optimiser"] == {
+        "kind": "ArtificialBeeColony", "sources": 8, "rounds": 10, "limit": 20,
+    }  # fmt: skip
+    assert set(fit.searches) == set(provenance["search"]) == {"u", "v", "r"}
+    for equation, search in fit.searches.items():
+        assert provenance["search"][equation]["C"] == pytest.approx(10.0 ** search.x[0])
+        assert len(search.history) == 11
+
+
+def test_optimisers_agree_on_C(noisy_trials: list[Trial], mariner: ShipModel) -> None:  # noqa: N802
+    found = [
+        identify(noisy_trials, method=m, particulars=mariner.particulars, steering=mariner.steering).searches
+        for m in SEARCHES
+    ]
+    for equation in ("u", "v", "r"):
+        exponents = [search[equation].x[0] for search in found]
+        assert np.ptp(exponents) < 0.05
+
+
+def test_free_running_choice_sails_its_trials_at_least_as_well(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
+    options = {"method": "abc-lssvr", "particulars": mariner.particulars, "steering": mariner.steering}
+    few = ArtificialBeeColony(sources=8, rounds=4)
+    used = noisy_trials[:2]
+    free = identify(used, objective="free-running", optimiser=few, **options)
+    held = identify(used, objective="k-fold", **options)
+    error = free_running_error(free.model, used)
+    assert error <= free_running_error(held.model, used)
+    assert free.searches["u"].value == pytest.approx(error, rel=1e-6)
+    assert free_running_error(mariner, used) < error + 0.05
+
+
+def test_outliers_spoil_the_plain_fit_and_not_the_robust_one(mariner: ShipModel, record: Any) -> None:
+    run = record(zigzag(mariner, 20, 20, duration=500, dt=0.1), every=5, name="spikes")
+    r = run["r"].copy()
+    r[37::83] += np.radians(0.3)
+    spiky = Trial(run.t, {**run.channels, "r": r}, name="spikes", kind="zigzag")
+    clean = run.with_(name="clean", use="validate")
+    error = {
+        robust: yaw_error(
+            identify(
+                [spiky, clean], method="tls-svm", robust=robust, smooth=False, window=1,
+                samples="integral", selection="full", particulars=mariner.particulars, guarded=False,
+            ),
+            "clean",
+        )
+        for robust in (False, True)
+    }  # fmt: skip
+    assert error[True] < 0.5 * error[False]
+
+
+def test_trials_of_different_length_and_sampling_are_fitted_together(mariner: ShipModel, record: Any) -> None:
+    plan = [(10, 10, 300, 5), (20, 20, 500, 10), (30, 20, 200, 20)]
+    trials = [
+        record(zigzag(mariner, a, b, duration=length, dt=0.1), every=every, name=f"{a}/{b}")
+        for a, b, length, every in plan
+    ]
+    held = record(zigzag(mariner, 15, 15, duration=400, dt=0.1), every=10, name="15/15", use="validate")
+    for method in ("tls-svm", "cv-lssvr"):
+        fit = identify([*trials, held], method=method, particulars=mariner.particulars)
+        assert fit.diagnostics["r"].samples == sum(round(d / (0.1 * e)) for _, _, d, e in plan)
+        assert yaw_error(fit, "15/15") < 0.002
+    by_trial = identify(trials, method="cv-lssvr", folds="trials", particulars=mariner.particulars)
+    assert by_trial.stable
+
+
+def test_trials_are_held_out_by_name(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    options = {"particulars": mariner.particulars, "steering": mariner.steering}
+    by_name = identify(noisy_trials, hold_out=["zigzag_20_20"], **options)
+    marked = [t.with_(use="validate") if t.name == "zigzag_20_20" else t for t in noisy_trials]
+    assert by_name.coefficients == identify(marked, **options).coefficients
+    assert by_name.metrics["trials"]["zigzag_20_20"]["use"] == "validate"
+    with pytest.raises(InputError, match=r"hold_out: 'zigzag_20_10' found.*Did you mean 'zigzag_\d0_\d0'"):
+        identify(noisy_trials, hold_out=["zigzag_20_10"], **options)
+
+
+def test_cross_validation_predicts_each_trial_by_a_model_of_the_others(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
+    options = {"particulars": mariner.particulars, "steering": mariner.steering}
+    metrics = cross_validate(noisy_trials, **options)
+    assert list(metrics) == [trial.name for trial in noisy_trials[:3]]
+    alone = identify(noisy_trials[:3], hold_out=["zigzag_20_20"], **options)
+    assert metrics["zigzag_20_20"] == alone.metrics["trials"]["zigzag_20_20"]
+    with pytest.raises(InputError, match="1 to fit found"):
+        cross_validate(noisy_trials[:1], **options)
+    with pytest.raises(InputError, match="folds"):
+        cross_validate(noisy_trials, folds=4, **options)
+
+
+def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    same = Trial(
+        cao_zigzag.t, {**cao_zigzag.channels, "v": -20.0 * cao_zigzag["r"]}, name="tied", kind="zigzag"
+    )
+    fit = identify([same], structure="linear-steering", method="ls", particulars=mariner.particulars)
+    assert fit.diagnostics["r"].rank == 2
+    (group,) = fit.diagnostics["r"].dropped
+    assert len(group) == 2
+    assert f"yaw: not told apart by the data, their combination was left out: {', '.join(group)}" in (
+        " ".join(fit.summary().split())
+    )
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"method": "abc-lsvr"}, "method: 'abc-lsvr'.*Did you mean 'abc-lssvr'"),
+        ({"method": "abc-lssvr", "objective": "kfold"}, "objective: 'kfold'.*Did you mean 'k-fold'"),
+        ({"method": "abc-lssvr", "optimiser": "psi"}, "optimiser: 'psi'.*Did you mean 'pso'"),
+        ({"method": "abc-lssvr", "folds": "trials"}, "1 trials"),
+        ({"method": "ls-svm", "C": 0}, "C: 0"),
+        ({"method": "ls-svm", "C": float("nan")}, "C: nan"),
+        ({"method": "tls-svm", "rank": 0}, "rank: 0"),
+        ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
+        ({"method": "svr", "C": float("inf")}, "C: inf"),
+        ({"method": "ls", "rank": 3, "depth": 2}, "settings: rank, depth found, method 'ls'"),
+    ],
+)
+def test_wrong_settings_are_named(
+    cao_zigzag: Trial, mariner: ShipModel, arguments: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(InputError, match=message):
+        identify([cao_zigzag], particulars=mariner.particulars, **arguments)
+
+
+def test_methods_are_registered_by_their_names() -> None:
+    assert all(name == method.name for name, method in METHODS.items())
+    assert {"ls", "ridge", "ls-svm", "tls-svm", "svr", *SEARCHES} <= set(METHODS)

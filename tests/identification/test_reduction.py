@@ -1,0 +1,129 @@
+"""Reduction keeps what is true, and sensitivities follow the physics."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification import build_samples
+from identification.reduction import (
+    backward_elimination,
+    forward_selection,
+    reduce,
+    reduced_structure,
+    sensitivity,
+)
+from shipgym import InputError, Particulars, ShipModel, SteeringGear
+from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.models import get_structure
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+NAMES = tuple("abcdefgh")
+
+
+def orthogonal(noise: float = 0.05) -> tuple[Floats, Floats]:
+    """Eight orthogonal regressors of which a, c and f count."""
+    rng = np.random.default_rng(3)
+    X = np.sqrt(600.0) * np.linalg.qr(rng.standard_normal((600, 8)))[0]
+    return X, X @ np.array([3.0, 0.0, -1.0, 0.0, 0.0, 0.5, 0.0, 0.0]) + noise * rng.standard_normal(600)
+
+
+@pytest.mark.parametrize("run", [backward_elimination, forward_selection])
+def test_of_an_orthogonal_design_the_truth_is_kept(run: Any) -> None:
+    found = run(*orthogonal(), NAMES)
+    assert set(found.terms) == {"a", "c", "f"}
+    assert found.coefficients["c"] == pytest.approx(-1.0, abs=0.01)
+
+
+def test_forward_selection_adds_terms_by_what_they_explain() -> None:
+    X, y = orthogonal(0.0)
+    found = forward_selection(X, y, NAMES)
+    assert [step.changed for step in found.path[:3]] == ["a", "c", "f"]
+    ratios = [step.error_reduction for step in found.path[:3]]
+    np.testing.assert_allclose(ratios, np.array([9.0, 1.0, 0.25]) / 10.25, rtol=1e-10)
+
+
+def test_elimination_keeps_its_whole_path() -> None:
+    found = backward_elimination(*orthogonal(), NAMES)
+    assert [len(step.terms) for step in found.path] == [8, 7, 6, 5, 4, 3]
+    for before, after in zip(found.path, found.path[1:], strict=False):
+        assert set(before.terms) - set(after.terms) == {after.changed}
+        assert after.r_squared <= before.r_squared
+    assert "chosen" in str(found)
+
+
+def test_of_collinear_terms_one_is_dropped() -> None:
+    X, y = orthogonal()
+    doubled = np.column_stack([X[:, [0, 2, 5]], X[:, 0] + 0.01 * X[:, 1]])
+    found = backward_elimination(doubled, y, ("a", "c", "f", "copy"))
+    assert len(found.terms) == 3
+    assert {"c", "f"} < set(found.terms)
+    assert found.path[-1].held_out > 0.999
+
+
+def test_a_term_that_matters_is_not_dropped_however_uncertain() -> None:
+    X, y = orthogonal(noise=1.0)
+    found = backward_elimination(X, y, NAMES, tolerance=1e-3, threshold=0.0)
+    assert {"a", "c", "f"} <= set(found.terms)
+
+
+PARTICULARS = Particulars(length=160.93, speed=7.7175)
+TRUE = {
+    "b_v": -0.06, "b_r": -2.3, "b_|v|r": -0.9, "b_d": -0.08,
+    "c_v": -1e-3, "c_r": -0.104, "c_|v|r": -0.03, "c_d": 3.7e-3,
+}  # fmt: skip
+
+
+def virtual_ship(name: str = "steering5") -> ShipModel:
+    names = get_structure(name).coefficient_names
+    own = {**dict.fromkeys(names, 0.0), **TRUE}
+    own = {c: own[c] for c in names}
+    return ShipModel("virtual", name, PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own)
+
+
+@pytest.mark.parametrize("direction", ["backward", "forward"])
+def test_the_terms_of_a_virtual_ship_are_found_among_more(direction: str) -> None:
+    """A ship of four terms an equation, looked at with seven."""
+    table = get_structure("steering7")
+    rng = np.random.default_rng(0)
+    trials = [zigzag(virtual_ship(), a, a, duration=600, dt=0.5).with_(name=f"{a}") for a in (10, 20, 35)]
+    samples = build_samples(trials, table, PARTICULARS, "integral", window=20, smooth=False)
+    for target in samples.targets.values():
+        target += 2e-4 * np.std(target) * rng.standard_normal(len(target))
+    found = reduce(samples, table, direction, tolerance=1e-6)
+    small = reduced_structure(table, found, "small")
+    for q in ("v", "r"):
+        assert found[q].path[found[q].chosen].held_out > 0.9999
+        assert {t.name for t in small.terms(q)} <= {t.name for t in table.terms(q)}
+        assert len(small.terms(q)) < 7
+    np.testing.assert_allclose(found["r"].coefficients["c_d"], TRUE["c_d"], rtol=0.02)
+
+
+def test_the_sensitivity_to_nomoto_s_gain_is_the_motion_itself() -> None:
+    """Yaw rate and heading are proportional to the coefficient of the rudder."""
+    own = {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0}
+    ship = ShipModel("virtual", "nomoto", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own)
+    turn = partial(turning_circle, rudder_deg=20.0, duration=300.0, dt=0.5)
+    effects, base = sensitivity(ship, turn), turn(ship)
+    squares = [np.mean(base[c] ** 2) / np.ptp(base[c]) ** 2 for c in ("r", "psi")]
+    assert effects["c_d"] == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-9)
+
+
+def test_a_coefficient_of_zero_has_no_effect_and_the_strongest_stands_first() -> None:
+    effects = sensitivity(virtual_ship("steering7"), partial(turning_circle, duration=300.0, dt=0.5))
+    assert effects["b_|r|r"] == 0.0
+    assert effects["c_d"] > effects["b_d"] > 0.0
+    assert list(effects.values()) == sorted(effects.values(), reverse=True)
+
+
+def test_what_cannot_be_reduced_is_named() -> None:
+    X, y = orthogonal()
+    with pytest.raises(InputError, match="20 samples found for 8 terms"):
+        backward_elimination(X[:20], y[:20], NAMES)
+    with pytest.raises(InputError, match="b is 0 throughout"):
+        forward_selection(X * np.array([1.0, 0, 1, 1, 1, 1, 1, 1]), y, NAMES)
+    with pytest.raises(InputError, match="one name a term"):
+        backward_elimination(X, y, NAMES[:3])

@@ -1,0 +1,199 @@
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sklearn.linear_model import Ridge
+
+from identification import (
+    LSSVM,
+    ArtificialBeeColony,
+    DifferentialEvolution,
+    GridSearch,
+    ParticleSwarm,
+    TunedLSSVM,
+    minimise,
+)
+from identification.tuning.objectives import held_out_error, time_blocks, training_error
+from identification.tuning.search import Optimiser
+from shipgym import InputError
+
+Floats = np.ndarray[Any, np.dtype[np.float64]]
+
+OPTIMISERS = [
+    ArtificialBeeColony(rounds=150),
+    ParticleSwarm(rounds=150),
+    GridSearch(points=21, refinements=5),
+    DifferentialEvolution(rounds=150),
+]
+BOX = [(-4.0, 5.0), (-3.0, 6.0)]
+
+
+def sphere(x: Floats) -> Floats:
+    values: Floats = np.sum((x - 1.0) ** 2, axis=1)
+    return values
+
+
+def rastrigin(x: Floats) -> Floats:
+    """Hilly, with its only global minimum of 0 at (1, 1)."""
+    z = x - 1.0
+    values: Floats = np.sum(z**2 - 10.0 * np.cos(2.0 * np.pi * z) + 10.0, axis=1)
+    return values
+
+
+def regression(n: int = 400, m: int = 6, noise: float = 1.0, seed: int = 0) -> tuple[Floats, Floats]:
+    rng = np.random.default_rng(seed)
+    X = rng.standard_normal((n, m)) @ rng.standard_normal((m, m)) + 1.0
+    return X, X @ rng.standard_normal(m) + 3.0 + noise * rng.standard_normal(n)
+
+
+@pytest.mark.parametrize("optimiser", OPTIMISERS, ids=lambda o: type(o).__name__)
+@pytest.mark.parametrize("objective", [sphere, rastrigin])
+def test_optimisers_find_the_global_minimum(optimiser: Optimiser, objective: Any) -> None:
+    found = optimiser.minimise(objective, BOX, seed=3)
+    np.testing.assert_allclose(found.x, [1.0, 1.0], atol=2e-3)
+    assert found.value == objective(found.x[None])[0] == found.history[-1]
+
+
+@pytest.mark.parametrize("name", ["abc", "pso", "grid", "de"])
+def test_search_is_a_function_of_its_seed_and_keeps_its_course(name: str) -> None:
+    first, again, other = (minimise(rastrigin, BOX, seed, name) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first.course, again.course)
+    assert name == "grid" or not np.array_equal(first.course, other.course)
+    assert np.all(np.diff(first.history) <= 0.0)
+    np.testing.assert_array_equal(rastrigin(first.course), first.history)
+
+
+@pytest.mark.parametrize("optimiser", OPTIMISERS, ids=lambda o: type(o).__name__)
+def test_candidates_stay_in_the_box_and_are_counted(optimiser: Optimiser) -> None:
+    seen = []
+
+    def outside(x: Floats) -> Floats:
+        seen.append(x.copy())
+        return sphere(x - 100.0)
+
+    found = optimiser.minimise(outside, BOX)
+    tried = np.vstack(seen)
+    assert np.all((tried >= [-4.0, -3.0]) & (tried <= [5.0, 6.0]))
+    assert found.evaluations == len(tried)
+    np.testing.assert_allclose(found.x, [5.0, 6.0], atol=1e-2)
+
+
+def test_bee_colony_of_zhu_is_20_sources_30_rounds_and_limit_20() -> None:
+    colony = ArtificialBeeColony()
+    assert (colony.sources, colony.rounds, colony.limit) == (20, 30, 20)
+    found = colony.minimise(sphere, BOX)
+    assert found.evaluations >= 20 + 30 * (20 + 20)
+    assert len(found.history) == 31
+
+
+def test_scouts_leave_a_barren_source() -> None:
+    flat = ArtificialBeeColony(sources=4, rounds=10, limit=3).minimise(lambda x: np.ones(len(x)), BOX)
+    assert flat.evaluations > 4 + 10 * 8
+
+
+def test_values_that_are_not_numbers_are_never_the_best() -> None:
+    found = minimise(lambda x: np.where(x[:, 0] < 1.0, np.nan, sphere(x)), BOX)
+    assert found.x[0] >= 1.0
+    assert np.isfinite(found.value)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"optimiser": "acb"}, "optimiser: 'acb'.*Did you mean 'abc'"),
+        ({"bounds": [(1.0, 0.0)]}, "lower one first"),
+        ({"bounds": [(0.0, np.inf)]}, "finite"),
+        ({"bounds": (0.0, 1.0)}, "shape"),
+        ({"bounds": "wide"}, "bounds: 'wide'"),
+        ({"objective": lambda x: x}, "one value for each row"),
+        ({"optimiser": ArtificialBeeColony(limit=0)}, "limit: 0"),
+        ({"optimiser": ParticleSwarm(particles=0)}, "particles: 0"),
+        ({"optimiser": GridSearch(points=2)}, "points: 2"),
+        ({"optimiser": DifferentialEvolution(members=1)}, "members: 1"),
+    ],
+)
+def test_wrong_searches_are_named(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        minimise(**{"objective": sphere, "bounds": BOX, **arguments})
+
+
+@pytest.mark.parametrize("fit_intercept", [True, False])
+@pytest.mark.parametrize("scale", [True, False])
+def test_held_out_error_is_that_of_fits_one_by_one(fit_intercept: bool, scale: bool) -> None:
+    X, y = regression()
+    blocks = time_blocks(len(y), 5)
+    error = held_out_error(X, y, scale, fit_intercept, blocks)
+    for C in (1e-3, 1.0, 1e6):
+        squares = []
+        for k in range(5):
+            away = blocks == k
+            machine = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(X[~away], y[~away])
+            squares.extend((y[away] - machine.predict(X[away])) ** 2)
+            if not scale:
+                oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd")
+                np.testing.assert_allclose(machine.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7)
+        assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
+
+
+def test_training_error_falls_with_the_weight_so_that_its_optimum_is_the_upper_bound() -> None:
+    X, y = regression(noise=0.01)
+    error = training_error(X, y, True, True)(np.linspace(-2.0, 4.0, 40)[:, None])
+    assert np.all(np.diff(error) < 0.0)
+    for optimiser in ("abc", "pso", "grid", "de"):
+        machine = TunedLSSVM(optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)).fit(X, y)
+        assert pytest.approx(1e4, rel=0.1) == machine.C_
+
+
+def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> None:
+    rng = np.random.default_rng(4)
+    gains = []
+    for _ in range(20):
+        X = rng.standard_normal((30, 10)) @ (np.eye(10) + 2.0)
+        truth = rng.standard_normal(10)
+        y = X @ truth + 10.0 * rng.standard_normal(30)
+        tuned = TunedLSSVM(optimiser="grid", bounds=(1e-5, 1e6), fit_intercept=False).fit(X, y)
+        plain = LSSVM(C=np.inf, fit_intercept=False).fit(X, y)
+        gains.append(np.linalg.norm(plain.coef_ - truth) / np.linalg.norm(tuned.coef_ - truth))
+    assert np.median(gains) > 1.5
+
+
+def test_search_costs_the_same_for_any_number_of_samples() -> None:
+    sizes, counts = [], []
+    for n in (200, 2000):
+        X, y = regression(n)
+        error = held_out_error(X, y, True, True, time_blocks(n, 5))
+        sizes.append((error.offset.size, error.gain.size, error.squares.size))
+        counts.append(TunedLSSVM(optimiser="pso").fit(X, y).search_.evaluations)
+    assert sizes[0] == sizes[1]
+    assert counts[0] == counts[1]
+
+
+@given(n=st.integers(2, 300), folds=st.integers(2, 12))
+def test_blocks_follow_each_other_in_time_and_are_equally_long(n: int, folds: int) -> None:
+    folds = min(folds, n)
+    blocks = time_blocks(n, folds)
+    assert np.all(np.diff(blocks) >= 0)
+    assert np.ptp(np.bincount(blocks, minlength=folds)) <= 1
+
+
+def test_each_trial_may_be_a_block() -> None:
+    np.testing.assert_array_equal(time_blocks(5, "trials", [3, 3, 7, 9, 9]), [0, 0, 1, 2, 2])
+    with pytest.raises(InputError, match="with 1 trials, expected at least 2"):
+        time_blocks(5, "trials", [3] * 5)
+
+
+def test_robust_search_is_not_moved_by_outliers() -> None:
+    X, y = regression()
+    spoilt = y.copy()
+    spoilt[::10] += 30.0
+    clean, plain, robust = (
+        TunedLSSVM(optimiser="grid", robust=on).fit(X, target)
+        for on, target in ((False, y), (False, spoilt), (True, spoilt))
+    )
+    assert robust.search_.value < 3.0 < plain.search_.value
+    away = [np.linalg.norm(X @ (m.coef_ - clean.coef_)) for m in (plain, robust)]
+    assert away[1] < 0.3 * away[0]

@@ -1,0 +1,71 @@
+"""Batched physics of bare ships, and the mathematics that lets its loops be vectorised."""
+
+import math
+
+import numba
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym.kernels import layout
+from shipgym.kernels.trigonometry import arctan, arctan2, exponential
+
+SHIPS = ("mariner", "container", "tanker", "kvlcc2")
+
+
+@numba.njit(error_model="numpy", fastmath={"contract"})
+def over(x, y):
+    """Our functions as kernels compile them."""
+    out = np.empty((3, x.size))
+    for i in range(x.size):
+        out[0, i], out[1, i], out[2, i] = exponential(x[i]), arctan(x[i]), arctan2(y[i], x[i])
+    return out
+
+
+def test_the_exponential_is_exact_to_rounding_over_its_whole_range():
+    x = np.concatenate([np.linspace(-708.0, 709.7, 200_001), np.linspace(-1.0, 1.0, 20_001)])
+    np.testing.assert_allclose(over(x, x)[0], np.exp(x), rtol=5e-16)
+    subnormal = np.linspace(-745.0, -708.0, 1001)
+    np.testing.assert_allclose(over(subnormal, subnormal)[0], np.exp(subnormal), rtol=5e-16, atol=1e-323)
+
+
+def test_the_exponential_ends_as_numpy_s():
+    x = np.array([np.nan, np.inf, -np.inf, 0.0, -0.0, 800.0, -800.0])
+    with np.errstate(over="ignore"):
+        np.testing.assert_array_equal(over(x, x)[0], np.exp(x))
+
+
+def test_the_arc_tangent_is_exact_to_rounding_over_its_whole_range():
+    rng = np.random.default_rng(0)
+    x, y = rng.standard_normal((2, 100_000)) * 10.0 ** rng.uniform(-12.0, 12.0, (2, 100_000))
+    _, single, double = over(x, y)
+    np.testing.assert_allclose(single, np.arctan(x), rtol=5e-16)
+    np.testing.assert_allclose(double, np.arctan2(y, x), rtol=5e-16)
+
+
+@pytest.mark.parametrize("y", [0.0, -0.0, 1.0, -1.0])
+@pytest.mark.parametrize("x", [0.0, -0.0, 1.0, -1.0])
+def test_the_arc_tangent_knows_the_axes(x, y):
+    assert arctan2(y, x) == pytest.approx(math.atan2(y, x), rel=3e-16)
+    assert math.copysign(1.0, arctan2(y, x)) == math.copysign(1.0, math.atan2(y, x))
+
+
+@pytest.mark.parametrize("name", SHIPS)
+def test_a_ship_in_a_batch_sails_as_it_does_alone(name):
+    """Every lane with a rudder of its own, against one simulation for three of them."""
+    model = shipgym.load_model(name)
+    h, steps, tiles = 0.02 * model.particulars["length"] / model.particulars["speed"], 60, 2
+    rudders = np.radians(np.linspace(-30.0, 30.0, tiles * layout.LANES))
+    states = np.repeat(np.tile(model.kernel_states(model.service_state[None]), (tiles, 1)), layout.LANES, 1)
+    commands = np.empty((tiles, 2, layout.LANES))
+    commands[:, 0], commands[:, 1] = rudders.reshape(tiles, -1), model.service_shaft_speed
+    kernel = model.kernel("fleet").advance_batch
+    kernel(states, commands.reshape(tiles, -1), h, steps, model.ship_tile()[None])
+    lanes = states.reshape(tiles, layout.N_STATE, layout.LANES).transpose(0, 2, 1).reshape(-1, layout.N_STATE)
+    for lane in (0, 40, 127):
+        held = np.tile(model.service_command, (steps, 1))
+        held[:, 0] = rudders[lane]
+        alone = model.simulate(held, h)
+        own = model.own_states(lanes[lane : lane + 1])[0]
+        for channel, value in zip(model.state_names, own, strict=True):
+            assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), channel

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shipgym import InputError
+from shipgym.guidance import Path, PathPosition, integral_line_of_sight, line_of_sight, random_path, wrapped
+
+EAST_THEN_SOUTH = Path([[0.0, 0.0], [0.0, 1000.0], [-500.0, 1000.0]])
+coordinates = st.floats(-2000.0, 2000.0)
+
+
+def test_legs_and_turns():
+    assert EAST_THEN_SOUTH.n_legs == 2
+    assert EAST_THEN_SOUTH.lengths.tolist() == [1000.0, 500.0]
+    assert np.degrees(EAST_THEN_SOUTH.courses).tolist() == [90.0, 180.0]
+    assert np.degrees(EAST_THEN_SOUTH.turns).tolist() == pytest.approx([90.0, 0.0])
+    assert EAST_THEN_SOUTH.length == 1500.0
+
+
+def test_starboard_of_the_leg_is_positive():
+    south_of_the_first_leg = EAST_THEN_SOUTH.position(-30.0, 400.0, 0)
+    assert south_of_the_first_leg.cross_track == pytest.approx(30.0)
+    assert south_of_the_first_leg.along == pytest.approx(400.0)
+    assert south_of_the_first_leg.to_go == pytest.approx(600.0)
+    west_of_the_second_leg = EAST_THEN_SOUTH.position(-100.0, 980.0, 1)
+    assert west_of_the_second_leg.cross_track == pytest.approx(20.0)
+
+
+@given(coordinates, coordinates)
+def test_distance_is_that_of_the_nearest_of_many_points(x, y):
+    corner = EAST_THEN_SOUTH.waypoints[1]
+    legs = [EAST_THEN_SOUTH.waypoints[0] + np.linspace(0, 1, 4001)[:, None] * (corner - [0.0, 0.0])]
+    legs.append(corner + np.linspace(0, 1, 4001)[:, None] * (EAST_THEN_SOUTH.waypoints[2] - corner))
+    nearest = np.hypot(*(np.vstack(legs) - [x, y]).T).min()
+    assert EAST_THEN_SOUTH.distance(x, y) == pytest.approx(nearest, abs=0.3)
+
+
+@given(st.floats(-500.0, 500.0), st.floats(1.0, 500.0))
+def test_line_of_sight_points_at_the_path_ahead(error, lookahead):
+    where = PathPosition(np.array(0.0), np.array(error), np.array(0.3), np.array(1.0))
+    course = line_of_sight(where, lookahead)
+    assert np.tan(course - 0.3) == pytest.approx(-error / lookahead)
+
+
+def test_integral_line_of_sight_holds_a_steady_drift_without_error():
+    """A ship that sails its course at 5 m/s through a current of 1 m/s across ends on the path."""
+    path = Path([[0.0, 0.0], [1e6, 0.0]])
+    x, y, integral, dt = 0.0, 50.0, np.array(0.0), 1.0
+    for _ in range(4000):
+        where = path.position(x, y, 0)
+        course, integral = integral_line_of_sight(where, 100.0, integral, 0.02, dt)
+        x, y = x + dt * 5.0 * np.cos(course), y + dt * (5.0 * np.sin(course) + 1.0)
+    assert y == pytest.approx(0.0, abs=1e-3)
+    assert np.sin(course) == pytest.approx(-0.2, abs=1e-4)  # the crab angle
+    assert integral == pytest.approx(100.0 * np.tan(np.arcsin(0.2)), rel=1e-3)
+
+
+def test_random_paths_keep_their_bounds_and_their_seed():
+    one, other = (random_path(np.random.default_rng(7), 12, (300.0, 900.0), 60.0) for _ in range(2))
+    assert np.array_equal(one.waypoints, other.waypoints)
+    assert one.n_legs == 12
+    assert np.all((one.lengths >= 300.0) & (one.lengths <= 900.0))
+    assert np.all(np.abs(one.turns) <= np.radians(60.0) + 1e-12)
+
+
+@given(st.floats(-1e4, 1e4))
+def test_wrapped_is_the_same_direction(angle):
+    assert -np.pi <= wrapped(angle) < np.pi
+    assert np.cos(wrapped(angle)) == pytest.approx(np.cos(angle), abs=1e-9)
+    assert np.sin(wrapped(angle)) == pytest.approx(np.sin(angle), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "message"),
+    [
+        ([[0.0, 0.0]], "at least 2 rows"),
+        ([0.0, 1.0], "at least 2 rows"),
+        ("north", "at least 2 rows"),
+        ([[0.0, 0.0], [0.0, 0.0]], "row 1 repeats"),
+        ([[0.0, 0.0], [np.nan, 1.0]], "row 1 is"),
+    ],
+)
+def test_a_path_that_is_none_is_refused(waypoints, message):
+    with pytest.raises(InputError, match=message):
+        Path(waypoints)

@@ -1,0 +1,132 @@
+"""Indices with their intervals over the posterior, and what is judged by them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, load_model, manoeuvres
+from shipgym.manoeuvres.imo import assess_draws, judge_imo
+from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, worst
+
+
+@pytest.fixture(scope="module")
+def identified():
+    return load_model("mariner-tls-svm")
+
+
+def test_intervals_hold_the_value_and_replay(identified):
+    found = manoeuvres.index_intervals(identified, n_draws=40, seed=3)
+    for index in found.values():
+        low, high = index.interval
+        assert low < index.value < high
+        assert index.n_ran_away == index.n_never_reached == 0
+    again = manoeuvres.index_intervals(identified, n_draws=40, seed=3)
+    np.testing.assert_array_equal(found["period_s"].values, again["period_s"].values)
+
+
+def test_the_interval_is_that_of_the_linearised_index(identified):
+    """For small uncertainty an index is linear in the coefficients: its spread is root(g' S g)."""
+    covariance = 1e-2 * identified.covariance
+    model = replace(identified, covariance=covariance)
+    found = manoeuvres.index_intervals(model, "turning circle 35 deg to starboard", n_draws=300, seed=0)
+    names, deviations = list(model.coefficients), np.sqrt(np.diag(covariance))
+    judged = manoeuvres.standard_manoeuvres(model)["turning circle 35 deg to starboard"].judge
+
+    def advance(name, change):
+        moved = {**model.coefficients, name: model.coefficients[name] + change}
+        return judged(replace(model, coefficients=moved)).advance_lengths
+
+    slope = np.array(
+        [(advance(n, d) - advance(n, -d)) / (2 * d) for n, d in zip(names, deviations, strict=True)]
+    )
+    expected = np.sqrt(slope @ covariance @ slope)
+    assert np.std(found["advance_lengths"].values) == pytest.approx(expected, rel=0.15)
+
+
+def test_a_manoeuvre_of_one_s_own(identified):
+    found = manoeuvres.index_intervals(
+        identified, lambda ship: manoeuvres.zigzag_indices(manoeuvres.zigzag(ship, 15, 5)), n_draws=5
+    )
+    assert found["overshoot_1_deg"].interval is not None
+
+
+def test_draws_that_run_away_or_never_reach_are_counted():
+    ship = load_model("mariner")
+    wild = replace(ship, coefficients=ship.coefficients | {"N_r": 5e-3})  # yaw that feeds itself
+    numb = {name: 0.0 if "d" in name.split("_")[1] else value for name, value in ship.coefficients.items()}
+    numb = replace(
+        ship, coefficients=numb | dict.fromkeys(("Y_0", "N_0", "Y_0u", "N_0u", "Y_0uu", "N_0uu"), 0.0)
+    )
+    name = "turning circle 35 deg to starboard"
+    manoeuvre = manoeuvres.standard_manoeuvres(ship)[name]
+    own = {name: {"advance_lengths": manoeuvre.judge(ship).advance_lengths}}
+    found = intervals_of(own, [ship, wild, numb, ship], {name: lambda s: _only_advance(manoeuvre.judge(s))})
+    index = found[name]["advance_lengths"]
+    assert (index.n_ran_away, index.n_never_reached) == (1, 1)
+    assert "1 of 4 draws ran away, 1 of 4 draws never got so far" in str(index)
+    criterion = assess_draws(ship, [ship, wild, numb, ship])["advance"]
+    assert criterion.share_passed == 0.5
+    assert criterion.to_dict()["without_value"] == 2
+
+
+def _only_advance(indices):
+    from dataclasses import make_dataclass
+
+    return make_dataclass("Advance", ["advance_lengths"])(indices.advance_lengths)
+
+
+def test_the_worse_side_counts_for_each_draw():
+    none = np.zeros(2, dtype=bool)
+    one, other = (
+        IndexInterval(1.0, np.array([1.0, 4.0]), none),
+        IndexInterval(2.0, np.array([3.0, np.nan]), ~none),
+    )
+    both = worst([one, other])
+    assert both.value == 2.0
+    np.testing.assert_array_equal(both.values, [3.0, np.nan])
+    assert both.n_ran_away == 2
+
+
+def test_an_identified_ship_is_judged_with_intervals(identified):
+    criteria = manoeuvres.imo_assessment(identified, n_draws=20)
+    low, high = criteria["advance"].interval
+    assert low < criteria["advance"].value < high < criteria["advance"].limit
+    assert criteria["advance"].share_passed == 1.0
+    assert criteria["tactical_diameter"].share_passed == 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "passed", "said"),
+    [
+        ("tanker", True, "up to 20"),
+        ("mariner", None, "inside its surge coefficients"),
+        ("container", None, "turning ahead only"),
+        ("kvlcc2", None, "turning ahead only"),
+    ],
+)
+def test_stopping_is_judged_where_the_ship_goes_astern(name, passed, said):
+    """Track reach of a full astern stop, MSC.137(76) 5.3.4: the tanker's 8.95 lengths are within 15."""
+    ship = load_model(name)
+    needed = {n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n}
+    own = {n: m.nothing for n, m in needed.items()}
+    stops = intervals_of(own, [], {})
+    if passed:
+        reach = manoeuvres.stopping_indices(manoeuvres.crash_stop(ship)).track_reach_lengths
+        stops["crash stop"] = {"track_reach_lengths": IndexInterval(reach, np.empty(0), np.empty(0, bool))}
+        assert reach == pytest.approx(8.95, abs=0.01)
+    criterion = judge_imo(ship, stops)["stopping"]
+    assert criterion.passed is passed
+    assert said in criterion.note
+    assert criterion.limit == 15.0
+
+
+def test_wrong_arguments(identified):
+    with pytest.raises(InputError, match="has no covariance"):
+        manoeuvres.index_intervals(load_model("mariner"))
+    with pytest.raises(InputError, match="manoeuvre: 'zigzag 30/30' found"):
+        manoeuvres.index_intervals(identified, "zigzag 30/30")
+    with pytest.raises(InputError, match="n_draws: 1 found"):
+        manoeuvres.index_intervals(identified, n_draws=1)
+    with pytest.raises(InputError, match="has no covariance"):
+        manoeuvres.imo_assessment(load_model("mariner"), n_draws=10)

@@ -1,0 +1,244 @@
+"""Second-order wave forces against published curves, limits and Newman's approximation; mobility."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from shipgym import InputError, Particulars, Waves, load_model, sea_states
+from shipgym.models import get_structure
+from shipgym.models.inertia import inertia
+from shipgym.weather import slow_drift, wave_drift, wave_motion, wave_spectrum
+from shipgym.weather.drift import added_resistance, reflection_coefficients
+from shipgym.weather.estimates import GRAVITY, weather_particulars
+from shipgym.weather.harmonics import evaluate_cosines, evaluate_sines
+from shipgym.weather.mobility import MOBILITY_ROWS, mobility, mobility_matrix, roll_inertia
+from shipgym.weather.waves import draught_attenuation
+
+SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
+KVLCC2 = weather_particulars(load_model("kvlcc2").particulars)
+S175 = weather_particulars(load_model("container").particulars)
+
+
+def head_sea_curve(ship, froude):
+    """Added resistance by rho g a^2 B^2 / L over wave by ship length."""
+    lengths = np.linspace(0.3, 2.0, 171)
+    omega = np.sqrt(2.0 * np.pi * GRAVITY / (lengths * ship.length))
+    scale = ship.water_density * GRAVITY * ship.beam**2 / ship.length
+    return lengths, added_resistance(omega, 0.0, ship, froude * np.sqrt(GRAVITY * ship.length)) / scale
+
+
+@pytest.mark.parametrize(
+    ("ship", "froude", "peak", "at"),
+    [
+        (KVLCC2, 0.142, 7.0, 1.1),  # Sadat-Hosseini et al. 2013; Guo & Steen 2011: 6 to 8 near 1.1
+        (S175, 0.25, 10.0, 1.15),  # Fujii & Takahashi 1975: 9 to 11 near 1.1 to 1.2
+    ],
+)
+def test_added_resistance_peaks_where_model_tests_have_it(ship, froude, peak, at):
+    lengths, curve = head_sea_curve(ship, froude)
+    assert curve.max() == pytest.approx(peak, rel=0.15)
+    assert lengths[np.argmax(curve)] == pytest.approx(at, abs=0.1)
+
+
+def test_short_waves_are_resisted_by_reflection_as_in_model_tests():
+    lengths, curve = head_sea_curve(KVLCC2, 0.142)
+    short = curve[lengths < 0.5]
+    assert short.min() > 1.5  # Guo & Steen 2011: 2 to 4
+    assert short.max() < 4.0
+
+
+def test_the_draught_takes_up_what_fujii_and_takahashi_say():
+    omega = np.sqrt(np.array([1e-4, 1.0, 100.0, 5000.0]) * GRAVITY / 8.0)  # k T of 1e-4, 1, 100, 5000
+    # at 1: I1 = 0.5651591, K1 = 0.6019072
+    middle = (np.pi * 0.5651591) ** 2 / ((np.pi * 0.5651591) ** 2 + 0.6019072**2)
+    np.testing.assert_allclose(draught_attenuation(omega, 8.0), [0.0, middle, 1.0, 1.0], atol=1e-6)
+
+
+def test_a_wall_abeam_reflects_all_there_is():
+    # waterplane coefficient to 1: a box, of which each metre takes up rho g a^2 / 2
+    box = replace(KVLCC2, block_coefficient=0.999, mass=None)
+    sway, yaw = reflection_coefficients(np.array([np.pi / 2]), box)
+    assert sway == pytest.approx(-1.0, abs=0.01)
+    assert yaw == pytest.approx(0.0, abs=1e-9)
+    along, _ = reflection_coefficients(np.array([0.0, np.pi]), box)
+    np.testing.assert_allclose(along, 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+def test_waves_push_to_lee_and_turn_the_ship_beam_on(ship):
+    drift = wave_drift(Waves(2.0, 8.0), load_model(ship).particulars)
+    bow, beam, quarter = 45, 90, 135  # from 45, 90 and 135 degrees to starboard
+    assert drift.Y[[bow, beam, quarter]].max() < 0.0
+    assert drift.N[bow] < 0.0 < drift.N[quarter]
+    assert drift.X[[0, bow]].max() < 0.0
+    mirror = -np.arange(len(drift.chi))
+    np.testing.assert_allclose(drift.X, drift.X[mirror], rtol=1e-9, atol=1e-9 * abs(drift.X[0]))
+    np.testing.assert_allclose(drift.Y, -drift.Y[mirror], atol=1e-9 * abs(drift.Y[beam]))
+    np.testing.assert_allclose(drift.N, -drift.N[mirror], atol=1e-9 * abs(drift.N[bow]))
+
+
+def test_mean_drift_grows_with_the_square_of_the_height():
+    small, large = (wave_drift(Waves(height, 8.0), KVLCC2) for height in (1.0, 2.0))
+    for name in "XYN":
+        np.testing.assert_allclose(getattr(large, name), 4.0 * getattr(small, name))
+    assert large.time_constant == pytest.approx(small.time_constant)
+
+
+def test_drift_scales_by_froude():
+    scale = 40.0
+    ship = {"length": 320.0, "beam": 58.0, "draught": 20.8}
+    model = {name: value / scale for name, value in ship.items()}
+    large = wave_drift(Waves(3.0, 9.0), Particulars(**ship, block_coefficient=0.81, speed=7.0))
+    small = wave_drift(
+        Waves(3.0 / scale, 9.0 / scale**0.5),
+        Particulars(**model, block_coefficient=0.81, speed=7.0 / scale**0.5),
+    )
+    np.testing.assert_allclose(large.X, small.X * scale**3, rtol=1e-7, atol=1e-3)
+    np.testing.assert_allclose(large.Y, small.Y * scale**3, rtol=1e-7, atol=1e-3)
+    np.testing.assert_allclose(large.N, small.N * scale**4, rtol=1e-7, atol=1.0)
+    assert large.time_constant == pytest.approx(small.time_constant * scale**0.5)
+
+
+@pytest.mark.parametrize("ship", SHIPS)
+@pytest.mark.parametrize("state", ["slight", "moderate", "rough"])
+def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
+    sea = sea_states()[state]
+    drift = wave_drift(Waves(sea.significant_height, sea.peak_period), load_model(ship).particulars)
+    series = drift.harmonics(8)
+    for name, sums in (("X", evaluate_cosines), ("Y", evaluate_sines), ("N", evaluate_sines)):
+        curve = getattr(drift, name)
+        error = np.abs(sums(getattr(series, name), drift.chi) - curve).max()
+        assert error < 0.001 * np.abs(curve).max()
+
+
+def newman_spectrum(sea, draught, mu):
+    """8 integral S(w) S(w + mu) c(w) c(w + mu) dw, over the square of the mean, 2 integral S c dw."""
+    w = np.linspace(0.15, 6.0, 4000)
+    weighted = [wave_spectrum(sea, w + m) * draught_attenuation(w + m, draught) for m in (0.0, *mu)]
+    mean = 2.0 * np.trapezoid(weighted[0], w)
+    return np.array([8.0 * np.trapezoid(weighted[0] * shifted, w) for shifted in weighted[1:]]) / mean**2
+
+
+@pytest.mark.parametrize("Tp", [7.5, 9.7, 14.0])
+def test_slow_drift_has_the_variance_and_low_frequencies_of_newmans_integral(Tp):
+    sea = Waves(2.0, Tp)
+    slow = slow_drift(sea, S175)
+    mu = np.linspace(1e-6, 4.0, 500)
+    density = newman_spectrum(sea, S175.draught, mu)
+    assert np.trapezoid(density, mu) == pytest.approx(slow.standard_deviation**2, rel=0.01)
+    filtered = slow.spectrum(mu / (2.0 * np.pi)) / (2.0 * np.pi)  # per rad/s
+    assert filtered[0] == pytest.approx(density[0], rel=0.01)
+    below = mu < 0.1  # rad/s, to which a ship answers
+    np.testing.assert_allclose(filtered[below], density[below], rtol=0.3)
+
+
+def test_slow_drift_is_the_squared_envelope_of_a_simulated_sea():
+    sea, step, n = Waves(3.0, 9.7), 0.25, 2**18
+    rng = np.random.default_rng(4)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(n, step)[1:]
+    weighted = wave_spectrum(sea, omega) * draught_attenuation(omega, S175.draught)
+    amplitude = np.sqrt(weighted * (omega[1] - omega[0])) * (
+        rng.standard_normal(len(omega)) + 1j * rng.standard_normal(len(omega))
+    )
+    analytic = np.zeros(n, dtype=complex)
+    analytic[1 : len(omega) + 1] = amplitude
+    force = np.abs(np.fft.ifft(analytic) * n) ** 2  # mean force by Newman: the squared envelope
+    mean = 2.0 * np.trapezoid(weighted, omega)
+    assert force.mean() == pytest.approx(mean, rel=0.02)
+    slow = force / force.mean() - 1.0
+    assert slow.std() == pytest.approx(1.0, rel=0.03)
+    power = np.abs(np.fft.fft(slow)) ** 2 / n
+    lags = int(120.0 / step)
+    correlation = np.fft.ifft(power).real[:lags] / slow.var()
+    time_constant = step * (correlation.sum() - 0.5)
+    assert time_constant == pytest.approx(slow_drift(sea, S175).time_constant, rel=0.1)
+
+
+def test_calm_water_does_not_drift_a_ship():
+    drift = wave_drift(Waves(0.0, 8.0), KVLCC2)
+    assert drift.standard_deviation == 0.0
+    assert np.abs(drift.Y).max() == 0.0
+
+
+@pytest.mark.parametrize("ship", ["mariner", "tanker", "kvlcc2", "kvlcc2-l7"])
+def test_mobility_is_the_inverse_of_inertia(ship):
+    model = load_model(ship)
+    matrix = mobility_matrix(model)
+    np.testing.assert_allclose(matrix[:3, :3] @ inertia(model)[:, :3], np.eye(3), atol=1e-9)
+    assert np.abs(matrix[3]).max() == np.abs(matrix[:, 3]).max() == 0.0
+
+
+def test_the_container_ship_rolls_by_son_and_nomotos_inertia():
+    from shipgym.kernels import container as c
+
+    a, b, e = c.m + c.my, -c.my * c.ly, c.Iz + c.Jz
+    prime = np.array([[a, c.my * c.alpha_y, b], [c.my * c.alpha_y, e, 0.0], [b, 0.0, c.Ix + c.Jx]])
+    L, mass = c.LENGTH, 0.5 * 1025.0 * c.LENGTH**3
+    expected = np.linalg.inv(mass * prime * np.array([[1, L, L], [L, L * L, L * L], [L, L * L, L * L]]))
+    np.testing.assert_allclose(mobility_matrix(load_model("container"))[1:, 1:], expected, rtol=1e-9)
+
+
+def test_rows_of_the_mobility_are_entries_of_the_matrix():
+    model = load_model("container")
+    rows, matrix = dict(zip(MOBILITY_ROWS, mobility(model), strict=True)), mobility_matrix(model)
+    assert rows["uX"] == matrix[0, 0]
+    assert rows["vN"] == matrix[1, 2]
+    assert rows["rY"] == matrix[2, 1]
+    assert rows["pY"] == matrix[3, 1] != 0.0
+
+
+def test_shallow_water_makes_the_tanker_heavier():
+    deep, shallow = mobility(load_model("tanker")), mobility(load_model("tanker"), water_depth=25.0)
+    assert (shallow[[0, 1, 4]] < deep[[0, 1, 4]]).all()
+
+
+def test_a_structure_without_surge_and_sway_only_turns():
+    mariner = load_model("mariner")
+    table = get_structure("nomoto")
+    coefficients = dict.fromkeys(table.coefficient_names, 0.1)
+    model = replace(mariner, structure="nomoto", coefficients=coefficients)
+    matrix = mobility_matrix(model)
+    assert matrix[2, 2] == pytest.approx(1.0 / inertia(mariner)[2, 2])
+    assert np.count_nonzero(matrix) == 1
+
+
+def test_roll_inertia_from_period_and_stability_is_that_of_the_container_ship():
+    from shipgym.kernels import container as c
+
+    own = (c.Ix + c.Jx) * 0.5 * 1025.0 * c.LENGTH**5
+    assert roll_inertia(load_model("container")) == pytest.approx(own, rel=0.1)
+
+
+def test_weather_tells_which_particulars_it_needs():
+    model = load_model("mariner")
+    bare = replace(model.particulars, beam=None, mass=None, block_coefficient=None)
+    with pytest.raises(InputError, match="weather without the particulars it needs: beam, block_coefficient"):
+        mobility(replace(model, particulars=bare))
+
+
+@given(
+    length=st.floats(2.0, 400.0),
+    slender=st.floats(4.0, 9.0),
+    flat=st.floats(2.0, 6.0),
+    fullness=st.floats(0.5, 0.9),
+    froude=st.floats(0.0, 0.6),
+    period=st.floats(0.5, 25.0),
+    steepness=st.floats(0.001, 0.06),
+)
+@settings(max_examples=10, deadline=None)
+def test_drift_and_motion_are_finite_for_any_ship_in_any_sea(
+    length, slender, flat, fullness, froude, period, steepness
+):
+    speed = min(froude * (GRAVITY * length) ** 0.5, 40.0) or None
+    beam = length / slender
+    ship = Particulars(length=length, beam=beam, draught=beam / flat, block_coefficient=fullness, speed=speed)
+    sea = Waves(min(steepness * GRAVITY * period**2 / (2.0 * np.pi), 20.0), period)
+    drift, motion = wave_drift(sea, ship), wave_motion(sea, ship)
+    for curve in (drift.X, drift.Y, drift.N, motion.heading_variance, motion.roll_variance):
+        assert np.isfinite(curve).all()
+    assert drift.time_constant > 0.0
+    for variance in (motion.heading_variance, motion.roll_variance):
+        assert variance.min() >= -1e-9 * variance.max()

@@ -1,0 +1,110 @@
+"""What a user says of the weather: the table of sea states, and what is refused."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from shipgym import Current, InputError, Waves, Weather, Wind, sea_states
+from shipgym.weather import WindTable
+
+TABLE = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0))
+
+
+def test_sea_states_lie_within_the_codes_of_the_wmo():
+    codes = {state.name: (state.code, state.lowest, state.highest) for state in sea_states().values()}
+    assert codes == {
+        "calm": (0, 0.0, 0.0),
+        "slight": (3, 0.5, 1.25),
+        "moderate": (4, 1.25, 2.5),
+        "rough": (5, 2.5, 4.0),
+    }
+    for state in sea_states().values():
+        assert state.lowest <= state.significant_height <= state.highest
+
+
+def test_winds_of_the_sea_states_raise_seas_of_their_height():
+    # Pierson & Moskowitz: Hs = 0.21 U^2 / g of a fully developed sea, wind at 19.5 m
+    for state in list(sea_states().values())[1:]:
+        at_19_5_m = state.wind_speed * 1.95 ** (1 / 7)
+        assert state.significant_height == pytest.approx(0.21 * at_19_5_m**2 / 9.81, rel=0.16)
+
+
+def test_moderate_is_that_of_bales_1983():
+    weather = Weather.from_sea_state("moderate")
+    assert (weather.waves.significant_height, weather.waves.peak_period) == (1.88, 8.8)
+    assert weather.wind.speed == pytest.approx(19 * 0.514444 * (10 / 19.5) ** (1 / 7), rel=1e-5)
+    assert weather.wind.from_deg == weather.waves.from_deg == 45.0
+    assert weather == Weather.from_sea_state(4)
+
+
+def test_calm_is_calm_unless_there_is_a_current():
+    assert Weather.from_sea_state("calm").calm
+    assert Weather(Current(0.0), Wind(0.0), Waves(0.0, 8.0)).calm
+    assert not Weather.from_sea_state("calm", current=Current(0.5, 90.0)).calm
+    assert not Weather(Current(0.0, variation=0.1)).calm
+
+
+def test_directions_may_be_left_to_the_episode():
+    weather = Weather.from_sea_state("rough", from_deg=None, current=Current(1.0))
+    assert weather.random_directions == ("current", "wind", "waves")
+    assert weather.with_direction(10.0).random_directions == ("current",)
+    assert Weather.from_sea_state("rough", current=Current(0.0)).random_directions == ()
+
+
+@pytest.mark.parametrize(
+    "weather",
+    [
+        Weather(),
+        Weather.from_sea_state("slight", from_deg=None, current=Current(0.7, 180.0, 0.1, 300.0)),
+        Weather(wind=Wind(12.0, 30.0, gust=False, spectrum="norsok", coefficients=TABLE), name="tunnel"),
+        Weather(waves=Waves(2.0, 9.0, -30.0, "pierson-moskowitz", spreading="long-crested")),
+    ],
+)
+def test_weather_survives_json(weather):
+    assert Weather.from_dict(json.loads(json.dumps(weather.to_dict()))) == weather
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Weather.from_sea_state("moderat"), r"'moderat' found.*'rough'.*Did you mean 'moderate'"),
+        (lambda: Weather.from_sea_state(7), "7 found, expected one of 'calm'.* 0, 3, 4, 5"),
+        (lambda: Weather.from_sea_state(True), "True found"),
+        (lambda: Wind(-1.0), "wind speed: -1 found, expected a number >= 0"),
+        (lambda: Wind(5.0, 400.0), "wind from_deg: 400 found.*clockwise from north"),
+        (lambda: Wind(5.0, spectrum="haris"), "Did you mean 'harris'"),
+        (
+            lambda: Wind(5.0, coefficients="blendermann-tankerloaded"),
+            "Did you mean 'blendermann-tanker-loaded'",
+        ),
+        (lambda: Wind(5.0, gust="yes"), "wind gust: 'yes' found, expected true or false"),
+        (lambda: Waves(3.0, 3.0), "peak_period 3, expected at most 1.4.* steeper waves break"),
+        (lambda: Waves(1.0, 0.0), "waves peak_period: 0 found"),
+        (lambda: Waves(1.0, 8.0, peak_enhancement=0.5), "peak_enhancement: 0.5 found"),
+        (lambda: Waves(1.0, 8.0, spreading="wide"), "waves spreading: 'wide' found"),
+        (lambda: Waves(np.nan, 8.0), "waves significant_height: nan found"),
+        (lambda: Current(0.5, time_constant=0.0), "current time_constant: 0 found"),
+        (lambda: Weather(wind=5.0), r"weather wind: 5.0 found, expected shipgym.Wind\(...\) or None"),
+        (lambda: Weather.from_dict({"winds": {}}), "unknown key 'winds'. Did you mean 'wind'"),
+        (lambda: Weather.from_dict({"wind": {}}), "weather wind: speed is missing"),
+        (
+            lambda: Weather.from_dict({"wind": {"speed": 1.0, "coefficients": {"CX": []}}}),
+            "angles_deg is missing",
+        ),
+        (lambda: WindTable((0, 90), (0, 0), (0, 0), (0, 0)), "at least three that rise from 0 to 180"),
+        (lambda: WindTable((0, 90, 180), (0, 0), (0, 0, 0), (0, 0, 0)), "CX: 2 values found, expected 3"),
+        (lambda: WindTable((0, 90, 180), (0, 0, 0), (0, 1, 1), (0, 0, 0)), "CY: 0 and 1 found at 0 and 180"),
+    ],
+)
+def test_impossible_weather_is_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
+
+
+def test_saying_what_the_weather_is_loads_no_scipy():
+    script = "import sys, shipgym; shipgym.Weather.from_sea_state('rough'); print('scipy' in sys.modules)"
+    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert output.stdout.strip() == "False"

@@ -1,0 +1,164 @@
+"""Wind on ships: published coefficients, symmetry, scaling, and gusts against their spectra."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipgym import InputError, Particulars, Wind, load_model
+from shipgym.weather import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
+from shipgym.weather.estimates import weather_particulars
+from shipgym.weather.harmonics import evaluate_cosines, evaluate_sines
+from shipgym.weather.wind_tables import BLENDERMANN, coefficient_names
+
+AREAS = {
+    "length_overall": 180.0, "frontal_area": 600.0, "lateral_area": 2700.0, "lateral_centroid": -4.0,
+    "lateral_centroid_height": 9.0,
+}  # fmt: skip
+S175 = replace(load_model("container").particulars, **AREAS)
+KVLCC2 = load_model("kvlcc2").particulars
+
+
+def at(curves, degrees):
+    """X, Y, N and K where the wind comes from there."""
+    i = round(degrees * len(curves.angle) / 360)
+    return curves.X[i], curves.Y[i], curves.N[i], curves.K[i]
+
+
+def test_blendermanns_resistances_stand_ahead_abeam_and_astern():
+    row = BLENDERMANN["container-loaded"]
+    curves = wind_curves(S175, "blendermann-container-loaded")
+    assert at(curves, 0)[0] == pytest.approx(-row.CD_l_bow * 600.0)
+    assert at(curves, 180)[0] == pytest.approx(row.CD_l_stern * 600.0)
+    assert at(curves, 90)[1] == pytest.approx(-row.CD_t * 2700.0)
+    assert at(curves, 90)[2] == pytest.approx(row.CD_t * 2700.0 * 4.0)  # lever of the centroid
+    assert at(curves, 90)[3] == pytest.approx(-row.kappa * row.CD_t * 2700.0 * 9.0)
+
+
+def test_blendermann_at_30_degrees_worked_by_hand():
+    # delta 0.4, CDl / CDt = 0.55 * 600 / 2700 / 0.9, sin(60 deg)^2 = 0.75
+    denominator = 1.0 - 0.2 * (1.0 - 0.55 * 600.0 / 2700.0 / 0.9) * 0.75
+    surge, sway, yaw, _ = at(wind_curves(S175, "blendermann-container-loaded"), 30)
+    assert surge == pytest.approx(-0.55 * 600.0 * np.cos(np.pi / 6) / denominator)
+    assert sway == pytest.approx(-0.9 * 0.5 * 2700.0 / denominator)
+    assert yaw == pytest.approx(sway * 180.0 * (-4.0 / 180.0 + 0.18 * np.pi / 3))
+
+
+def test_isherwood_worked_by_hand():
+    length, beam, lateral, frontal = 180.0, 25.4, 2700.0, 600.0
+    perimeter = length + 2.0 * lateral / length + 2.0 * 0.07 * 175.0
+    CX_60 = -(
+        0.913 - 4.68 * 2.0 * lateral / length**2 - 0.104 * length / beam + 0.482 * perimeter / length + 0.104
+    )
+    CY_90 = 0.889 + 0.138 * 2.0 * frontal / beam**2 - 0.66 * (90.0 + 4.0) / length
+    CN_90 = 0.2627 - 0.508 * (90.0 + 4.0) / length
+    curves = wind_curves(S175, "isherwood")
+    assert at(curves, 60)[0] == pytest.approx(CX_60 * frontal)
+    assert at(curves, 90)[1] == pytest.approx(-CY_90 * lateral)
+    assert at(curves, 90)[2] == pytest.approx(-CN_90 * lateral * length)
+
+
+@pytest.mark.parametrize("coefficients", coefficient_names())
+def test_wind_pushes_to_lee_and_its_mirror_image_the_other_way(coefficients):
+    curves = wind_curves(S175, coefficients)
+    mirror = -np.arange(len(curves.angle))
+    np.testing.assert_allclose(curves.X, curves.X[mirror], atol=1e-9)
+    for odd in (curves.Y, curves.N, curves.K):
+        np.testing.assert_allclose(odd, -odd[mirror], atol=1e-6)
+    # on the starboard bow: back, to port, bow to port, heeling to port
+    assert np.sign(at(curves, 40)).tolist() == [-1, -1, -1, -1]
+    assert np.sign(at(curves, 320)).tolist() == [-1, 1, 1, 1]
+
+
+@pytest.mark.parametrize("coefficients", coefficient_names())
+@pytest.mark.parametrize("ship", [S175, KVLCC2])
+def test_eight_harmonics_stay_near_the_curve(coefficients, ship):
+    curves = wind_curves(ship, coefficients)
+    series = curves.harmonics(8)
+    assert [len(row) for row in series] == [9, 8, 8, 8]
+    allowed = 0.09 if coefficients == "isherwood" else 0.015
+    for name in "XYNK":
+        curve = getattr(curves, name)
+        sums = evaluate_cosines if name == "X" else evaluate_sines
+        error = np.abs(sums(getattr(series, name), curves.angle) - curve).max()
+        assert error < allowed * np.abs(curve).max()
+
+
+def test_similar_ships_have_the_same_coefficients():
+    ship = {"length": 320.0, "beam": 58.0, "draught": 20.8}
+    model = {name: value / 50.0 for name, value in ship.items()}
+    large, small = (wind_curves(Particulars(**sizes, block_coefficient=0.81)) for sizes in (ship, model))
+    np.testing.assert_allclose(large.Y, small.Y * 50.0**2, atol=1e-6)
+    np.testing.assert_allclose(large.N, small.N * 50.0**3, atol=1e-4)
+
+
+def test_fullness_picks_the_type_of_ship():
+    np.testing.assert_array_equal(wind_curves(KVLCC2).X, wind_curves(KVLCC2, "blendermann-tanker-loaded").X)
+    np.testing.assert_array_equal(wind_curves(S175).X, wind_curves(S175, "blendermann-container-loaded").X)
+
+
+def test_estimates_are_marked_and_given_areas_are_used():
+    assert wind_curves(S175).estimated == ()
+    assert wind_curves(KVLCC2).estimated == tuple(sorted(AREAS))
+    estimated = weather_particulars(KVLCC2)
+    assert estimated.lateral_centroid < 0.0  # a tanker's house stands aft
+    # depth 30.0 m less draught 20.8 m, by length overall, is less than the lateral area with the house
+    assert 330.0 * 9.2 < estimated.lateral_area < 1.5 * 330.0 * 9.2
+
+
+def test_a_table_of_ones_own_is_followed():
+    table = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0), (0.0, 1.2, 0.0))
+    curves = wind_curves(S175, table)
+    assert at(curves, 45) == pytest.approx(
+        (-0.3 * 600, -0.4 * 2700, -0.025 * 2700 * 180, -0.6 * 2700 * 2700 / 180)
+    )
+
+
+def test_wind_needs_proportions():
+    with pytest.raises(
+        InputError, match="weather without the particulars it needs: beam, draught, block_coef"
+    ):
+        wind_curves(Particulars(length=100.0))
+
+
+@pytest.mark.parametrize("speed", [5.0, 20.0])
+@pytest.mark.parametrize("spectrum", ["harris", "davenport"])
+def test_variance_of_gusts_is_the_integral_of_their_spectrum(spectrum, speed):
+    f = np.geomspace(1e-9, 1e5, 40_000)
+    integral = np.trapezoid(f * gust_spectrum(f, speed, spectrum), np.log(f))
+    assert gust_variance(speed, spectrum) == pytest.approx(integral, rel=1e-4)
+
+
+def test_gusts_are_as_strong_as_over_a_rough_sea():
+    # turbulence intensity: sqrt(6.677 * 0.003) and sqrt(6 * 0.003); NORSOK's own formula 0.06 (1 + 0.043 V)
+    assert gust_filter(Wind(15.0)).standard_deviation / 15.0 == pytest.approx(0.1415, abs=1e-4)
+    assert gust_filter(Wind(15.0, spectrum="davenport")).standard_deviation / 15.0 == pytest.approx(
+        0.1342, abs=1e-4
+    )
+    norsok = gust_filter(Wind(15.0, spectrum="norsok")).standard_deviation / 15.0
+    assert norsok == pytest.approx(0.06 * (1.0 + 0.043 * 15.0), rel=0.15)
+    assert gust_filter(Wind(15.0, gust=False)).standard_deviation == 0.0
+
+
+@pytest.mark.parametrize(("spectrum", "bound"), [("harris", 0.18), ("davenport", 0.21), ("norsok", 0.65)])
+@pytest.mark.parametrize("speed", [5.0, 10.0, 25.0])
+def test_the_filter_has_the_energy_of_the_spectrum_where_it_is(spectrum, bound, speed):
+    wind = Wind(speed, spectrum=spectrum)
+    f = np.geomspace(1.0 / 2400.0, 0.5, 500)
+    energy, filtered = f * gust_spectrum(f, speed, spectrum), f * gust_filter(wind).spectrum(f)
+    assert f[np.argmax(filtered)] == pytest.approx(f[np.argmax(energy)], rel=0.03)
+    assert np.abs(filtered - energy).max() < bound * energy.max()
+
+
+def test_a_simulated_gust_has_the_spectrum_of_the_filter():
+    from scipy.signal import lfilter, welch
+
+    gust, step, n = gust_filter(Wind(12.0)), 0.5, 2**18
+    decay = np.exp(-step / gust.time_constant)
+    noise = np.random.default_rng(1).standard_normal(n) * gust.standard_deviation * np.sqrt(1.0 - decay**2)
+    wind = lfilter([1.0], [1.0, -decay], noise)
+    assert wind.var() == pytest.approx(gust.standard_deviation**2, rel=0.03)
+    f, density = welch(wind, 1.0 / step, nperseg=2048)
+    low = (f > 0) & (f < 0.1)  # well below the Nyquist frequency of 1 Hz
+    np.testing.assert_allclose(density[low], gust.spectrum(f[low]), rtol=0.25)
+    assert density[low].sum() == pytest.approx(gust.spectrum(f[low]).sum(), rel=0.03)
