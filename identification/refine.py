@@ -182,6 +182,11 @@ class _Problem:
     ) -> None:
         self.start, self.settings, self.trials = start, settings, trials
         blank = start.model
+        if "q" in blank.table.equations:
+            raise InputError(
+                f"method 'output-error': structure {blank.structure!r} with a memory of yaw found, whose state "
+                "no trial records, expected one without; choose method 'tls-svm'"
+            )
         self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
         self.sizes = np.concatenate([_term_sizes(samples, q) for q in blank.table.equations])
         channels = compared_channels(blank, [*trials, *settings.extra_trials])
