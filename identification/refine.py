@@ -184,8 +184,8 @@ class _Problem:
         blank = start.model
         if "q" in blank.table.equations:
             raise InputError(
-                f"method 'output-error': structure {blank.structure!r} with a memory of yaw found, whose state "
-                "no trial records, expected one without; choose method 'tls-svm'"
+                f"method 'output-error': structure {blank.structure!r} with a memory of yaw found,"
+                " whose state no trial records, expected one without; choose method 'tls-svm'"
             )
         self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
         self.sizes = np.concatenate([_term_sizes(samples, q) for q in blank.table.equations])
