@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from .accelerations import ROLL
-from .compiling import inlined, rare
+from .compiling import inlined, pick, rare
 from .layout import LANES
 from .random import DRAW, S11, TO_UNIT, mix, normal
 from .trigonometry import sin_cos
@@ -175,8 +175,8 @@ def decay(x: float) -> float:
 def ring(turn: float, ship: Any, lane: int) -> tuple[float, float, float, float, float, float]:
     """Exact step of a lightly damped oscillator driven by white noise, with both states of variance 1.
 
-    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h of `turn`. Returns
-    P11, P12 = -P21 and P22 of the transition P and the factors of the noise, whose covariance is I - P P'.
+    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h of `turn`. Returns P11, P12 = -P21 and
+    P22 of the transition P, and the factors of the noise, whose covariance is I - P P'.
     """
     damping, ringing = ship[WAVE_DAMPING + lane], ship[WAVE_RINGING + lane]
     kept = decay(damping * turn)
@@ -211,20 +211,21 @@ def show_waves(bow: float, beam: float, frequency: float, sky: Any, ship: Any, l
 
 
 @inlined
-def evolve(psi: float, u: float, v: float, h: float, sky: Any, words: Any, ship: Any, lane: int) -> None:
+def evolve(
+    psi: float, u: float, v: float, h: float, still: bool, sky: Any, words: Any, ship: Any, lane: int
+) -> None:
     """Current, gusts, drift force and first-order motion after a step (see `weather.py`)."""
     word = words[lane]
     words[lane] = word + DRAW[8]
     kept, shock = ship[CURRENT_KEPT + lane], ship[CURRENT_SHOCK + lane]
-    north, east = sky[MEAN_NORTH + lane], sky[MEAN_EAST + lane]
-    sky[CURRENT_NORTH + lane] = (
-        north + kept * (sky[CURRENT_NORTH + lane] - north) + shock * normal(word, DRAW[0])
-    )
-    sky[CURRENT_EAST + lane] = east + kept * (sky[CURRENT_EAST + lane] - east) + shock * normal(word, DRAW[1])
-    sky[GUST + lane] = ship[GUST_KEPT + lane] * sky[GUST + lane] + ship[GUST_SHOCK + lane] * normal(word, DRAW[2])
-    sky[DRIFT + lane] = (
-        ship[DRIFT_KEPT + lane] * sky[DRIFT + lane] + ship[DRIFT_SHOCK + lane] * normal(word, DRAW[3])
-    )
+    mean, now = sky[MEAN_NORTH + lane], sky[CURRENT_NORTH + lane]
+    sky[CURRENT_NORTH + lane] = pick(still, now, mean + kept * (now - mean) + shock * normal(word, DRAW[0]))
+    mean, now = sky[MEAN_EAST + lane], sky[CURRENT_EAST + lane]
+    sky[CURRENT_EAST + lane] = pick(still, now, mean + kept * (now - mean) + shock * normal(word, DRAW[1]))
+    now, shock = sky[GUST + lane], ship[GUST_SHOCK + lane]
+    sky[GUST + lane] = pick(still, now, ship[GUST_KEPT + lane] * now + shock * normal(word, DRAW[2]))
+    now, shock = sky[DRIFT + lane], ship[DRIFT_SHOCK + lane]
+    sky[DRIFT + lane] = pick(still, now, ship[DRIFT_KEPT + lane] * now + shock * normal(word, DRAW[3]))
 
     sine, cosine = sin_cos(psi)
     bow, beam = from_bow(sine, cosine, sky, lane)
@@ -232,13 +233,13 @@ def evolve(psi: float, u: float, v: float, h: float, sky: Any, words: Any, ship:
     p11, p12, p22, n11, n12, n22 = ring(frequency * h, ship, lane)
     z1, z2 = sky[HEADING_1 + lane], sky[HEADING_2 + lane]
     w1, w2 = normal(word, DRAW[4]), normal(word, DRAW[5])
-    sky[HEADING_1 + lane] = p11 * z1 + p12 * z2 + n11 * w1 + n12 * w2
-    sky[HEADING_2 + lane] = p22 * z2 - p12 * z1 + n22 * w2
+    sky[HEADING_1 + lane] = pick(still, z1, p11 * z1 + p12 * z2 + n11 * w1 + n12 * w2)
+    sky[HEADING_2 + lane] = pick(still, z2, p22 * z2 - p12 * z1 + n22 * w2)
     if ROLL:
         z3, z4 = sky[ROLL_1 + lane], sky[ROLL_2 + lane]
         w3, w4 = normal(word, DRAW[6]), normal(word, DRAW[7])
-        sky[ROLL_1 + lane] = p11 * z3 + p12 * z4 + n11 * w3 + n12 * w4
-        sky[ROLL_2 + lane] = p22 * z4 - p12 * z3 + n22 * w4
+        sky[ROLL_1 + lane] = pick(still, z3, p11 * z3 + p12 * z4 + n11 * w3 + n12 * w4)
+        sky[ROLL_2 + lane] = pick(still, z4, p22 * z4 - p12 * z3 + n22 * w4)
     show_waves(bow, beam, frequency, sky, ship, lane)
 
 

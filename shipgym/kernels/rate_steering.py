@@ -29,8 +29,9 @@ def steer_rate(
 ) -> int:
     """From the state in row 0 with a proportional-integral helmsman who holds the yaw rate at `rate`.
 
-    `commands` receives the rudder angle held from each sample on; `memory` holds the integral part of
-    the helmsman's rudder and is changed; for `sky` and `words` see `trajectories`. Returns the last row at which the ship had not yet run away.
+    `commands` receives the rudder angle held from each sample on; `memory` holds the integral part of the
+    helmsman's rudder and is changed; for `sky` and `words` see `trajectories`. Returns the last row at which
+    the ship had not yet run away.
     """
     state = stored(out, 0)
     limit = ship[RUDDER_LIMIT]

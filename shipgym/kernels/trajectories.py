@@ -93,7 +93,7 @@ def follow(states: Any, row: int, state: State, h: float, sky: Any, words: Any, 
     """Write down where a step led, and let the weather go on meanwhile."""
     store(states, row, state)
     if WEATHER:
-        evolve(state[2], state[3], state[4], h, sky, words, ship, 0)
+        evolve(state[2], state[3], state[4], h, False, sky, words, ship, 0)
         record(states, row, sky, ship)
 
 

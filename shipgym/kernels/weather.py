@@ -27,8 +27,10 @@ def feel(psi: float, u: float, v: float, sky: Any, ship: Any, lane: int) -> None
 
 
 @inlined
-def evolve(psi: float, u: float, v: float, h: float, sky: Any, words: Any, ship: Any, lane: int) -> None:
-    """Let the weather go on for h seconds, the step for which its filters were made.
+def evolve(
+    psi: float, u: float, v: float, h: float, still: bool, sky: Any, words: Any, ship: Any, lane: int
+) -> None:
+    """Let the weather go on for h seconds, the step for which its filters were made, or stand `still`.
 
     `words`, a uint64 array, holds the state of each lane's random numbers and is changed; for the others
     see `feel`, with the state of the ship at the end of the step.

@@ -145,7 +145,9 @@ def multi_sine_rudder(
     waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
     crests = np.abs(waves).max(axis=1)
     best = int(np.argmin(crests))
-    return _sail(model, amplitude * waves[best] / crests[best], None, dt, Conditions(water_depth, weather, seed))
+    return _sail(
+        model, amplitude * waves[best] / crests[best], None, dt, Conditions(water_depth, weather, seed)
+    )
 
 
 def random_rudder_steps(
@@ -301,9 +303,7 @@ def _times(duration: float, dt: float) -> Floats:
     return dt * np.arange(number_of_steps(duration, dt), dtype=float)
 
 
-def _sail(
-    model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, conditions: Conditions
-) -> Trial:
+def _sail(model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, conditions: Conditions) -> Trial:
     """The trial with a rudder, rad, and a shaft speed, 1/s, for each step."""
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder

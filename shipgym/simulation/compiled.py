@@ -1,9 +1,9 @@
 """How the kernels are compiled for one ship, cached on disk and never stale.
 
 The folder `shipgym/kernels` is copied into the user's cache under a name that hashes its contents,
-the ship's `accelerations.py` (and `open_sea.py` as its `weather.py` where weather is on), the versions of Python and Numba and the processor; Numba's own on-disk
-cache lies beside the copied files. The folder is written beside its target and renamed, so any number
-of processes may compile at once.
+the ship's `accelerations.py`, the versions of Python and Numba and the processor; Numba's own on-disk
+cache lies beside the copied files. Where there is weather, `open_sea.py` is its `weather.py`. The folder is
+written beside its target and renamed, so any number of processes may compile at once.
 """
 
 from __future__ import annotations

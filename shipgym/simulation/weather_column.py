@@ -1,4 +1,4 @@
-"""Weather as the kernels read it: the rows of a ship's tile that tell what current, wind and waves do to her."""
+"""Weather as the kernels read it: rows of a ship's tile that tell what current, wind and waves do to her."""
 
 from __future__ import annotations
 
