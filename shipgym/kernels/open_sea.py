@@ -175,8 +175,8 @@ def decay(x: float) -> float:
 def ring(turn: float, ship: Any, lane: int) -> tuple[float, float, float, float, float, float]:
     """Exact step of a lightly damped oscillator driven by white noise, with both states of variance 1.
 
-    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h of `turn`. Returns P11, P12 = -P21 and
-    P22 of the transition P, and the factors of the noise, whose covariance is I - P P'.
+    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h of `turn`. Returns
+    P11, P12 = -P21 and P22 of the transition P, and the factors of the noise, whose covariance is I - P P'.
     """
     damping, ringing = ship[WAVE_DAMPING + lane], ship[WAVE_RINGING + lane]
     kept = decay(damping * turn)
@@ -197,8 +197,8 @@ def show_waves(bow: float, beam: float, frequency: float, sky: Any, ship: Any, l
     """First-order motion of a ship at an angle to the waves.
 
     The angle is the oscillator's velocity, which is white noise through gain s / (s^2 + 2 lambda w s + w^2).
-    Its own derivative has no finite variance, so the rate is the part of it that swings, -w times the displacement:
-    of variance w^2 and a quarter of a period ahead, as in waves of one frequency.
+    Its own derivative has no finite variance, so the rate is the part of it that swings, -w times the
+    displacement: of variance w^2 and a quarter of a period ahead, as in waves of one frequency.
     """
     cosines, _ = multiples(bow, beam)
     heading = sqrt(max(cosine_series(cosines, HEADING_VARIANCE, ship, lane), 0.0))

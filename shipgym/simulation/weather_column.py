@@ -41,7 +41,8 @@ def as_weather(weather: Weather | str | None, where: str, from_deg: float | None
     try:
         return Weather.from_sea_state(weather, from_deg)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        reason = str(error).removeprefix("sea state: ")
+        raise InputError(f"{where}: {reason}") from None
 
 
 def weather_column(model: ShipModel, weather: Weather, step: float, water_depth: float = np.inf) -> Floats:
