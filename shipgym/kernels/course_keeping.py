@@ -91,6 +91,7 @@ def measured(state: Any, lane: int) -> tuple[float, float]:
         return state[PSI + lane] + state[PSI_WAVE + lane], state[R + lane] + state[R_WAVE + lane]
     return state[PSI + lane], state[R + lane]
 
+
 KEEPS_P = ROLL or getattr(equations, "MEMORY", False)  # the row holds a roll rate or a memory of yaw
 
 
