@@ -32,7 +32,6 @@ from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
 from shipgym.weather import Current, Waves, Weather, Wind
 
-
 Floats = NDArray[np.float64]
 
 MODEL = "mariner-tls-svm"
