@@ -46,13 +46,13 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
-        from shipgym.errors import InputError, UnstableModelError
+        from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
             command(*args, **kwargs)
         except InputError as error:
             _fail(str(error), WRONG_INPUT)
-        except UnstableModelError as error:
+        except (ManoeuvreError, UnstableModelError) as error:
             _fail(str(error), FAILED)
         except KeyboardInterrupt:
             _fail("interrupted, nothing was written", INTERRUPTED)
@@ -142,6 +142,9 @@ def trials_command(
         int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
+    depth: Annotated[
+        float | None, typer.Option(metavar="M", help="Depth of the water, m; default: deep water.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Put a model through the standard manoeuvres and judge it by the IMO criteria.
@@ -155,19 +158,24 @@ def trials_command(
     from shipgym.models import load_model
 
     ship = load_model(model)
+    water_depth = float("inf") if depth is None else depth
+    ship.check_depth(water_depth)
     if out is not None:
         check_page(out)
     with progress_bars(not as_json) as progress:
         tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
-        found = standard_trials(ship, draws, seed, tell)
+        found = standard_trials(ship, draws, seed, tell, water_depth)
     if out is not None:
         write_page(ship, found, out)
     if as_json:
         print_json({"model": ship.name, "seed": seed, **found.to_dict()})
         return
-    console.print(manoeuvre_table(found.indices))
+    console.print(manoeuvre_table(found.indices, found.water))
     console.print()
-    console.print(criteria_table(found.criteria))
+    if found.criteria:
+        console.print(criteria_table(found.criteria))
+    else:
+        console.print("The IMO criteria are made for deep water: leave --depth out to judge by them.")
     for name, criterion in found.criteria.items():
         if criterion.note:
             console.print(f"{name}: {criterion.note}", soft_wrap=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from numbers import Real
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
@@ -195,7 +194,7 @@ class ShipModel:
         ------
         InputError
         """
-        if isinstance(water_depth, Real) and water_depth == np.inf:
+        if water_depth == np.inf:
             return
         check_number(water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water")
         if not self.dynamics.shallow_water:
