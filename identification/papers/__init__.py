@@ -12,7 +12,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["PAPERS", "Paper", "Row", "get_paper"]
 
-PAPERS = ("cao2015", "xu2020")
+PAPERS = ("cao2015", "xu2020", "song2020")
 
 
 def get_paper(name: str) -> Paper:

@@ -28,8 +28,8 @@ Floats = NDArray[np.float64]
 PARTICULARS = Particulars(
     length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
 )
-TANK = Tank(cycles=2, samples=1000)
-NOISE = 0.02  # standard deviation of each force, in parts of its root mean square over all tests
+TANK = Tank(cycles=2, samples=500)
+NOISE = 0.015  # standard deviation of each force, in parts of its root mean square over all tests
 SEED = 2020
 
 # amplitude and period, s: surge in parts of the speed, drift in degrees, yaw rate as r'

@@ -27,12 +27,19 @@ def test_each_step_keeps_what_the_paper_keeps(fitted, step):
     assert set(fitted.reductions[step.table].terms) == set(step.kept) - {"Y_r|r|"}
 
 
+def test_what_is_dropped_explains_nothing(fitted):
+    """Less than the paper's own loss of R2, at most 0.005: its ship has the terms a little."""
+    for table, (old, revised) in xu2020.R_SQUARED.items():
+        path = fitted.reductions[table].path
+        assert 0.0 <= path[0].r_squared - path[-1].r_squared < max(old - revised, 1e-3)
+
+
 def test_all_38_at_once_leave_the_same_18(fitted):
     assert xu2020_tank.all_at_once(fitted.forces, fitted.stepwise) == set(TABLE_11)
 
 
 def test_other_noise_leaves_the_same_18():
-    assert xu2020.repeated(xu2020.NOISE * xu2020_tank.noise_sizes(), 2) == (2, 2)
+    assert xu2020.repeated(xu2020.NOISE * xu2020_tank.noise_sizes(), 1) == (1, 1)
 
 
 def test_table_11_comes_back_within_four_per_cent(fitted):
