@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from identification.papers import PAPERS, get_paper
+from identification.papers import CASES, get_paper
 from shipgym.checks import check_choice
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from identification.papers import Row
+    from identification.papers import Requirement, Row
 
 ALL = "all"
 HEADINGS = ("case", "quantity", "printed", "as the paper", "at best", "aim", "met")
@@ -26,14 +26,14 @@ says what stands in for it.
 
 
 def papers_of(name: str) -> tuple[str, ...]:
-    """Short names of the papers asked for: one, or all.
+    """Short names of the papers asked for: one, or all, with the requirements after them.
 
     Raises
     ------
     InputError
         If there is none of that name.
     """
-    return PAPERS if check_choice(name, (*PAPERS, ALL), "paper") == ALL else (name,)
+    return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
 
 
 def reproduce(names: Iterable[str], tell: Callable[[str], None] | None = None) -> dict[str, list[Row]]:
@@ -97,6 +97,7 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         "",
         f"{paper.citation}. {paper.what}",
         "",
+        *_requirements(paper.requirements),
         f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}. `shipgym reproduce {name}`",
         "",
         "| " + " | ".join((*HEADINGS, "note")) + " |",
@@ -104,6 +105,18 @@ def _section(name: str, rows: Sequence[Row]) -> str:
     ]
     lines += ["| " + " | ".join((*map(_escaped, _cells(row)), _escaped(row.note))) + " |" for row in rows]
     return "\n".join([*lines, ""])
+
+
+def _requirements(requirements: Sequence[Requirement]) -> list[str]:
+    """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
+    if not requirements:
+        return []
+    lines = ["| | requirement | why it holds | tests | tables |", "| --- | --- | --- | --- | --- |"]
+    for one in requirements:
+        tests = "<br>".join(f"`{test}`" for test in one.tests)
+        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
+        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
+    return [*lines, ""]
 
 
 def _cells(row: Row) -> tuple[str, ...]:
