@@ -38,6 +38,14 @@ def test_the_printed_means_are_those_of_the_printed_errors(rows):
     assert linear == pytest.approx([52.0, 18.8])
 
 
+def test_the_printed_errors_are_those_of_the_printed_estimates():
+    """To the digits given."""
+    for method, (gain, time) in song2020.ESTIMATES.items():
+        printed = song2020.TABLE_3_3[method]
+        assert 100.0 * (1.0 - gain / song2020.K) == pytest.approx(printed["K"], abs=0.5)
+        assert 100.0 * (1.0 - time / song2020.T) == pytest.approx(printed["T"], abs=0.5)
+
+
 def test_with_the_noise_of_instruments_they_come_within_one_per_cent(rows):
     noisy = quantities(rows, "Section 3.1")
     assert len(noisy) == 5
