@@ -20,8 +20,8 @@ INTRODUCTION = """# The papers' tables, run again
 
 Written by `shipgym reproduce all --markdown docs/reproduction.md`. *Printed* is the paper's number, *as the
 paper* ours by its method on the same case, *at best* ours by the best method that there is here, on the same
-data. A cell is empty where the paper shows only a picture or does not publish what it used; the note then
-says what stands in for it.
+data. A cell is empty where the paper shows only a picture or does not publish what it used; the note, whose
+number stands in the last column, then says what stands in for it.
 """
 
 
@@ -100,11 +100,22 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         *_requirements(paper.requirements),
         f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}. `shipgym reproduce {name}`",
         "",
+        *_table(rows),
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    """The rows, and below them each note once."""
+    lines = [
         "| " + " | ".join((*HEADINGS, "note")) + " |",
         "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
     ]
-    lines += ["| " + " | ".join((*map(_escaped, _cells(row)), _escaped(row.note))) + " |" for row in rows]
-    return "\n".join([*lines, ""])
+    notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
+    for row in rows:
+        number = str(notes[row.note]) if row.note else ""
+        lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
+    return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
 
 
 def _requirements(requirements: Sequence[Requirement]) -> list[str]:

@@ -47,3 +47,13 @@ def test_the_page_tells_of_each_requirement_why_it_holds_and_what_shows_it():
     assert [line.count("|") for line in unescaped[:8]] == [6] * 8
     for line, one in zip(table, REQUIREMENTS, strict=False):
         assert all(f"`{test}`" in line for test in one.tests)
+
+
+def test_a_note_stands_once_below_the_table_and_is_pointed_at():
+    rows = [
+        Row("Table 1", q, 1.0, 1.0, 1.0, note=note) for q, note in zip("abc", ("x|y", "", "x|y"), strict=True)
+    ]
+    lines = page({PAPERS[0]: rows}).splitlines()
+    cells = [line.split("|")[-2].strip() for line in lines if line.startswith("| Table 1")]
+    assert cells == ["1", "", "1"]
+    assert lines.count("1. x|y") == 1
