@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -11,12 +10,11 @@ from pathlib import Path
 from string import Template
 
 import shipgym
+from agents.output import check_page
 from agents.replay_series import quantities, run
 from shipgym.episode import Episode
 from shipgym.errors import InputError
 from shipgym.whole_file import write_text
-
-ENDINGS = (".html", ".htm")
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
@@ -35,29 +33,12 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
         If there is no episode, one cannot be read, or the page cannot be written; nothing is written then.
     """
     target = Path(out)
-    check_target(target)
+    check_page(target)
     if not paths:
         raise InputError("episodes: none found, expected at least one episode file")
     sources = [Path(path) for path in paths]
     episodes = [Episode.load(path) for path in sources]
     write_text(replay_page(dict(zip(names(sources), episodes, strict=True))), target)
-
-
-def check_target(path: Path) -> None:
-    """Refuse a file for the page that cannot be written, before any work.
-
-    Raises
-    ------
-    InputError
-        If the ending is not .html, it is a folder, or its folder cannot be written.
-    """
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write the page to")
-    folder = path.absolute().parent
-    if not folder.is_dir() or not os.access(folder, os.W_OK):
-        raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")
 
 
 def replay_page(episodes: Mapping[str, Episode]) -> str:

@@ -12,10 +12,10 @@ from shipgym.episode import Episode
 
 Floats = NDArray[np.float64]
 
-DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre
+DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
 COURSE_ORDERS = ("set_point", "course_order", "heading_order", "desired_course", "los_course")
-SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n")  # each by itself
+SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by itself
 CROSS_TRACK = ("cross_track_error", "cross_track")
 
 
@@ -36,7 +36,7 @@ QUANTITIES = (
     Quantity("cross-track error", "m", 1, "cross_track_error", short="cross-track"),
     Quantity("heading error", "deg", 1, "heading_error"),
     Quantity("rudder", "deg", 1, "delta", "rudder_order"),
-    Quantity("speed", "m/s", 2, "speed"),
+    Quantity("speed through water", "m/s", 2, "speed", short="speed"),
     Quantity("yaw rate", "deg/s", 2, "yaw_rate"),
     Quantity("heel", "deg", 1, "heel"),
     Quantity("shaft speed", "1/min", 1, "shaft_speed"),
@@ -56,12 +56,12 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     Returns
     -------
     dict
-        What it is, the ship to draw, the path, series of n + 1 values each, and under `other` states that
-        are shown by no other name, SI units.
+        What it is, the ship to draw, the path, series of n + 1 values each, and under `other` what was
+        recorded and is shown by no other name, SI units.
     """
-    states, path = episode.states, episode.waypoints
-    shown = {*SHOWN, _first(COURSE_ORDERS, states), _first(CROSS_TRACK, states)}
-    other = {key: values for key, values in states.items() if key not in shown}
+    told, path = {**episode.info, **episode.states}, episode.waypoints
+    shown = {*SHOWN, _first(COURSE_ORDERS, told), _first(CROSS_TRACK, told)}
+    other = {key: values for key, values in told.items() if key not in shown}
     return {
         "name": name,
         "environment": episode.environment,
@@ -75,12 +75,12 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
-        "waypoints": None if path is None else [_rounded(point) for point in path],
+        "waypoints": None if path is None else [rounded(point) for point in path],
         "corridor": episode.corridor,
-        "series": {key: _rounded(values) for key, values in series(episode).items()},
-        "parts": {key: _rounded(values) for key, values in _after_steps(episode.reward_parts).items()},
-        "rewards": _rounded(np.append(0.0, episode.rewards)),
-        "other": {key: _rounded(values) for key, values in other.items()},
+        "series": {key: rounded(values) for key, values in series(episode).items()},
+        "parts": {key: rounded(values) for key, values in _after_steps(episode.reward_parts).items()},
+        "rewards": rounded(np.append(0.0, episode.rewards)),
+        "other": {key: rounded(values) for key, values in other.items()},
     }
 
 
@@ -115,9 +115,10 @@ def series(episode: Episode) -> dict[str, Floats]:
         error = np.remainder(states[order] - heading + np.pi, 2.0 * np.pi) - np.pi
         found["heading_error"] = np.degrees(error)
         found["course_order"] = np.degrees(heading + error)  # so that it stands beside the heading
-    cross_track = _first(CROSS_TRACK, states)
+    told = {**episode.info, **states}
+    cross_track = _first(CROSS_TRACK, told)
     if cross_track is not None:
-        found["cross_track_error"] = states[cross_track]
+        found["cross_track_error"] = told[cross_track]
     return {**found, **_weather(states)}
 
 
@@ -168,5 +169,10 @@ def _after_steps(parts: Mapping[str, Floats]) -> dict[str, Floats]:
     return {name: np.append(0.0, values) for name, values in parts.items()}
 
 
-def _rounded(values: Floats) -> list[float]:
-    return [float(f"{value:.{DIGITS}g}") for value in values]
+def rounded(values: Floats) -> list[float]:
+    """Numbers with the digits that the page keeps."""
+    array = np.asarray(values, dtype=float)
+    size = np.floor(np.log10(np.maximum(np.abs(array), 1e-12)))
+    power = 10.0 ** np.clip(DIGITS - 1.0 - size, 0.0, DIGITS + 2.0)
+    short: list[float] = (np.round(array * power) / power).tolist()
+    return short

@@ -26,8 +26,8 @@ REQUIRED_STATES = ("x", "y", "psi", "delta")
 class Episode:
     """What happened in one episode, immutable, SI units and the project's signs.
 
-    States are those at the beginning and after each of the n steps; commands, actions and rewards belong to
-    the steps.
+    States and info are those at the beginning and after each of the n steps; commands, actions and rewards
+    belong to the steps.
 
     Parameters
     ----------
@@ -51,6 +51,8 @@ class Episode:
         What was ordered in each step, ``delta`` in rad and ``n`` in 1/s, where that is known.
     reward_parts : mapping of str to array-like of shape (n_steps,), optional
         Parts of the rewards, as `info` names them.
+    info : mapping of str to array-like of shape (n_steps + 1,), optional
+        What else `info` told in numbers, at the beginning and after each step; true is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
     corridor : float, optional
@@ -84,6 +86,7 @@ class Episode:
     rewards: Floats
     commands: Mapping[str, Floats] = field(default_factory=dict)
     reward_parts: Mapping[str, Floats] = field(default_factory=dict)
+    info: Mapping[str, Floats] = field(default_factory=dict)
     waypoints: Floats | None = None
     corridor: float | None = None
     beam: float | None = None
@@ -124,13 +127,12 @@ class Episode:
             )
         self._set("rewards", rewards)
         self._set("actions", actions)
-        for group, count in (
-            ("states", len(rewards) + 1),
-            ("commands", len(rewards)),
-            ("reward_parts", len(rewards)),
-        ):
+        counts = {"states": 1, "info": 1, "commands": 0, "reward_parts": 0}
+        for group, more in counts.items():
             table = check_table(getattr(self, group), group)
-            arrays = {name: series(values, f"{group}.{name}", count) for name, values in table.items()}
+            arrays = {
+                name: series(values, f"{group}.{name}", len(rewards) + more) for name, values in table.items()
+            }
             self._set(group, arrays)
         missing = [name for name in REQUIRED_STATES if name not in self.states]
         if missing:

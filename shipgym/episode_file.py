@@ -16,6 +16,7 @@ Format 1:
     actions      n rows, as the agent gave them
     rewards      n values
     reward_parts {name: n values}
+    info         {name: n + 1 values}: what else was told, at the beginning and after each step
     outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
 """
 
@@ -37,7 +38,7 @@ KIND = "episode"
 REMEDY = "record the episode again or take another copy"
 FIELDS = (
     "format", "kind", "environment", "model", "seed", "number", "dt", "ship", "path", "states", "commands",
-    "actions", "rewards", "reward_parts", "outcome",
+    "actions", "rewards", "reward_parts", "info", "outcome",
 )  # fmt: skip
 
 
@@ -70,6 +71,7 @@ def episode_fields(episode: Episode) -> dict[str, Any]:
         "actions": episode.actions.tolist(),
         "rewards": episode.rewards.tolist(),
         "reward_parts": _lists(episode.reward_parts),
+        "info": _lists(episode.info),
         "outcome": {
             "terminated": episode.terminated,
             "truncated": episode.truncated,
@@ -106,14 +108,14 @@ def _episode(content: Mapping[str, Any]) -> Episode:
         _check_numbers(path["waypoints"], "path.waypoints")
     for name in ("actions", "rewards"):
         _check_numbers(content[name], name)
-    for group in ("states", "commands", "reward_parts"):
+    for group in ("states", "commands", "reward_parts", "info"):
         for name, values in check_table(content[group], group).items():
             _check_numbers(values, f"{group}.{name}")
     return Episode(
         environment=environment["id"],
         arguments=environment["arguments"],
         **{name: content[name] for name in ("model", "seed", "number", "dt", "states", "commands")},
-        **{name: content[name] for name in ("actions", "rewards", "reward_parts")},
+        **{name: content[name] for name in ("actions", "rewards", "reward_parts", "info")},
         **ship,
         **path,
         **outcome,

@@ -22,6 +22,7 @@ Observation = TypeVar("Observation")
 Action = TypeVar("Action")
 
 REWARD = "reward_"  # how the names of the parts of the reward begin in info
+SUCCESS = ("success", "is_success")
 
 
 class RecordEpisode(
@@ -65,7 +66,7 @@ class RecordEpisode(
     ) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(
             self,
-            folder=folder,
+            folder=str(folder),
             episode_trigger=episode_trigger,
             trials=trials,
             name_prefix=name_prefix,
@@ -92,7 +93,7 @@ class RecordEpisode(
         self.episode_number += 1
         self._since_seed = 0 if seed is not None else self._since_seed + 1
         if self._trigger is None or self._trigger(self.episode_number):
-            self._recorded = _Recorded(self.env, self._since_seed)
+            self._recorded = _Recorded(self.env, self._since_seed, info)
         return observation, info
 
     def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
@@ -126,7 +127,7 @@ class _Recorded:
     Path and ship are taken at its beginning, because the next reset may change them.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], since_seed: int) -> None:
+    def __init__(self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]) -> None:
         ship: Any = env.unwrapped
         self.rewards: list[float] = []
         self._ship, self._model = ship, ship.model
@@ -134,6 +135,7 @@ class _Recorded:
         self._actions: list[Floats] = []
         self._commands: list[dict[str, float]] = []
         self._parts: list[dict[str, float]] = []
+        self._info = [_numbers(info)]
         self._outcome: dict[str, Any] = {}
         self._rudder_actions = _are_rudders(env, ship)
         waypoints = getattr(ship, "waypoints", None)
@@ -163,7 +165,8 @@ class _Recorded:
         self._actions.append(numbers)
         self._commands.append(self._ordered(state, numbers))
         self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
-        said = info.get("success", info.get("is_success"))
+        self._info.append(_numbers(info))
+        said = next((info[key] for key in SUCCESS if key in info), None)
         self._outcome = {
             "terminated": bool(terminated),
             "truncated": bool(truncated),
@@ -187,6 +190,7 @@ class _Recorded:
             rewards=np.array(self.rewards),
             commands=_columns(self._commands),
             reward_parts=_columns(self._parts),
+            info=_columns(self._info),
             **self._facts,
             **self._outcome,
         )
@@ -201,6 +205,18 @@ def _are_rudders(env: gymnasium.Env[Any, Any], ship: Any) -> bool:
         and space.low.reshape(-1)[0] == -1.0
         and space.high.reshape(-1)[0] == 1.0
     )
+
+
+def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
+    """What `info` tells in single finite numbers, without the parts of the reward and the success."""
+    return {
+        key: float(value)
+        for key, value in info.items()
+        if not key.startswith(REWARD)
+        and key not in SUCCESS
+        and isinstance(value, (bool, int, float, np.number, np.bool_))
+        and math.isfinite(value)
+    }
 
 
 def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:

@@ -127,9 +127,17 @@ class Browser:
     def wait(self, condition: str) -> None:
         """Wait until an expression is true."""
         end = time.monotonic() + PATIENCE
-        while not self.run(condition):
+        while not self._holds(condition):
             if time.monotonic() > end:
                 raise TimeoutError(f"never true: {condition}")
+
+    def _holds(self, condition: str) -> bool:
+        try:
+            return bool(self.run(condition))
+        except RuntimeError as error:
+            if "context" in str(error):  # that of a page which is just being left
+                return False
+            raise
 
     def press(self, key: str, code: str, shift: bool = False) -> None:
         """Press a key and let it go."""

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.replay import names, replay_page, write_replay
-from agents.replay_series import outcome, series
+from agents.replay_series import outcome, rounded, series
 from shipgym import Episode, InputError
 
 STEPS, DT = 40, 5.0
@@ -23,7 +23,7 @@ def episode(**changes):
         "x": 5.0 * t, "y": np.full_like(t, 20.0), "psi": 0.002 * t, "u": np.full_like(t, 5.0),
         "v": np.zeros_like(t), "r": np.full_like(t, 0.002), "delta": rudder,
         "set_point": np.full_like(t, 0.1),
-        "cross_track_error": np.full_like(t, 20.0), "wind_speed": np.full_like(t, 8.0),
+        "wind_speed": np.full_like(t, 8.0),
         "wind_from": np.full_like(t, np.pi / 2), "current_north": np.zeros_like(t),
         "current_east": np.full_like(t, -0.5), "under_keel_clearance": np.full_like(t, 3.0),
     }  # fmt: skip
@@ -33,6 +33,7 @@ def episode(**changes):
         "rudder_limit": np.radians(35.0), "states": states, "actions": np.zeros((STEPS, 1)),
         "rewards": np.full(STEPS, -0.5), "commands": {"delta": rudder[1:]},
         "reward_parts": {"reward_cross_track": np.full(STEPS, -0.4), "reward_rudder": np.full(STEPS, -0.1)},
+        "info": {"cross_track": np.full_like(t, 20.0), "extrapolating": np.zeros_like(t)},
         "waypoints": [[0.0, 0.0], [1000.0, 0.0]], "corridor": 50.0, "seed": 2**80, "truncated": True,
     }  # fmt: skip
     return Episode(**(known | changes))
@@ -54,6 +55,11 @@ def test_series_are_in_the_units_that_are_read():
     assert shown["current_speed"] == pytest.approx(0.5)
     assert shown["current_towards"] == pytest.approx(270.0)
     assert shown["wind_from"] == pytest.approx(90.0)
+
+
+def test_numbers_keep_seven_digits():
+    values = np.array([0.0, -1234.56789, 1.0 / 3.0, 2e-7, 1e5 / 3.0])
+    assert rounded(values) == [0.0, -1234.568, 0.3333333, 2e-7, 33333.33]
 
 
 def test_the_error_is_the_short_way_round():
@@ -84,8 +90,8 @@ def test_a_page_holds_all_of_an_episode_that_is_shown():
     assert run["seed"] == str(2**80)  # a number of that size would lose its end in a browser
     assert run["waypoints"] == [[0.0, 0.0], [1000.0, 0.0]]
     assert list(run["parts"]) == ["reward_cross_track", "reward_rudder"]
-    assert run["other"].keys() >= {"under_keel_clearance", "u", "v"}
-    assert "cross_track_error" not in run["other"]
+    assert run["other"].keys() >= {"under_keel_clearance", "u", "v", "extrapolating"}
+    assert "cross_track" not in run["other"]
     assert run["total"] == -0.5 * STEPS
 
 
@@ -197,6 +203,7 @@ def test_an_episode_of_one_step_has_a_page():
         states={name: values[:2] for name, values in known.states.items()},
         commands={},
         reward_parts={},
+        info={},
         actions=known.actions[:1],
         rewards=known.rewards[:1],
     )

@@ -30,7 +30,7 @@ def page(tmp_path_factory):
     states = {name: values[: half + 1] for name, values in first.states.items()}
     second = episode(
         model="</script><b>container", length=50.0, states={**states, "y": states["y"] + 200.0},
-        commands={}, reward_parts={}, rewards=first.rewards[:half], actions=first.actions[:half],
+        commands={}, reward_parts={}, info={}, rewards=first.rewards[:half], actions=first.actions[:half],
     )  # fmt: skip
     first.save(folder / "first.json")
     second.save(folder / "second.json")

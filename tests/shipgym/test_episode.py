@@ -28,6 +28,7 @@ EPISODE = Episode(
     actions=np.array([[0.1], [-0.1], [0.2], [0.3]]),
     rewards=-np.ones(STEPS),
     reward_parts={"reward_heading": -np.ones(STEPS)},
+    info={"cross_track": np.linspace(0.0, 1.0, STEPS + 1)},
     waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
     corridor=60.0,
     arguments={"model": "mariner", "sea": {"wind": None}},
@@ -41,7 +42,7 @@ EPISODE = Episode(
 def test_what_is_read_is_what_was_written_to_the_last_digit(tmp_path):
     EPISODE.save(tmp_path / "episode.json")
     read = Episode.load(tmp_path / "episode.json")
-    for name in ("states", "commands", "reward_parts"):
+    for name in ("states", "commands", "reward_parts", "info"):
         written, found = getattr(EPISODE, name), getattr(read, name)
         assert list(written) == list(found)
         assert all(np.array_equal(written[key], found[key]) for key in written)
@@ -97,6 +98,7 @@ def test_an_episode_cannot_be_changed():
         (("states", "x"), [0.0, 1.0], "states.x: shape (2,) found, expected (5,)"),
         (("states", "x"), [0.0, 1.0, None, 2.0, 3.0], "states.x[2]: None found, expected a number"),
         (("states", "x"), [0.0, 1.0, True, 2.0, 3.0], "states.x[2]: True found"),
+        (("info", "cross_track"), [0.0] * STEPS, "info.cross_track: shape (4,) found, expected (5,)"),
         (("commands", "delta"), 0.1, "commands.delta: 0.1 found, expected a list"),
         (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
         (("actions",), [[0.1], [0.2, 0.3], [0.1], [0.1]], "actions: expected an array of numbers"),

@@ -72,6 +72,9 @@ def test_rewards_parts_and_orders_are_those_of_the_environment(tmp_path):
     assert episode.rewards.tolist() == rewards
     assert sum(episode.reward_parts.values()) == pytest.approx(episode.rewards, abs=1e-12)
     assert episode.commands["delta"] == pytest.approx(episode.actions[:, 0] * np.radians(40.0))
+    assert list(episode.info) == ["heading_error", "extrapolating"]
+    error = episode.states["set_point"] - episode.states["psi"]
+    assert np.cos(episode.info["heading_error"]) == pytest.approx(np.cos(error), abs=1e-6)
     assert (episode.truncated, episode.terminated, episode.success) == (True, False, None)
     assert (episode.length, episode.beam, episode.dt) == (160.93, 23.17, env.unwrapped.dt)
     assert episode.waypoints is None
@@ -171,6 +174,13 @@ def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="cannot be made"):
         RecordEpisode(course_keeping(), tmp_path / "file")
+
+
+def test_an_environment_that_records_is_made_again_from_its_spec(tmp_path):
+    env = RecordEpisode(course_keeping(), tmp_path, name_prefix="again")
+    spec = gymnasium.envs.registration.EnvSpec.from_json(env.spec.to_json())
+    sail(gymnasium.make(spec))
+    assert files(tmp_path) == ["again-00000.json"]
 
 
 @pytest.mark.filterwarnings("ignore:.*different from the unwrapped version")
