@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from agents.replay import write_replay
+from agents.replay import replay_page, write_replay
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.test_replay import DT, STEPS, episode
 
@@ -186,10 +186,23 @@ def test_nothing_sticks_out_or_is_cut_off(opened, width, height):
     assert opened.run(cut) == []
     assert opened.run("chart.svg.clientHeight") > 0.4 * height
     slide(opened, 100.0)
-    ship_box = opened.run("chart.ships[0].ship.getBoundingClientRect().toJSON()")
-    chart_box = opened.run("chart.svg.getBoundingClientRect().toJSON()")
-    assert chart_box["left"] < ship_box["left"] < ship_box["right"] < chart_box["right"]
-    assert chart_box["top"] < ship_box["top"] < ship_box["bottom"] < chart_box["bottom"]
+
+
+@pytest.mark.parametrize(("width", "height"), [(1000, 700), (390, 844)])
+@pytest.mark.parametrize("east", [0.0, 1000.0, 4000.0])
+def test_the_whole_path_is_seen_beside_the_compass(browser, tmp_path, width, height, east):
+    path = tmp_path / "replay.html"
+    path.write_text(replay_page({"run": episode(waypoints=[[0.0, 0.0], [1000.0, east]])}))
+    browser.resize(width, height, mobile=width < 500)
+    browser.open(path.as_uri())
+    browser.wait(f"innerWidth === {width}")
+    dots, whole, rose = (
+        browser.run(f"{place}.getBoundingClientRect().toJSON()")
+        for place in ("document.querySelector('.waypoint')", "chart.svg", "find('rose')")
+    )
+    assert whole["left"] < dots["left"] <= dots["right"] < whole["right"]
+    assert whole["top"] < dots["top"] < dots["bottom"] < whole["bottom"]
+    assert dots["right"] < rose["left"] or dots["top"] > rose["bottom"]
 
 
 def test_everything_that_can_be_operated_has_a_name(opened):

@@ -72,7 +72,7 @@ def test_rewards_parts_and_orders_are_those_of_the_environment(tmp_path):
     assert episode.rewards.tolist() == rewards
     assert sum(episode.reward_parts.values()) == pytest.approx(episode.rewards, abs=1e-12)
     assert episode.commands["delta"] == pytest.approx(episode.actions[:, 0] * np.radians(40.0))
-    assert list(episode.info) == ["heading_error", "extrapolating"]
+    assert episode.info.keys() >= {"heading_error", "extrapolating"}
     error = episode.states["set_point"] - episode.states["psi"]
     assert np.cos(episode.info["heading_error"]) == pytest.approx(np.cos(error), abs=1e-6)
     assert (episode.truncated, episode.terminated, episode.success) == (True, False, None)
