@@ -235,7 +235,7 @@ def autopilot_command(
 @answered
 def replay_command(
     episodes: Annotated[
-        list[Path], typer.Argument(metavar="EPISODE.JSON...", help="Episodes that RecordEpisode wrote.")
+        list[Path], typer.Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
     ],
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:

@@ -72,10 +72,8 @@ class RecordEpisode(
             name_prefix=name_prefix,
             overwrite=overwrite,
         )
+        _check_environment(env)
         super().__init__(env)
-        for name in ("physical_state", "model", "dt"):
-            if not hasattr(env.unwrapped, name):
-                raise InputError(f"env: {env.unwrapped} has no '{name}', expected an environment of shipgym")
         self.episode_number = -1
         self._trigger = episode_trigger
         self._trials = trials
@@ -229,6 +227,14 @@ def _seed(ship: Any) -> int | None:
     """Seed of the environment's random numbers, None where its generator was put in by hand."""
     seed = ship.np_random_seed
     return None if seed is None or seed < 0 else int(seed)
+
+
+def _check_environment(env: Any) -> None:
+    if not isinstance(env, gymnasium.Env):
+        raise InputError(f"env: {env!r} found, expected a single environment; give each its own recorder")
+    for name in ("physical_state", "model", "dt"):
+        if not hasattr(env.unwrapped, name):
+            raise InputError(f"env: {env.unwrapped} has no '{name}', expected an environment of shipgym")
 
 
 def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:

@@ -9,6 +9,7 @@ import os
 import select
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from typing import Any
@@ -19,6 +20,13 @@ FLAGS = (
     "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-extensions",
     "--host-resolver-rules=MAP * ~NOTFOUND", "--hide-scrollbars", "--force-device-scale-factor=1",
 )  # fmt: skip
+# DevTools reads from descriptor 3 and writes to 4
+WIRED = """
+import os, sys
+os.dup2(int(sys.argv[1]), 3)
+os.dup2(int(sys.argv[2]), 4)
+os.execv(sys.argv[3], sys.argv[3:])
+"""
 PATIENCE = 60.0  # s, for an answer
 LOADED = ("Network.enable", "Log.enable", "Runtime.enable", "Page.enable")
 
@@ -26,17 +34,14 @@ LOADED = ("Network.enable", "Log.enable", "Runtime.enable", "Page.enable")
 def _started(flags: list[str]) -> tuple[subprocess.Popen[bytes], int, int]:
     """A browser, and the ends of its pipe to write to and to read from."""
     (theirs_in, out), (into, theirs_out) = os.pipe(), os.pipe()
-    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (theirs_in, theirs_out)]
+    high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in (theirs_in, theirs_out)]  # out of the way
     os.close(theirs_in)
     os.close(theirs_out)
 
-    def wired() -> None:  # DevTools reads from descriptor 3 and writes to 4
-        os.dup2(high[0], 3)
-        os.dup2(high[1], 4)
-
     process = subprocess.Popen(
-        [str(COMMAND), *flags, "--remote-debugging-pipe", "about:blank"],
-        preexec_fn=wired, close_fds=False, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        [sys.executable, "-I", "-S", "-c", WIRED, *map(str, high), str(COMMAND), *flags,
+         "--remote-debugging-pipe", "about:blank"],
+        pass_fds=high, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     for end in high:
         os.close(end)

@@ -169,6 +169,10 @@ def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
 def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
     with pytest.raises(InputError, match="has no 'physical_state', expected an environment of shipgym"):
         RecordEpisode(gymnasium.make("CartPole-v1"), tmp_path)
+    several = gymnasium.make_vec(COURSE_KEEPING, num_envs=2, vectorization_mode="sync")
+    with pytest.raises(InputError, match="expected a single environment"):
+        RecordEpisode(several, tmp_path)
+    several.close()
     with pytest.raises(InputError, match="expected the beginning of a file's name"):
         RecordEpisode(course_keeping(), tmp_path, name_prefix="a/b")
     (tmp_path / "file").write_text("")
