@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
 from pathlib import Path, PurePath
-from string import Template
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +10,6 @@ import numpy as np
 import shipgym
 from agents.concerns import concerns
 from agents.report_figures import CRITERIA
-from agents.report_html import NONE, Html, html, join, note, number, paragraph, percent, section, table
 from agents.report_sections import (
     coefficients_section,
     data_section,
@@ -25,7 +22,23 @@ from agents.report_verification import (
     manoeuvres_section,
     ranking_section,
 )
-from shipgym.errors import InputError
+from shipgym.pages import (
+    NONE,
+    Html,
+    card,
+    cards,
+    header,
+    html,
+    join,
+    note,
+    number,
+    page,
+    paragraph,
+    percent,
+    section,
+    table,
+)
+from shipgym.pages import verdict as box
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult, Verification
@@ -42,30 +55,7 @@ TITLES = {
     "ranking": "Ranking",
     "origin": "How this was made",
     "remedy": "What to do",
-    "imo": "IMO criteria",
-    "zigzags": "Zigzags",
-    "circles": "Turning circles",
-    "spirals": "Spirals",
-    "pull-outs": "Pull-outs",
-    "stops": "Stopping and acceleration",
 }
-
-
-def plotly_script() -> str:
-    """The source of plotly.js, to stand once in a page.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
-    try:
-        from plotly.offline import get_plotlyjs
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "plotly is not installed, the report needs it: pip install 'shipgym[report]'"
-        ) from error
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def write_report(result: AutopilotResult, path: str | Path) -> None:
@@ -85,28 +75,13 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     """
     found = result.verification
     body = unstable_body(result) if found is None else stable_body(result, found)
-    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body), encoding="utf-8")
-
-
-def page(title: str, body: dict[str, Html]) -> str:
-    """A whole page from its sections by name, in order."""
-    template = Template(files("agents").joinpath("report_template.html").read_text(encoding="utf-8"))
-    contents = join(
-        Html(f'<li><a href="#{name}">{html(TITLES[name])}</a></li>') for name in body if name in TITLES
-    )
-    return template.substitute(
-        title=html(title),
-        version=html(shipgym.__version__),
-        plotly=plotly_script(),
-        contents=contents,
-        body=join(body.values(), "\n"),
-    )
+    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body, TITLES), encoding="utf-8")
 
 
 def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]:
     """All sections."""
     return {
-        "header": header(result),
+        "header": top(result),
         "verdict": verdict(result, found),
         "data": data_section(result),
         "coefficients": coefficients_section(result),
@@ -121,10 +96,8 @@ def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]
 def unstable_body(result: AutopilotResult) -> dict[str, Html]:
     """What can be said of an unstable model: that it is, and what to do; no numbers of its own."""
     headline = (
-        f'<div class="verdict bad" id="verdict"><div class="headline">The identified model is unstable: '
-        f"{html(result.instability)}. It must not be used, and no coefficients, predictions, manoeuvres or "
-        "autopilots are given.</div>"
-        f'<div class="cards">{ship_card(result)}{data_card(result)}</div></div>'
+        f"The identified model is unstable: {result.instability}. It must not be used, and no coefficients, "
+        "predictions, manoeuvres or autopilots are given."
     )
     advice = section(
         "remedy",
@@ -142,8 +115,8 @@ def unstable_body(result: AutopilotResult) -> dict[str, Html]:
     )
     data = section("data", "Data", trials_table(result), ship_tables(result))
     return {
-        "header": header(result),
-        "verdict": Html(headline),
+        "header": top(result),
+        "verdict": box(headline, "bad", cards(ship_card(result), data_card(result))),
         "remedy": advice,
         "data": data,
         "origin": origin_section(result),
@@ -155,21 +128,13 @@ def ship_name(result: AutopilotResult) -> str:
     return str(result.ship.particulars.name)
 
 
-def header(result: AutopilotResult) -> Html:
+def top(result: AutopilotResult) -> Html:
     """Title of the page."""
-    return Html(
-        "<header><p class=kicker>Identified manoeuvring model and "
-        f"autopilots</p><h1>{html(ship_name(result))}</h1><p class=lead>Identified from recorded "
-        "manoeuvres, with the uncertainty of every coefficient carried through to the manoeuvring "
-        "criteria and to the autopilots.</p></header>"
-    )
-
-
-def card(label: str, value: object, detail: object) -> Html:
-    """One fact of the verdict."""
-    return Html(
-        f'<div class="card"><div class="label">{html(label)}</div><div class="value">{html(value)}</div>'
-        f'<div class="detail">{html(detail)}</div></div>'
+    return header(
+        "Identified manoeuvring model and autopilots",
+        ship_name(result),
+        "Identified from recorded manoeuvres, with the uncertainty of every coefficient carried through to "
+        "the manoeuvring criteria and to the autopilots.",
     )
 
 
@@ -206,7 +171,7 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
         found.manoeuvres.unstable.any()
     )
     lost = bool(np.any(best.flights.terminated))
-    cards = [
+    facts = [
         ship_card(result),
         data_card(result),
         quality_card(result),
@@ -221,11 +186,7 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
             ),
         ),
     ]
-    return Html(
-        f'<div class="verdict {"warn" if doubts or lost else "good"}" id="verdict">'
-        f'<div class="headline">{html(headline(found))}</div>'
-        f'<div class="cards">{join(cards)}</div>{concerns_list(result)}</div>'
-    )
+    return box(headline(found), "warn" if doubts or lost else "good", cards(*facts), concerns_list(result))
 
 
 def concerns_list(result: AutopilotResult) -> Html:

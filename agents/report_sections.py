@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from agents.report_figures import overview_figure, prediction_figure
-from agents.report_html import (
+from shipgym.pages import (
     MINUS,
     NONE,
     Html,
