@@ -77,7 +77,7 @@ def structure_samples(
     samples: str = "spline",
     window: int | None = None,
     gear: SteeringGear | None = None,
-    smooth: bool = True,
+    smooth: bool | str = True,
     shaft_speed: float = 0.0,
 ) -> Samples:
     """The regression of any structure; arguments as in `build_samples`.

@@ -67,12 +67,15 @@ class Method:
     fit : callable
         Fits machines, made by its first argument, to the task that is its second, and returns them by
         equation. By default each equation by itself, from the samples alone.
+    refined : bool
+        Whether what was fitted is the start of a refinement by simulation (`refine`).
     """
 
     name: str
     machine: Callable[..., Machine]
     regularised: bool
     fit: Callable[[Callable[[], Machine], FitTask], Machines] = each_equation
+    refined: bool = False
 
     def machines(self, settings: Mapping[str, Any], task: FitTask) -> Machines:
         """Machines of all equations, fitted with the settings.
@@ -163,6 +166,7 @@ METHODS = {
         Method("nisg", _nisg, regularised=False),
         Method("mils", _mils, regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
+        Method("output-error", _tls_svm, regularised=True, refined=True),
         Method("rm-svm", _rm_svm, regularised=True, fit=_fit_rm_svm),
     )
 }

@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
+from identification.bootstrap import bootstrap_covariance, influence_covariance
 from identification.diagnostics import EquationDiagnostics, check_samples, check_trials, diagnose
 from identification.gear import estimated_gear
 from identification.grey_box import bare_metrics, chosen_box, structure_samples
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
 from identification.prediction import predict, trial_metrics
+from identification.preprocess import repaired
 from identification.prior import with_prior
+from identification.refine import Refined, refine, split_settings
 from identification.samples import Samples
 from identification.threads import on_one_thread
 from identification.tuning import SearchResult
@@ -35,6 +38,7 @@ from shipgym.trial import Trial
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 Floats = NDArray[np.float64]
 
+UNCERTAINTIES = ("analytic", "bootstrap")
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
@@ -131,6 +135,9 @@ def identify(
     name: str | None = None,
     window: int | None = None,
     smooth: bool = True,
+    preprocessing: str | None = None,
+    repair: bool = False,
+    uncertainty: str = "analytic",
     guarded: bool = True,
     hold_out: Sequence[str] = (),
     reference_model: str | ShipModel | None = None,
@@ -153,7 +160,8 @@ def identify(
         A name of `identification.methods.METHODS`: truncated LS-SVM (`tls-svm`), LS-SVM of given C (`ls-svm`)
         or of one found by grid, particle swarm, bee colony or differential evolution (`cv-lssvr`,
         `pso-lssvr`, `abc-lssvr`, `de-lssvr`), or scikit-learn's least squares, ridge and support
-        vector regression (`ls`, `ridge`, `svr`); for the structure `grey-box` also RM-SVM (`rm-svm`).
+        vector regression (`ls`, `ridge`, `svr`), or refinement of a truncated LS-SVM by simulation
+        (`output-error`); for the structure `grey-box` also RM-SVM (`rm-svm`).
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     particulars : Particulars or mapping
@@ -171,6 +179,13 @@ def identify(
         Sampling steps over which the velocities are integrated; see `samples.build_samples`.
     smooth : bool
         Whether noisy channels are smoothed first.
+    preprocessing : {"spline", "savgol", "median", "rts", "none"}, optional
+        How they are smoothed (`preprocess.smoothed_channels`); by default by splines.
+    repair : bool
+        Whether outliers are replaced and short dropouts filled first (`preprocess.repaired`).
+    uncertainty : {"analytic", "bootstrap"}
+        Where the covariance comes from: the formula for errors correlated over the time to sail one ship
+        length, or refits to blocks of that time drawn with replacement (`bootstrap`).
     guarded : bool
         Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
         is large in a hard turn and invisible in the data. The provenance tells what was done.
@@ -186,7 +201,7 @@ def identify(
         0 for none, infinite for the prior itself; by default chosen by cross-validation.
     **settings
         Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
-        `optimiser` of a search.
+        `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
 
     Returns
     -------
@@ -198,13 +213,16 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     chosen = get_method(method)
+    check_choice(uncertainty, UNCERTAINTIES, "uncertainty")
     trials = _held_out(trials, hold_out)
-    used = _used(trials)
+    used = [repaired(trial) if repair else trial for trial in _used(trials)]
     table, similarity = _table(structure, reference_model, particulars, used)
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     shaft = _shaft_speed(service_shaft_speed, used, table)
-    regression = structure_samples(used, table, ship, samples, window, steering, smooth, shaft)
+    regression = structure_samples(
+        used, table, ship, samples, window, steering, preprocessing or smooth, shaft
+    )
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(ship["name"] if name is None else name, table, ship, gear, shaft, used)
@@ -212,8 +230,13 @@ def identify(
         raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
     if prior is not None:
         chosen = with_prior(chosen, prior, prior_strength, blank)
-    fit = guarded_fit(chosen, settings, regression, blank, used, guarded)
-    asked = {"window": window, "smooth": smooth, "guarded": guarded, **settings}
+    refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
+    fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
+    refined = refine(fit, regression, used, refinement, _memory(ship)) if refinement else None
+    fit = refined.fit if refined else fit
+    asked = {"window": window, "smooth": smooth, "guarded": guarded, **of_machine}
+    if preprocessing is not None:
+        asked["preprocessing"] = preprocessing
     provenance = {
         "structure": structure,
         "method": method,
@@ -224,7 +247,11 @@ def identify(
         **({"prior": _prior_name(prior), **_prior_found(fit)} if prior is not None else {}),
         **_origin(fit, regression, used),
     }
-    covariance = _covariance(fit, regression, blank)
+    if refined:
+        provenance["refinement"] = refined.report
+    if uncertainty != "analytic":
+        provenance["uncertainty"] = uncertainty
+    covariance = _covariance(fit, regression, blank, refined, uncertainty)
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _judged(model, fit, regression, trials)
 
@@ -245,13 +272,26 @@ def _blank(
     )
 
 
-def _covariance(fit: GuardedFit, regression: Samples, blank: ShipModel) -> Floats:
+def _memory(ship: Particulars) -> float:
+    """Time over which errors are correlated, s."""
+    return float(MEMORY * ship["length"] / ship["speed"])
+
+
+def _covariance(
+    fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None, uncertainty: str
+) -> Floats:
     """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
     ship = blank.particulars
-    memory = MEMORY * ship["length"] / ship["speed"]
+    memory, bootstrap = _memory(ship), uncertainty == "bootstrap"
+    if refined is None or refined.covariance is None:
+        by_machines = bootstrap_covariance if bootstrap else joint_covariance
+        covariance = by_machines(fit.machines, regression, memory)
+    elif bootstrap:
+        covariance = influence_covariance(refined.influences, max(round(memory / refined.width), 1))
+    else:
+        covariance = refined.covariance
     return coefficient_covariance(
-        joint_covariance(fit.machines, regression, memory),
-        blank.table.acceleration_matrix(ship, blank.service_shaft_speed),
+        covariance, blank.table.acceleration_matrix(ship, blank.service_shaft_speed)
     )
 
 
@@ -265,7 +305,9 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
-            {"name": trial.name, "sha256": trial.sha256, "derived": sorted(trial.derived)} for trial in used
+            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
+            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
+            for trial in used
         ],
     }
 

@@ -20,6 +20,7 @@ from scipy.ndimage import median_filter
 from identification import preprocess
 from identification.memory import eliminated, twice_integrated
 from identification.rudder import Rudder, rebuild, straight
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.models.structures import Structure
 from shipgym.particulars import Particulars
@@ -77,7 +78,7 @@ def build_samples(
     samples: str = "spline",
     window: int | None = None,
     gear: SteeringGear | None = None,
-    smooth: bool = True,
+    smooth: bool | str = True,
     shaft_speed: float = 0.0,
 ) -> Samples:
     """Stack the regressions of all trials.
@@ -100,8 +101,9 @@ def build_samples(
         as the noise asks for otherwise, up to a third of the time to sail one ship length.
     gear : SteeringGear, optional
         Helps to rebuild the rudder between samples (spline only).
-    smooth : bool
-        Whether channels with noise are smoothed before the terms are formed.
+    smooth : bool or str
+        Whether channels with noise are smoothed before the terms are formed; by smoothing splines, or as
+        named (`preprocess.PREPROCESSING`).
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
 
@@ -118,6 +120,8 @@ def build_samples(
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
     if window is not None and window < 1:
         raise InputError(f"window: {window} found, expected a number of sampling steps, at least 1")
+    preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
+    check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
     parts = []
     for index, trial in enumerate(trials):
         if window is not None and window >= len(trial):
@@ -132,7 +136,7 @@ def build_samples(
         pieces = between_gaps(trial, particulars, FEWEST_SAMPLES if window is None else window + 1)
         steps = default_window(max(pieces, key=len), particulars) if window is None else window
         parts += [
-            _one_trial(piece, index, structure, terms, samples, steps, gear, smooth)
+            _one_trial(piece, index, structure, terms, samples, steps, gear, preprocessing)
             for piece in pieces
             if len(piece) > steps
         ]
@@ -229,16 +233,10 @@ def _one_trial(
     samples: str,
     window: int,
     gear: SteeringGear | None,
-    smooth: bool,
+    preprocessing: str,
 ) -> Samples:
     t = trial.t
-    channels = {name: trial[name] for name in structure.required_channels}
-    if smooth:
-        channels = {
-            name: values if name == "delta" else preprocess.smooth(t, values)
-            for name, values in channels.items()
-        }
-
+    channels = preprocess.smoothed_channels(trial, structure.required_channels, preprocessing)
     if samples == "spline":
         noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
         rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)

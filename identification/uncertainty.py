@@ -67,7 +67,7 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
     for trial in np.unique(samples.trial):
         rows = samples.trial == trial
         spacing = float(np.median(np.diff(samples.start[rows]))) if rows.sum() > 1 else memory
-        total += _newey_west(scores[rows], max(round(memory / spacing), 0))
+        total += newey_west(scores[rows], max(round(memory / spacing), 0))
     return 0.5 * (total + total.T)
 
 
@@ -97,7 +97,7 @@ def coefficient_covariance(acceleration_covariance: Floats, acceleration_matrix:
     return 0.5 * (covariance + covariance.T)
 
 
-def _newey_west(scores: Floats, lags: int) -> Floats:
+def newey_west(scores: Floats, lags: int) -> Floats:
     """Long-run second moment of the rows of scores, shape (n_columns, n_columns)."""
     lags = min(lags, len(scores) - 1)
     total: Floats = scores.T @ scores

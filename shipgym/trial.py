@@ -51,6 +51,10 @@ class Trial:
         Names of the channels that were not measured but computed from others.
     length : float, optional
         Length of the ship between perpendiculars, m; indices of manoeuvres are told in it.
+    repaired : mapping of str to int, optional
+        How many values of a channel were filled in, because they were missing or outliers.
+    raw : Trial, optional
+        The trial before it was smoothed or repaired.
 
     Raises
     ------
@@ -58,7 +62,7 @@ class Trial:
         For unknown channels, lengths that differ, values that are not finite, or time that goes back.
     """
 
-    __slots__ = ("_channels", "_derived", "_kind", "_length", "_name", "_t", "_use")
+    __slots__ = ("_channels", "_derived", "_kind", "_length", "_name", "_raw", "_repaired", "_t", "_use")
 
     def __init__(
         self,
@@ -70,6 +74,8 @@ class Trial:
         use: str = "fit",
         derived: Collection[str] = (),
         length: float | None = None,
+        repaired: Mapping[str, int] | None = None,
+        raw: Trial | None = None,
     ) -> None:
         self._name = check_text(name, "trial: name")
         where = f"trial '{name}'"
@@ -93,6 +99,8 @@ class Trial:
         if not self._derived <= arrays.keys():
             unknown = quoted(sorted(self._derived - arrays.keys()))
             raise InputError(f"{where}: derived: {unknown} found, expected some of {quoted(arrays)}")
+        self._repaired = dict(repaired or {})
+        self._raw = raw
 
     @property
     def t(self) -> Array:
@@ -130,6 +138,16 @@ class Trial:
         return self._length
 
     @property
+    def repaired(self) -> Mapping[str, int]:
+        """How many values were filled in, by channel, where any were."""
+        return MappingProxyType(self._repaired)
+
+    @property
+    def raw(self) -> Trial:
+        """The trial as it was recorded: before it was smoothed or repaired, itself where it was not."""
+        return self if self._raw is None else self._raw.raw
+
+    @property
     def duration(self) -> float:
         """Time from the first to the last sample, s."""
         return float(self._t[-1] - self._t[0])
@@ -155,6 +173,8 @@ class Trial:
             "use": self._use,
             "derived": self._derived,
             "length": self._length,
+            "repaired": self._repaired,
+            "raw": self._raw,
         }
         return _restore, (self._t, self._channels, settings)
 
@@ -194,7 +214,52 @@ class Trial:
             raise InputError(
                 f"trial '{self._name}': cannot change {quoted(sorted(unknown))}, only name, kind, use, length"
             )
-        return Trial(self._t, self._channels, derived=self._derived, **(settings | changes))
+        return Trial(
+            self._t,
+            self._channels,
+            derived=self._derived,
+            repaired=self._repaired,
+            raw=self._raw,
+            **(settings | changes),
+        )
+
+    def with_channels(
+        self,
+        channels: Mapping[str, npt.ArrayLike],
+        *,
+        t: npt.ArrayLike | None = None,
+        repaired: Mapping[str, int] | None = None,
+    ) -> Trial:
+        """Return a copy with some channels replaced, of which this trial is the raw one.
+
+        Parameters
+        ----------
+        channels : mapping of str to array-like of shape (n_samples,)
+            Those that change; all of them where `t` is given.
+        t : array-like of shape (n_samples,), optional
+            Other times, s.
+        repaired : mapping of str to int, optional
+            How many values were filled in, by channel, on top of those filled before.
+
+        Raises
+        ------
+        InputError
+            As for a new trial.
+        """
+        counts = dict(self._repaired)
+        for name, count in (repaired or {}).items():
+            counts[name] = counts.get(name, 0) + count
+        return Trial(
+            self._t if t is None else t,
+            {**self._channels, **channels},
+            name=self._name,
+            kind=self._kind,
+            use=self._use,
+            derived=self._derived,
+            length=self._length,
+            repaired=counts,
+            raw=self,
+        )
 
     @classmethod
     def from_csv(
@@ -254,7 +319,7 @@ class Trial:
             repair=repair,
             where=f"{path}:",
         )
-        t, channels, derived = import_csv(Path(path), columns, conventions)
+        t, channels, derived, repaired = import_csv(Path(path), columns, conventions)
         return cls(
             t,
             channels,
@@ -263,6 +328,7 @@ class Trial:
             use=use,
             derived=derived,
             length=length,
+            repaired=repaired,
         )
 
     def to_csv(self, path: str | Path) -> None:

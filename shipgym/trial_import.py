@@ -80,7 +80,7 @@ class Conventions:
 
 def import_csv(
     path: Path, columns: Mapping[str, Any] | None, conventions: Conventions
-) -> tuple[Array, dict[str, Array], frozenset[str]]:
+) -> tuple[Array, dict[str, Array], frozenset[str], dict[str, int]]:
     """Read a CSV file into channels.
 
     Parameters
@@ -100,6 +100,8 @@ def import_csv(
         In SI units, with the project's signs, in the body frame, at midship.
     derived : frozenset of str
         Channels that were computed from others.
+    repaired : dict of str to int
+        How many values were filled in, by recorded channel, where any were.
 
     Raises
     ------
@@ -110,7 +112,9 @@ def import_csv(
     chosen = choose_columns(table, columns)
     values = table.numbers([column.name for column in chosen.values()])
     source = Source(table, chosen, np.arange(len(values)))
+    missing = ~np.isfinite(values)
     values, source = _repaired(values, source, conventions.repair)
+    filled = dict(zip(chosen, missing[source.rows].sum(axis=0).tolist(), strict=True))
     recorded = {
         channel: values[:, k] * si_factor(channel, column.unit)
         for k, (channel, column) in enumerate(chosen.items())
@@ -123,7 +127,8 @@ def import_csv(
         check_heading(t, recorded["psi"], raw_psi, source)
     check_consistency(t, recorded, conventions.velocity_frame, source)
     channels, derived = to_project_conventions(t, recorded, conventions, str(path))
-    return t, {name: channels[name] for name in QUANTITIES if name in channels}, derived
+    repaired = {name: count for name, count in filled.items() if count}
+    return t, {name: channels[name] for name in QUANTITIES if name in channels}, derived, repaired
 
 
 def to_project_conventions(

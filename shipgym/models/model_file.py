@@ -8,8 +8,8 @@ Format 1:
                    [{"name", "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be
                    absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
                    [{"coefficient", "name", "powers", "sign"}, ...]}};
-                   for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether the
-                   shaft speed is known) and "reference": a reference ship, as a whole model file
+                   for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether
+                   the shaft speed is known) and "reference": a reference ship, as a whole model file
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s

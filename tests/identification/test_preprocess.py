@@ -1,10 +1,17 @@
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
 
-from identification.preprocess import _Reinsch, noise_level, smooth
+from identification import identify
+from identification.preprocess import median, noise_level, repaired, savitzky_golay, smooth, smooth_kinematics
+from identification.preprocess.kinematics import current_of
+from identification.preprocess.spline import Reinsch
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import zigzag
 
 
 def signal(noise: float, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -35,5 +42,66 @@ def test_smoothing_takes_away_more_than_half_of_the_noise() -> None:
 def test_smoothing_spline_is_that_of_scipy() -> None:
     t, _, values = signal(0.05)
     np.testing.assert_allclose(
-        _Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
+        Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
     )
+
+
+@pytest.mark.parametrize("smoother", [savitzky_golay, median])
+def test_filters_take_away_noise(smoother: Callable[..., np.ndarray]) -> None:
+    t, truth, values = signal(0.05)
+    assert np.std(smoother(t, values) - truth) < 0.75 * 0.05
+
+
+def test_median_takes_away_spikes_and_keeps_steps() -> None:
+    step = np.repeat([0.0, 1.0], 50)
+    spiked = step.copy()
+    spiked[[20, 70]] = 9.0
+    np.testing.assert_array_equal(median(np.arange(100.0), spiked), step)
+
+
+def test_savitzky_golay_keeps_cubics() -> None:
+    t = np.linspace(-1.0, 1.0, 101)
+    np.testing.assert_allclose(savitzky_golay(t, t**3 - t, 11), t**3 - t, atol=1e-12)
+
+
+def test_outliers_and_short_dropouts_are_repaired_and_told(noisy_trials: list[Trial]) -> None:
+    trial = noisy_trials[0]
+    u = trial["u"].copy()
+    u[[50, 200]] += 3.0
+    kept = np.ones(len(trial), dtype=bool)
+    kept[100:103] = False
+    wrong = Trial(trial.t[kept], {c: v[kept] for c, v in (dict(trial.channels) | {"u": u}).items()}, name="w")
+    mended = repaired(wrong)
+    assert mended.raw is wrong
+    assert mended.repaired["u"] >= 5
+    np.testing.assert_allclose(mended.t, trial.t)
+    assert np.abs(mended["u"] - trial["u"]).max() < 0.2
+    assert repaired(mended)["u"].max() < 9.0
+
+
+def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:
+    assert repaired(cao_zigzag) is cao_zigzag
+    assert cao_zigzag.raw is cao_zigzag
+
+
+def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
+    truth, noisy = record(run, 10), record(run, 10, 1.0, 5)
+    smoothed = smooth_kinematics(noisy)
+    assert smoothed.raw is noisy
+    for channel in ("psi", "r", "u", "v"):
+        before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
+        assert after < 0.7 * before
+
+
+def test_unknown_current_is_found(mariner: ShipModel, record: Callable[..., Trial]) -> None:
+    run = record(zigzag(mariner, 20, 20, duration=200, dt=0.1), 10, 0.3, 5)
+    drifted = run.with_channels({"x": run["x"] + 0.4 * run.t, "y": run["y"] - 0.7 * run.t})
+    assert current_of(drifted) == pytest.approx((0.4, -0.7), abs=0.03)
+
+
+def test_preprocessing_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    with pytest.raises(InputError, match="preprocessing: 'fourier'"):
+        identify([cao_zigzag], preprocessing="fourier", particulars=mariner.particulars)

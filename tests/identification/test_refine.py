@@ -1,0 +1,175 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import IdentificationResult, build_samples, identify
+from identification.guarded_fit import guarded_fit
+from identification.methods import get_method
+from identification.refine import Refinement, refine
+from identification.segments import Shooter, compared_channels, cut
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
+
+
+def parameters(model: ShipModel) -> np.ndarray:
+    return model.table.acceleration_matrix(model.particulars) @ np.array(list(model.coefficients.values()))
+
+
+@pytest.fixture(scope="module")
+def shooter(mariner: ShipModel, cao_zigzag: Trial) -> Shooter:
+    channels = compared_channels(mariner, [cao_zigzag])
+    return Shooter(mariner, channels, np.abs(parameters(mariner)), free=False, offsets=True)
+
+
+def test_the_ship_itself_sails_every_segment_as_recorded(
+    mariner: ShipModel, cao_zigzag: Trial, shooter: Shooter
+) -> None:
+    segments = cut([cao_zigzag], mariner, shooter.channels, 3.4, True)
+    truth = np.append(np.sign(parameters(mariner)), 0.0)
+    shooting = shooter.shoot(truth, segments, shooter.units, 1)
+    assert np.median(np.abs(shooting.residuals)) < 1e-8
+    assert np.abs(shooting.residuals).max() < 3e-4  # a corner of the rudder inside a sampling step
+
+
+def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
+    travel = mariner.particulars["length"] / mariner.particulars["speed"]
+    segments = cut([cao_zigzag], mariner, ("u", "v", "r"), 4.0, True)
+    starts = [segment.times[0] for segment in segments]
+    assert starts[0] == 0.0
+    half = starts[starts.index(0.0) + 1 :].index(min(starts[1:])) + 1
+    assert min(starts[1:]) == pytest.approx(2.0 * travel, abs=0.5)
+    assert all(segment.inputs[-1, 0] == cao_zigzag.t[-1] for segment in (segments[half - 1], segments[-1]))
+    assert sum(len(s.measured) for s in segments[:half]) == len(cao_zigzag) + half - 1
+
+
+def test_jacobian_is_that_of_central_differences(
+    mariner: ShipModel, cao_zigzag: Trial, shooter: Shooter
+) -> None:
+    two = [cao_zigzag, cao_zigzag]
+    segments = cut(two, mariner, shooter.channels, 4.0, False)[1:8:6]  # one of each trial
+    at = np.append(1.01 * np.sign(parameters(mariner)), [0.002, -0.001])
+    jacobian = shooter.shoot(at, segments, shooter.units, 2).jacobian
+    for k in (3, 12, 38, len(at) - 1):
+        step = 1e-4 * np.eye(len(at))[k]
+        ahead, behind = (shooter.shoot(at + s, segments, shooter.units, 2).residuals for s in (step, -step))
+        slope = (ahead - behind) / 2e-4
+        np.testing.assert_allclose(jacobian[:, k], slope, atol=2e-4 * np.abs(slope).max())
+
+
+def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
+    start = guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag])
+    for q, machine in start.machines.items():
+        start.machines[q] = machine
+        machine.coef_ = machine.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(machine.coef_))))
+    refined = refine(start, samples, [cao_zigzag], Refinement(prior=0.0), 20.0)
+    truth = np.array(list(mariner.coefficients.values()))
+    found = np.array(list(refined.fit.model.coefficients.values()))
+    assert np.median(np.abs(found / truth - 1.0)) < 5e-3
+    assert refined.report["cost_after"] < 1e-2 * refined.report["cost_before"]
+
+
+@pytest.fixture(scope="module")
+def refined_fits(mariner: ShipModel, record: Callable[..., Trial]) -> dict[str, list[IdentificationResult]]:
+    """Three repetitions of noisy trials, by regression and refined."""
+    runs = [
+        zigzag(mariner, a, b, duration=400, dt=0.1, port_first=a == 20)
+        for a, b in ((10, 10), (20, 20), (30, 20))
+    ]
+    fits: dict[str, list[IdentificationResult]] = {"ls": [], "output-error": []}
+    for seed in range(3):
+        trials = [record(run, 10, 1.0, 10 * seed + i, name=f"zz{i}") for i, run in enumerate(runs)]
+        for method, found in fits.items():
+            found.append(
+                identify(trials, method=method, particulars=mariner.particulars, steering=mariner.steering)
+            )
+    return fits
+
+
+def test_refined_coefficients_are_nearer_to_the_truth(
+    refined_fits: dict[str, list[IdentificationResult]], mariner: ShipModel
+) -> None:
+    truth = np.array(list(mariner.coefficients.values()))
+    errors = {
+        method: np.array([list(fit.coefficients.values()) for fit in fits]) / truth - 1.0
+        for method, fits in refined_fits.items()
+    }
+    size = {method: np.sqrt(np.mean(error**2, axis=0)) for method, error in errors.items()}
+    assert np.median(size["output-error"] / size["ls"]) < 0.8
+
+
+def test_intervals_of_a_refined_model_hold_the_truth(
+    refined_fits: dict[str, list[IdentificationResult]], mariner: ShipModel
+) -> None:
+    truth = np.array(list(mariner.coefficients.values()))
+    hits = [
+        np.abs(np.array(list(fit.coefficients.values())) - truth)
+        < 1.96 * np.array(list(fit.standard_errors.values()))
+        for fit in refined_fits["output-error"]
+    ]
+    assert np.mean(hits) > 0.88
+
+
+def test_residuals_are_those_of_the_sensors_and_the_provenance_tells(
+    refined_fits: dict[str, list[IdentificationResult]],
+) -> None:
+    for fit in refined_fits["output-error"]:
+        assert fit.stable
+        report = (fit.model.provenance or {})["refinement"]
+        noise = {"u": 0.03, "v": 0.03, "r": np.radians(0.01), "psi": np.radians(0.05)}
+        assert report["residual_rms"] == pytest.approx(noise, rel=0.1)
+        assert report["decision"] == "refined"
+        assert report["cost_after"] < report["cost_before"]
+
+
+def test_turns_given_to_the_refinement_alone_hold_the_turn(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
+    turns = [
+        record(turning_circle(mariner, side, duration=400), 10, name=f"turn{side}") for side in (35.0, -35.0)
+    ]
+    ship = {"particulars": mariner.particulars, "steering": mariner.steering}
+    free = identify(zigzags, method="output-error", **ship)  # type: ignore[arg-type]
+    held = identify(zigzags, method="output-error", extra_trials=turns, **ship)  # type: ignore[arg-type]
+    expected = turning_indices(turning_circle(mariner, 35)).tactical_diameter_lengths
+    found = [turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths for fit in (free, held)]
+    errors = [np.inf if diameter is None else abs(diameter / expected - 1.0) for diameter in found]
+    assert errors[1] < 0.02
+    assert errors[1] < errors[0]
+    report = (held.model.provenance or {})["refinement"]
+    assert [trial["name"] for trial in report["extra_trials"]] == ["turn35.0", "turn-35.0"]
+
+
+def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
+    start = replace(guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag]), stable=False)
+    kept = refine(start, samples, [cao_zigzag], Refinement(), 20.0)
+    assert kept.fit is start
+    assert kept.report["decision"] == "not refined: the start runs away"
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"segment_lengths": 0.0}, "segment_lengths: 0"),
+        ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
+        ({"prior": -1.0}, "prior: -1"),
+        ({"extra_weight": float("nan")}, "extra_weight: nan"),
+    ],
+)
+def test_wrong_settings_are_refused(settings: dict[str, object], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Refinement(**settings)  # type: ignore[arg-type]
+
+
+def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    lacking = Trial(cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking")
+    with pytest.raises(InputError, match="extra trial 'lacking': channel 'v' is missing"):
+        identify([cao_zigzag], method="output-error", particulars=mariner.particulars, extra_trials=[lacking])
