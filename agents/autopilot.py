@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verification
-from agents.concerns import why_unstable
 from agents.output import check_folder, whole_folder
 from agents.spread import manoeuvre_spread
 from identification import IdentificationResult, identify
+from identification.concerns import why_unstable
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json

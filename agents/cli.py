@@ -17,8 +17,6 @@ import typer
 P = ParamSpec("P")
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
-MODEL_FILES = ("model.json", "metrics.json")
-
 app = typer.Typer(
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
     no_args_is_help=True,
@@ -91,29 +89,32 @@ def shipgym_command(
 @answered
 def identify_command(
     ship: ShipFileArgument,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for model.json and metrics.json.")],
+    out: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Folder for model, metrics, settings and report.")
+    ],
     structure: Structure = None,
     method: Method = None,
     samples: Samples = None,
     as_json: Json = False,
 ) -> None:
-    """Identify a manoeuvring model from recorded trials; write model.json and metrics.json.
+    """Identify a manoeuvring model from recorded trials; write model, metrics, settings and report.
 
     Exits with 1 if the identified model is unstable.
     """
     from agents.autopilot import identification_settings, identify_ship
-    from agents.concerns import concerns, why_unstable
     from agents.output import check_folder, whole_folder
     from agents.terminal import err, prediction_table, print_json, warn
     from agents.terminal import out as console
+    from identification.concerns import concerns, why_unstable
+    from identification.result import FILES
     from shipgym.ship_file import ShipFile
 
-    check_folder(out, MODEL_FILES)
+    check_folder(out, FILES)
     read = ShipFile.load(ship)
     chosen = identification_settings(read, structure, method, samples)
     with err.status("identifying"):
         result = identify_ship(read, read.trials(), chosen)
-    with whole_folder(out, MODEL_FILES) as draft:
+    with whole_folder(out, FILES) as draft:
         result.save(draft)
     instability = why_unstable(result)
     if as_json:
@@ -122,7 +123,7 @@ def identify_command(
         if instability is None:
             console.print(result.summary(), markup=False, soft_wrap=True)
             console.print(prediction_table(result))
-        console.print(f"\nwritten: {out / 'model.json'}, {out / 'metrics.json'}", soft_wrap=True)
+        console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     if instability is not None:
         _fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
     for concern in concerns(result):
@@ -194,7 +195,6 @@ def autopilot_command(
     Exits with 1 if the identified model is unstable; the report then says so.
     """
     from agents.autopilot import build_autopilot
-    from agents.concerns import concerns
     from agents.terminal import (
         criteria_table,
         prediction_table,
@@ -204,6 +204,7 @@ def autopilot_command(
         warn,
     )
     from agents.terminal import out as console
+    from identification.concerns import concerns
 
     with progress_bars(not as_json) as progress:
         result = build_autopilot(

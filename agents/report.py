@@ -2,38 +2,30 @@
 
 from __future__ import annotations
 
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import shipgym
-from agents.concerns import concerns
 from agents.report_figures import CRITERIA
-from agents.report_sections import (
-    coefficients_section,
-    data_section,
-    prediction_section,
-    ship_tables,
-    trials_table,
-)
 from agents.report_verification import (
     autopilots_section,
     manoeuvres_section,
     ranking_section,
 )
+from identification.report.coefficients import coefficients_section
+from identification.report.facts import concerns_list, data_card, quality_card, remedy_section, ship_card
+from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
 from shipgym.pages import (
     NONE,
     Html,
     card,
     cards,
     header,
-    html,
-    join,
     note,
     number,
     page,
-    paragraph,
     percent,
     section,
     table,
@@ -83,9 +75,9 @@ def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]
     return {
         "header": top(result),
         "verdict": verdict(result, found),
-        "data": data_section(result),
-        "coefficients": coefficients_section(result),
-        "prediction": prediction_section(result),
+        "data": data_section(result.identification),
+        "coefficients": coefficients_section(result.identification),
+        "prediction": prediction_section(result.identification),
         "manoeuvres": manoeuvres_section(result, found),
         "autopilots": autopilots_section(result, found),
         "ranking": ranking_section(found),
@@ -95,29 +87,16 @@ def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]
 
 def unstable_body(result: AutopilotResult) -> dict[str, Html]:
     """What can be said of an unstable model: that it is, and what to do; no numbers of its own."""
+    identification = result.identification
     headline = (
         f"The identified model is unstable: {result.instability}. It must not be used, and no coefficients, "
         "predictions, manoeuvres or autopilots are given."
     )
-    advice = section(
-        "remedy",
-        "What to do",
-        paragraph(
-            "An unstable fit usually means that the trials do not hold enough: manoeuvres with other "
-            "rudder angles and to the other side, a turning circle, more samples. Or that the data is not "
-            "what the ship file says: check the signs of the rudder and of sway and yaw, the units, and "
-            "whether the velocities are those of midship."
-        ),
-        paragraph(
-            "A simpler structure, or the default method with its guard against models that run away, may "
-            "hold as well."
-        ),
-    )
-    data = section("data", "Data", trials_table(result), ship_tables(result))
+    data = section("data", "Data", trials_table(result.identification), ship_tables(result.identification))
     return {
         "header": top(result),
-        "verdict": box(headline, "bad", cards(ship_card(result), data_card(result))),
-        "remedy": advice,
+        "verdict": box(headline, "bad", cards(ship_card(identification), data_card(identification))),
+        "remedy": remedy_section(),
         "data": data,
         "origin": origin_section(result),
     }
@@ -172,9 +151,9 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
     )
     lost = bool(np.any(best.flights.terminated))
     facts = [
-        ship_card(result),
-        data_card(result),
-        quality_card(result),
+        ship_card(result.identification),
+        data_card(result.identification),
+        quality_card(result.identification),
         imo_card(found),
         card(
             "Best autopilot",
@@ -186,56 +165,11 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
             ),
         ),
     ]
-    return box(headline(found), "warn" if doubts or lost else "good", cards(*facts), concerns_list(result))
-
-
-def concerns_list(result: AutopilotResult) -> Html:
-    """What has to be known before the model is used."""
-    items = join(
-        Html(f"<li>{html(text[0].upper() + text[1:])}.</li>") for text in concerns(result.identification)
-    )
-    return Html(f'<ul class="concerns">{items}</ul>' if items else "")
-
-
-def ship_card(result: AutopilotResult) -> Html:
-    """Size and speed."""
-    ship = result.model.particulars
-    return card(
-        "Ship",
-        f"L = {ship['length']:.4g} m",
-        Html(f"service speed {number(ship['speed'], 3)} m/s, mass {number(ship['mass'] / 1000.0, 3)} t"),
-    )
-
-
-def data_card(result: AutopilotResult) -> Html:
-    """How many trials."""
-    uses = [trial.use for trial in result.trials]
-    samples = sum(len(trial) for trial in result.trials)
-    minutes = sum(trial.duration for trial in result.trials) / 60.0
-    return card(
-        "Data",
-        f"{uses.count('fit')} trials to fit",
-        Html(f"{uses.count('validate')} to validate; {samples} samples, {number(minutes, 2)} min"),
-    )
-
-
-def quality_card(result: AutopilotResult) -> Html:
-    """Heading error on the trials that were not fitted, else on those that were."""
-    trials = result.identification.metrics["trials"]
-    unseen = {name: metrics for name, metrics in trials.items() if metrics["use"] == "validate"}
-    errors = {
-        name: float(np.degrees(metrics["rmse"]["psi"]))
-        for name, metrics in (unseen or trials).items()
-        if metrics["rmse"]["psi"] is not None
-    }
-    if not errors:
-        return card("Prediction", NONE, "no heading was measured")
-    worst = max(errors, key=lambda name: errors[name])
-    which = "trials not fitted" if unseen else "fitted trials, none to validate"
-    return card(
-        "Prediction",
-        f"{np.median(list(errors.values())):.1f}°",
-        f"heading rmse, median of {which}; largest {errors[worst]:.1f}° ({PurePath(worst).name})",
+    return box(
+        headline(found),
+        "warn" if doubts or lost else "good",
+        cards(*facts),
+        concerns_list(result.identification),
     )
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import tomllib
 from collections.abc import Mapping
@@ -10,13 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.columns import parse_columns
 from shipgym.csv_reader import check_readable, read_bytes
 from shipgym.errors import InputError
 from shipgym.particulars import Particulars
+from shipgym.plausibility import check_scale
 from shipgym.steering import SteeringGear
 from shipgym.trial import KINDS, USES, Trial
 from shipgym.trial_import import Conventions
@@ -25,9 +23,6 @@ _SECTIONS = ("ship", "steering", "columns", "conventions", "identify", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
 _IDENTIFY = ("structure", "method", "samples", "reference_model")
 _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
-
-_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
-_FASTEST_TIP = 100.0  # m/s at the propeller's tip
 
 
 @dataclass(frozen=True)
@@ -174,7 +169,7 @@ class ShipFile:
             )
         except InputError as error:
             raise InputError(f"{entry.where}: {error}") from None
-        _check_scale(trial, self.particulars, entry)
+        check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
         return trial
 
 
@@ -254,27 +249,3 @@ def _entry(
 
 def _conventions(words: Mapping[str, Any], particulars: Particulars, where: str) -> Conventions:
     return Conventions(**words, xg=particulars.xg, where=where)
-
-
-def _check_scale(trial: Trial, particulars: Particulars, entry: TrialEntry) -> None:
-    """Refuse what no ship of this size does: |r| L / U, and the speed of the propeller's tip."""
-    head = f"{entry.where}: {entry.path}"
-    if "r" in trial and "u" in trial:
-        fastest = float(np.abs(trial["r"]).max())
-        speed = float(np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))).max())
-        limit = _FASTEST_TURN_PRIME * speed / particulars.length
-        if fastest > limit:
-            raise InputError(
-                f"{head}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
-                f"expected at most {math.degrees(limit):.4g} deg/s for a length of {particulars.length:g} m; "
-                "likely a wrong unit of r, psi, u or v in [columns], or of [ship] length"
-            )
-    diameter = particulars.propeller_diameter
-    if "n" in trial and diameter is not None:
-        fastest, limit = float(np.abs(trial["n"]).max()), _FASTEST_TIP / (math.pi * diameter)
-        if fastest > limit:
-            raise InputError(
-                f"{head}: shaft speed up to {fastest:.4g} rps found, expected at most {limit:.4g} rps for a "
-                f"propeller of {diameter:g} m; likely a wrong unit: "
-                'declare n = { column = "...", unit = "rpm" } in [columns]'
-            )
