@@ -13,6 +13,7 @@ from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.columns import parse_columns
 from shipgym.csv_reader import check_readable, read_bytes
 from shipgym.errors import InputError
+from shipgym.identify_table import check_options
 from shipgym.particulars import Particulars
 from shipgym.plausibility import check_scale
 from shipgym.steering import SteeringGear
@@ -21,7 +22,6 @@ from shipgym.trial_import import Conventions
 
 _SECTIONS = ("ship", "steering", "columns", "conventions", "identify", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
-_IDENTIFY = ("structure", "method", "samples", "reference_model")
 _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
 
 
@@ -68,8 +68,8 @@ class ShipFile:
         As given; ``particulars.completed()`` estimates the rest.
     steering : SteeringGear or None
         None where the file has no ``[steering]``.
-    identify : dict of str to str
-        Defaults for the identification: any of ``structure``, ``method``, ``samples``, ``reference_model``.
+    identify : dict
+        Defaults for the identification, by the names of :data:`shipgym.identify_table.OPTIONS`.
     entries : tuple of TrialEntry
         The trials, not read yet.
     """
@@ -77,7 +77,7 @@ class ShipFile:
     path: Path
     particulars: Particulars
     steering: SteeringGear | None
-    identify: dict[str, str]
+    identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]
 
     @classmethod
@@ -109,11 +109,8 @@ class ShipFile:
         steering = (
             SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
         )
-        identify = check_table(data.get("identify", {}), f"{path}: [identify]")
-        check_keys(identify, _IDENTIFY, f"{path}: [identify]")
-        for key, value in identify.items():
-            check_text(value, f"{path}: [identify] {key}")
-        return cls(path, particulars, steering, dict(identify), _entries(path, data, particulars))
+        identify = check_options(data.get("identify", {}), f"{path}: [identify]")
+        return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:
         """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
@@ -150,6 +147,23 @@ class ShipFile:
             check_choice(use, USES, f"{self.path}: trials(use)")
         wanted = [e for e in self.entries if (e.use == use if use is not None else e.use != "skip")]
         return [self._read(entry) for entry in wanted]
+
+    def trial(self, file: str) -> Trial:
+        """Read one trial, whatever its use.
+
+        Parameters
+        ----------
+        file : str
+            As written in the ship file.
+
+        Raises
+        ------
+        InputError
+            If no trial has that file, and for anything wrong with it.
+        """
+        files = [entry.file for entry in self.entries]
+        check_choice(file, files, f"{self.path}: trial")
+        return self._read(self.entries[files.index(file)])
 
     def _read(self, entry: TrialEntry) -> Trial:
         c = entry.conventions
