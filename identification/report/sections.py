@@ -275,7 +275,7 @@ def indices_text(metrics: Mapping[str, Any]) -> Html:
         for name, (text, unit) in INDICES.items()
         if metrics.get(name) is not None
     ]
-    return Html(f'<span class="sub">{"<br>".join(lines) or NONE}</span>')
+    return Html(f'<span class="sub" style="white-space:nowrap">{"<br>".join(lines) or NONE}</span>')
 
 
 def _degrees(value: float | None) -> float | None:
