@@ -102,7 +102,9 @@ def _table(title: str, values: Mapping[str, float], errors: Mapping[str, float],
 
 
 def _t(value: float, error: float) -> float:
-    return abs(value / error) if error > 0.0 else np.inf
+    if error > 0.0:
+        return abs(value / error)
+    return np.inf if value else 0.0
 
 
 def estimated_note(result: IdentificationResult) -> Html:

@@ -208,15 +208,18 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
 
 def search_figure(result: IdentificationResult) -> Figure:
     """What a search had found after each of its rounds: the objective, and the weight C of the errors."""
-    courses = {q: s.course[:, 0] for q, s in result.searches.items() if isinstance(s, SearchResult)}
+    searches = {EQUATIONS.get(q, q): search for q, search in result.searches.items()}
+    if len({id(search) for search in searches.values()}) == 1:  # one for all
+        searches = {"all equations": next(iter(searches.values()))}
+    courses = {q: s.course[:, 0] for q, s in searches.items() if isinstance(s, SearchResult)}
     titles = ["best objective, by its last", *(["best C"] if courses else [])]
     figure = subplots(1, len(titles), titles=titles, horizontal_spacing=0.1)
-    for (q, search), colour in zip(result.searches.items(), PALETTE, strict=False):
+    for (name, search), colour in zip(searches.items(), PALETTE, strict=False):
         history = np.asarray(search.history) / (search.value if search.value > 0.0 else 1.0)
-        rounds, name = np.arange(len(history)), EQUATIONS.get(q, q)
+        rounds = np.arange(len(history))
         figure.add_trace(line(rounds, history, name, colour), row=1, col=1)
-        if q in courses:
-            found = 10.0 ** courses[q]
+        if name in courses:
+            found = 10.0 ** courses[name]
             figure.add_trace(line(rounds, found, name, colour, showlegend=False), row=1, col=2)
     for column in range(1, len(titles) + 1):
         figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
@@ -242,7 +245,7 @@ def coefficients_figure(result: IdentificationResult) -> Figure:
     for column in range(columns):
         part = slice(column * rows, (column + 1) * rows)
         for sure, name, colour in ((True, "told from 0", MODEL), (False, "not told from 0", "#b3bcc7")):
-            own = np.flatnonzero((half[part] < 1.0) == sure)
+            own = np.flatnonzero(((half < 1.0) & (values != 0.0))[part] == sure)
             centre = np.sign(values[part][own]) ** 2
             low, high = (np.clip(centre + side * half[part][own], *SHOWN) for side in (-1.0, 1.0))
             figure.add_trace(
