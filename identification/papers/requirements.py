@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from identification.lssvm import LSSVM
 from identification.papers.row import Paper, Requirement, Row
-from identification.pipeline import IdentificationResult, identify
+from identification.pipeline import identify
+from identification.result import IdentificationResult
 from identification.samples import Samples, build_samples
 from identification.tuning import TunedLSSVM
 from identification.tuning.objectives import held_out_error, time_blocks
