@@ -12,6 +12,7 @@ from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from shipgym import manoeuvres, plots, towing_tank, weather
+    from shipgym.envs.checker import check_vector_env
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
@@ -41,6 +42,7 @@ _HOME = {
     "Weather": "shipgym.weather.conditions",
     "Wind": "shipgym.weather.conditions",
     "check_ship_model": "shipgym.models.checker",
+    "check_vector_env": "shipgym.envs.checker",
     "list_models": "shipgym.models",
     "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
@@ -68,6 +70,7 @@ __all__ = [
     "Weather",
     "Wind",
     "check_ship_model",
+    "check_vector_env",
     "list_models",
     "list_structures",
     "load_model",
