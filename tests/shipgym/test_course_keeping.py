@@ -17,9 +17,9 @@ from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import (
     OBSERVATION_NAMES,
     CourseKeepingTask,
-    control_interval,
     observation_scales,
 )
+from shipgym.envs.task import control_interval
 from shipgym.models import Envelope
 
 ID = "shipgym/CourseKeeping-v0"
@@ -208,9 +208,11 @@ def test_each_lane_of_a_batch_is_the_single_environment(mariner):
         assert rewards[lane] == reward
 
 
-def test_a_model_found_unstable_is_said_to_be(mariner):
-    with pytest.warns(UserWarning, match="found unstable when it was identified"):
-        make(model=replace(mariner, provenance={"stable": False}))
+def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
+    unstable = replace(mariner, provenance={"stable": False})
+    with pytest.raises(InputError, match="found unstable when it was identified"):
+        make(model=unstable)
+    make(model=unstable, allow_unstable=True).reset(seed=0)
 
 
 def test_a_finished_lane_stays_and_earns_nothing(mariner):
