@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from agents import output
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
 from shipgym.manoeuvres.imo import judge_imo
@@ -19,7 +21,7 @@ from shipgym.trial import Trial
 from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
-    from agents.report_html import Html
+    from shipgym.pages import Html
 
 HISTORIES = ("psi", "delta", "r", "speed", "drift")
 #: Sections of the page, and how the names of their manoeuvres begin.
@@ -29,6 +31,14 @@ SECTIONS: dict[str, str | tuple[str, ...]] = {
     "spirals": ("direct spiral", "reverse spiral"),
     "pull-outs": "pull-out",
     "stops": ("inertia stop", "crash stop", "acceleration"),
+}
+TITLES = {
+    "imo": "IMO criteria",
+    "zigzags": "Zigzags",
+    "circles": "Turning circles",
+    "spirals": "Spirals",
+    "pull-outs": "Pull-outs",
+    "stops": "Stopping and acceleration",
 }
 CAPTIONS = {
     "zigzag": "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed.",
@@ -52,11 +62,13 @@ class StandardTrials:
     indices : dict of str to dict of str to IndexInterval
         By manoeuvre and index, units in the names.
     criteria : dict of str to Criterion
-        The criteria of IMO resolution MSC.137(76).
+        The criteria of IMO resolution MSC.137(76); none in shallow water, which they are not made for.
     refused : dict of str to str
         Why a manoeuvre could not be sailed.
     draws : int
         Models drawn.
+    water_depth : float
+        m.
     """
 
     sailed: dict[str, Trial | Spiral]
@@ -64,11 +76,18 @@ class StandardTrials:
     criteria: dict[str, Criterion]
     refused: dict[str, str]
     draws: int
+    water_depth: float = np.inf
+
+    @property
+    def water(self) -> str:
+        """Where they were sailed, in words."""
+        return water_in_words(self.water_depth)
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` prints it."""
         return {
             "draws": self.draws,
+            "water_depth": None if np.isinf(self.water_depth) else self.water_depth,
             "manoeuvres": {
                 name: {index: found.to_dict() for index, found in indices.items()}
                 for name, indices in self.indices.items()
@@ -79,7 +98,11 @@ class StandardTrials:
 
 
 def standard_trials(
-    model: ShipModel, draws: int = 0, seed: int = 0, progress: Callable[[int], None] | None = None
+    model: ShipModel,
+    draws: int = 0,
+    seed: int = 0,
+    progress: Callable[[int], None] | None = None,
+    water_depth: float = np.inf,
 ) -> StandardTrials:
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
@@ -93,13 +116,17 @@ def standard_trials(
         Of the draws.
     progress : callable, optional
         Told the number of draws done.
+    water_depth : float
+        m, for ships that know shallow water.
 
     Raises
     ------
+    InputError
+        For water that is too shallow, or shallow water in a ship that knows none.
     UnstableModelError
         If the ship itself runs away.
     """
-    manoeuvres = standard_manoeuvres(model)
+    manoeuvres = standard_manoeuvres(model, water_depth)
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
@@ -113,7 +140,13 @@ def standard_trials(
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
     judged = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
     found = intervals_of(own, drawn, judged, progress)
-    return StandardTrials(sailed, found, judge_imo(model, found), refused, len(drawn))
+    criteria = judge_imo(model, found) if np.isinf(water_depth) else {}
+    return StandardTrials(sailed, found, criteria, refused, len(drawn), water_depth)
+
+
+def water_in_words(water_depth: float) -> str:
+    """Say that the water is deep, or how deep it is."""
+    return "deep water" if np.isinf(water_depth) else f"water of {water_depth:g} m"
 
 
 def check_page(path: Path) -> None:
@@ -125,39 +158,29 @@ def check_page(path: Path) -> None:
         If plotly is missing, the ending is not .html, or the folder cannot be written.
     """
     graph_objects()
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write the figures to")
-    if not path.absolute().parent.is_dir() or not os.access(path.absolute().parent, os.W_OK):
-        raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")
+    output.check_page(path)
 
 
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
-    from agents.report import page
+    from shipgym.pages import page
 
-    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found)), path)
+    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found), TITLES), path)
 
 
 def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
     """The sections of the page."""
-    from agents.report import TITLES
-    from agents.report_html import Html, html, section
+    from shipgym.pages import header, section
 
     drawn = f" Intervals: 95 % of {found.draws} models drawn from its covariance." if found.draws else ""
     ship = model.particulars
     lead = (
-        f"Simulated from service speed, {ship['speed']:.4g} m/s, in deep water; "
+        f"Simulated from service speed, {ship['speed']:.4g} m/s, in {found.water}; "
         f"ship length {ship['length']:.5g} m.{drawn}"
     )
-    body = {
-        "header": Html(
-            f"<header><p class=kicker>Standard manoeuvres</p><h1>{html(model.name)}</h1>"
-            f"<p class=lead>{html(lead)}</p></header>"
-        ),
-        "imo": section("imo", TITLES["imo"], _criteria(found.criteria)),
-    }
+    body = {"header": header("Standard manoeuvres", model.name, lead)}
+    if found.criteria:
+        body["imo"] = section("imo", TITLES["imo"], _criteria(found.criteria))
     for name, start in SECTIONS.items():
         chosen = [key for key in found.indices if key.startswith(start)]
         if chosen:
@@ -168,7 +191,7 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
 def _criteria(criteria: Mapping[str, Criterion]) -> Html:
     """The table of criteria."""
     from agents.report_figures import CRITERIA
-    from agents.report_html import NONE, Html, badge, fixed, html, percent, table
+    from shipgym.pages import NONE, Html, badge, fixed, html, percent, table
 
     rows = []
     for name, criterion in criteria.items():
@@ -193,14 +216,14 @@ def _criteria(criteria: Mapping[str, Criterion]) -> Html:
 
 
 def _interval(interval: tuple[float, float] | None) -> Html:
-    from agents.report_html import NONE, Html, fixed
+    from shipgym.pages import NONE, Html, fixed
 
     return Html(NONE) if interval is None else Html(f"{fixed(interval[0], 2)} to {fixed(interval[1], 2)}")
 
 
 def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
     """Indices and figures of one family of manoeuvres."""
-    from agents.report_html import figure, note
+    from shipgym.pages import figure, note
 
     parts = [_indices(chosen, found)]
     parts += [note(f"{key}: {found.refused[key]}", "warn") for key in chosen if key in found.refused]
@@ -230,7 +253,7 @@ def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
 
 def _indices(chosen: list[str], found: StandardTrials) -> Html:
     """One row for each index, one column for each manoeuvre."""
-    from agents.report_html import Html, fixed, table
+    from shipgym.pages import Html, fixed, table
 
     def cell(index: IndexInterval) -> Html:
         lost = index.n_ran_away + index.n_never_reached

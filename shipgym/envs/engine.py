@@ -11,6 +11,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shipgym.envs.stability import refuse_unstable
 from shipgym.envs.task import Task
 from shipgym.envs.variety import SmallFleet, Variety
 from shipgym.errors import InputError
@@ -79,8 +80,7 @@ class Engine:
         if len(fleet) not in (1, num_envs):
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
         self.model = fleet[0]
-        for model in {id(model): model for model in fleet}.values():
-            _check_stable(model, allow_unstable)
+        refuse_unstable(fleet, allow_unstable)
         if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
         task.check_fits(self.model)
@@ -260,7 +260,7 @@ class Engine:
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
 
     def physical_state(self) -> dict[str, Floats]:
-        """State, course to steer and, unless it is calm, the weather, SI units, each of shape (num_envs,).
+        """State, course, commands and, unless it is calm, the weather, SI units, each of shape (num_envs,).
 
         Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
         the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
@@ -271,6 +271,9 @@ class Engine:
             for name, row in zip(self.model.state_names, self.model.kernel_names, strict=True)
         }
         state["set_point"] = self.outcome(rows.COURSE)
+        state["delta_command"] = self.outcome(rows.RUDDER_COMMAND) * self._ship_row(layout.RUDDER_LIMIT)
+        if "n" in self.model.command_names:
+            state["n_command"] = self.outcome(rows.SHAFT_COMMAND) * self._ship_row(layout.SERVICE_SHAFT)
         return {**state, **self._weather_now()} if self.windy else state
 
     def _weather_now(self) -> dict[str, Floats]:
@@ -333,14 +336,6 @@ def episode_key(random: np.random.Generator) -> int:
 def _check_count(count: Any, name: str) -> None:
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InputError(f"{name}: {count!r} found, expected a whole number of at least 1")
-
-
-def _check_stable(model: ShipModel, allow_unstable: bool) -> None:
-    if (model.provenance or {}).get("stable") is False and not allow_unstable:
-        raise InputError(
-            f"model {model.name!r} was found unstable when it was identified: it runs away in hard turns, do "
-            "not trust what is learned or tuned on it. To use it all the same say allow_unstable=True"
-        )
 
 
 def _ship_columns(own: SmallFleet, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:

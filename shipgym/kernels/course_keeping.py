@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import fabs, floor, pi
 from typing import Any
 
-from .compiling import inlined, rare
+from .compiling import exact, inlined, rare
 from .layout import LANES, PSI
 from .voyage import draw, gather, prices, settle, strain
 from .voyage_rows import (
@@ -57,7 +57,7 @@ def is_due(state: Any, settings: Any, ship: Any, lane: int) -> bool:
     return (state[STEPS + lane] >= state[NEXT_CHANGE + lane]) & (state[ENDED + lane] == 0.0)
 
 
-@inlined
+@exact
 def judge(state: Any, settings: Any, ship: Any, lanes: int) -> None:
     """The classical steering cost, and whether the episode is over."""
     largest = settings[LARGEST_ERROR]
@@ -72,11 +72,11 @@ def judge(state: Any, settings: Any, ship: Any, lanes: int) -> None:
         settle(state, price, fabs(error) > largest, False, cost, worst, lane)
 
 
-@inlined
+@exact
 def misread(state: Any, settings: Any, ship: Any, lane: int) -> None:
     """A set-point is not read from instruments."""
 
 
-@inlined
+@exact
 def look(state: Any, settings: Any, ship: Any, lanes: int) -> None:
     """Nothing beyond what every autopilot sees."""

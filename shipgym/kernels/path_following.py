@@ -9,7 +9,7 @@ from math import fabs, pi, sqrt
 from typing import Any
 
 from .accelerations import ROLL
-from .compiling import inlined, pick, rare
+from .compiling import exact, inlined, pick, rare
 from .layout import LANES, LENGTH, PHI, PSI, SCALE_SPEED, U, V, X, Y, offsets
 from .motion import clip, kinematics
 from .trigonometry import arctan2, sin_cos, wrap
@@ -108,7 +108,7 @@ def set_out(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: An
     state[IN_CORRIDOR + lane] = 1.0
 
 
-@inlined
+@exact
 def steer(state: Any, lookahead: float, ship: Any, lane: int) -> float:
     """Course to the point of the leg `lookahead` ship lengths ahead; returns the way run on the leg, m."""
     north, east = state[X + lane] - state[LEG_NORTH + lane], state[Y + lane] - state[LEG_EAST + lane]
@@ -120,7 +120,7 @@ def steer(state: Any, lookahead: float, ship: Any, lane: int) -> float:
     return along
 
 
-@inlined
+@exact
 def judge(state: Any, settings: Any, ship: Any, lanes: int) -> None:
     """Costs of being off the path and of making less way along it than at service speed, and the end.
 
@@ -169,7 +169,7 @@ def turn(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: Any) 
     state[SAILED + lane] = state[BEFORE + lane] + clip(along, 0.0, state[LEG_LENGTH + lane])
 
 
-@inlined
+@exact
 def misread(state: Any, settings: Any, ship: Any, lane: int) -> None:
     """By how much the course to steer differs when it is worked out from the position as read."""
     cosine, sine = state[LEG_COSINE + lane], state[LEG_SINE + lane]
@@ -178,7 +178,7 @@ def misread(state: Any, settings: Any, ship: Any, lane: int) -> None:
     state[MISREAD_COURSE + lane] = course - state[COURSE + lane]
 
 
-@inlined
+@exact
 def look(state: Any, settings: Any, ship: Any, lanes: int) -> None:
     """Distance from the path, course over ground against that to steer, and the turn ahead."""
     per_corridor = 1.0 / settings[CORRIDOR]

@@ -13,7 +13,7 @@ import numpy as np
 
 from . import accelerations as equations
 from .accelerations import ROLL, SHAFT
-from .compiling import inlined, pick, rare
+from .compiling import exact, inlined, pick, rare
 from .envelope import envelope_distance, outside_range
 from .layout import (
     DELTA,
@@ -32,7 +32,7 @@ from .layout import (
     X,
     Y,
 )
-from .motion import CALM, Push, clip, runge_kutta, runs_away
+from .motion import CALM, Push, capsizes, clip, runge_kutta, runs_away
 from .random import stream, uniform
 from .trigonometry import wrap
 from .voyage_rows import (
@@ -152,6 +152,8 @@ def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
         shaft = state[SHAFT_COMMAND + lane] * ship[SERVICE_SHAFT + lane]
         new = runge_kutta(old, rudder, shaft, h, pushed(state, lane), ship, lane)
         away = runs_away(new[3], new[4], new[5], ship, lane)
+        if ROLL:
+            away = away | capsizes(new[7])
         stays = away | (state[ENDED + lane] != 0.0)
         state[X + lane] = pick(stays, old[0], new[0])
         state[Y + lane] = pick(stays, old[1], new[1])
@@ -184,7 +186,7 @@ def voyage(state: Any, words: Any, interval: float, substeps: int, ship: Any, la
                 evolve(state[PSI + lane], state[U + lane], state[V + lane], h, over, state, words, ship, lane)
 
 
-@inlined
+@exact
 def prices(settings: Any) -> Prices:
     """What `gather`, `strain` and `settle` read of the settings, read once and not in every lane."""
     per_scale, per_heel = 1.0 / settings[HEADING_SCALE], 1.0 / settings[ROLL_SCALE]
@@ -201,7 +203,7 @@ def prices(settings: Any) -> Prices:
     )
 
 
-@inlined
+@exact
 def gather(state: Any, price: Prices, ship: Any, lane: int) -> float:
     """Heading error, rad; its integral grows only while it is small and the episode is not over."""
     dt, zone, lengths = price[0], price[1], price[2]
@@ -213,7 +215,7 @@ def gather(state: Any, price: Prices, ship: Any, lane: int) -> float:
     return error
 
 
-@inlined
+@exact
 def strain(state: Any, price: Prices, ship: Any, lane: int) -> float:
     """Cost of rudder, rudder rate and heel, and of being where the model extrapolates."""
     u, v, r, delta = state[U + lane], state[V + lane], state[R + lane], state[DELTA + lane]
@@ -237,7 +239,7 @@ def strain(state: Any, price: Prices, ship: Any, lane: int) -> float:
     return rudder_cost + rate_cost + heel_cost + envelope_cost
 
 
-@inlined
+@exact
 def settle(
     state: Any, price: Prices, lost: bool, arrived: bool, cost: float, worst: float, lane: int
 ) -> None:

@@ -71,7 +71,8 @@ def test_identify_writes_model_and_metrics(demo, tmp_path):
     assert "N_vvr" in answer.stdout
     assert "zigzag_15_15.csv" in answer.stdout
     assert "estimated, not given in the ship file: N_rdot" in answer.stderr
-    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == ["metrics.json", "model.json"]
+    names = ["metrics.json", "model.json", "report.html", "settings.json"]
+    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     assert load_model(tmp_path / "ship" / "model.json").coefficients["N_d"] > 0.0
     metrics = json.loads((tmp_path / "ship" / "metrics.json").read_text())
     assert metrics["trials"]["zigzag_15_15.csv"]["use"] == "validate"
@@ -214,3 +215,16 @@ def test_a_wrong_file_gives_no_traceback_from_the_shell(tmp_path):
     assert answer.returncode == 2
     assert "Traceback" not in answer.stderr
     assert answer.stderr.count("\n") == 1
+
+
+def test_trials_in_shallow_water():
+    answer = shipgym("trials", "tanker", "--depth", 25, "--json")
+    found = json.loads(answer.stdout)
+    assert found["water_depth"] == 25.0
+    assert found["imo"] == {}  # the criteria are made for deep water
+    turn = found["manoeuvres"]["turning circle 35 deg to starboard"]
+    assert turn["tactical_diameter_lengths"]["value"] > 3.5
+    for name, depth, said in (("tanker", 18, "draught of 18.46 m"), ("mariner", 30, "deep-water model")):
+        answer = shipgym("trials", name, "--depth", depth)
+        assert answer.exit_code == 2
+        assert said in answer.stderr

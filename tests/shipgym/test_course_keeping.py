@@ -209,10 +209,13 @@ def test_each_lane_of_a_batch_is_the_single_environment(mariner):
 
 
 def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
-    unstable = replace(mariner, provenance={"stable": False})
-    with pytest.raises(InputError, match="found unstable when it was identified"):
-        make(model=unstable)
-    make(model=unstable, allow_unstable=True).reset(seed=0)
+    marked = replace(mariner, provenance={"stable": False})
+    with pytest.raises(InputError, match=r"'mariner' was found unstable.*allow_unstable=True"):
+        make(model=marked)
+    with pytest.raises(InputError, match="was found unstable"):
+        CourseKeepingEngine([mariner, marked], 2)
+    with pytest.warns(UserWarning, match="found unstable when it was identified"):
+        make(model=marked, allow_unstable=True)
 
 
 def test_a_finished_lane_stays_and_earns_nothing(mariner):

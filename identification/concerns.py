@@ -6,7 +6,8 @@ from pathlib import PurePath
 
 import numpy as np
 
-from identification import IdentificationResult
+from identification.result import IdentificationResult
+from identification.summary import exactly_collinear
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable, steering_state_space
@@ -18,7 +19,8 @@ def why_unstable(identification: IdentificationResult) -> str | None:
     """Why an identified model must not be used, in one sentence; None where it is stable."""
     ran_away = [name for name, prediction in identification.predictions.items() if prediction is None]
     if ran_away:
-        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {ran_away[0]} first"
+        first = PurePath(ran_away[0]).name
+        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {first} first"
     if not identification.stable:
         guard = (identification.model.provenance or {}).get("guard", {})
         reasons = guard.get("rejected", ["in a standard manoeuvre"])
@@ -53,6 +55,7 @@ def concerns(identification: IdentificationResult) -> list[str]:
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
             "held back; predictions far from the recorded manoeuvres deserve caution"
         )
+    found += exactly_collinear(identification)
     lost = {
         name: float(np.degrees(metrics["rmse"]["psi"]))
         for name, metrics in identification.metrics["trials"].items()
