@@ -14,10 +14,12 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.models import ShipModel, load_model
 from shipgym.models.structures import Structure
+from shipgym.particulars import Particulars
 from shipgym.weather.conditions import Weather
 
 POOL_SIZE = 256  # ships drawn from what is continuous
 POOL_SEED = 20260101
+N_SPEEDS = 9  # approach speeds, evenly over their range
 Range = tuple[float, float]
 SmallFleet = list[tuple[ShipModel, Weather]]
 
@@ -90,20 +92,31 @@ class Variety:
         if not (self.model_uncertainty or self.speed_range or self.loading_range):
             return list(product(models, seas))
         random = np.random.default_rng(POOL_SEED)
-        return [self._drawn(models, seas, i, random) for i in range(POOL_SIZE)]
+        turns = -(-POOL_SIZE // len(models))
+        drawn = [one.sample(turns, random) if self.model_uncertainty else [one] * turns for one in models]
+        ships = [ship for turn in zip(*drawn, strict=True) for ship in turn]
+        in_turn = [(ship, seas[i // len(models) % len(seas)]) for i, ship in enumerate(ships[:POOL_SIZE])]
+        paces = self._paces(models)
+        return [(self._varied(ship, paces, random), sea) for ship, sea in in_turn]
 
-    def _drawn(
-        self, models: Sequence[ShipModel], seas: Sequence[Weather], i: int, random: np.random.Generator
-    ) -> tuple[ShipModel, Weather]:
-        """Number i of the pool; models and seas in turn, so that all are as frequent."""
-        ship = models[i % len(models)]
-        if self.model_uncertainty:
-            (ship,) = ship.sample(1, random)
+    def _paces(self, models: Sequence[ShipModel]) -> dict[int, list[Particulars]]:
+        """Particulars at each approach speed, one object each, because the weather is worked out for each."""
+        parts = np.linspace(*(self.speed_range or (1.0, 1.0)), N_SPEEDS)
+        known = {id(one.particulars): one.particulars for one in models}
+        return {
+            key: [replace(own, speed=part * own["speed"]) for part in parts.tolist()]
+            for key, own in known.items()
+        }
+
+    def _varied(
+        self, ship: ShipModel, paces: dict[int, list[Particulars]], random: np.random.Generator
+    ) -> ShipModel:
+        """A ship at a speed and of a loading within the ranges."""
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
-            ship = _at_speed(ship, random.uniform(*self.speed_range))
-        return ship, seas[i // len(models) % len(seas)]
+            ship = _at_speed(ship, paces[id(ship.particulars)][random.integers(N_SPEEDS)])
+        return ship
 
 
 def _check_range(given: Any, name: str) -> None:
@@ -113,9 +126,9 @@ def _check_range(given: Any, name: str) -> None:
     check_number(given[1], f"{name}: the largest", at_least=given[0])
 
 
-def _at_speed(ship: ShipModel, part: float) -> ShipModel:
-    """A ship with another approach speed and shaft speed."""
-    particulars = replace(ship.particulars, speed=part * ship.particulars["speed"])
+def _at_speed(ship: ShipModel, particulars: Particulars) -> ShipModel:
+    """A ship with another approach speed, and shaft speed in proportion."""
+    part = particulars["speed"] / ship.particulars["speed"]
     return replace(ship, particulars=particulars, service_shaft_speed=part * ship.service_shaft_speed)
 
 
