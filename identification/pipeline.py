@@ -143,6 +143,7 @@ def identify(
     reference_model: str | ShipModel | None = None,
     prior: str | ShipModel | None = None,
     prior_strength: float | None = None,
+    prior_folds: str = "trials",
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -199,6 +200,8 @@ def identify(
         name or file), or the regression formulas "clarke" or "kijima". See `prior`.
     prior_strength : float, optional
         0 for none, infinite for the prior itself; by default chosen by cross-validation.
+    prior_folds : {"trials", "largest-rudder"}
+        What that holds out: each trial in turn, or those of the largest rudder.
     **settings
         Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
         `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
@@ -229,7 +232,7 @@ def identify(
     if prior is None and prior_strength is not None:
         raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
     if prior is not None:
-        chosen = with_prior(chosen, prior, prior_strength, blank)
+        chosen = with_prior(chosen, prior, prior_strength, blank, prior_folds)
     refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
     fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
     refined = refine(fit, regression, used, refinement, _memory(ship)) if refinement else None

@@ -19,6 +19,7 @@ from sklearn.linear_model import Ridge
 from sklearn.svm import SVR
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.machine import Machine
 from identification.pattern_search import PatternSearch, pattern_search
 from identification.prediction import predict
@@ -63,6 +64,9 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     free_constant : bool
         Whether `identify` leaves the constant unpenalised, as the paper does. By default it is penalised like
         the other terms, so that the weight leads from the bare reference ship to the free fit in small steps.
+    folds : {"trials", "largest-rudder"}
+        What `identify` chooses the weight by: each trial held out in turn (of a single one, pieces), or the
+        trials of the largest rudder together, for models that are to turn harder than any trial.
     constant : int or None
         Column that is a free constant, or its integral, by which rows are divided; `identify` finds it.
 
@@ -84,6 +88,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         regression: str = "svr",
         free_constant: bool = False,
         constant: int | None = None,
+        folds: str = TRIALS,
     ) -> None:
         self.C = C
         self.epsilon = epsilon
@@ -91,6 +96,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.regression = regression
         self.free_constant = free_constant
         self.constant = constant
+        self.folds = folds
 
     def check(self) -> None:
         """Refuse settings that cannot be.
@@ -101,6 +107,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_choice(self.regression, REGRESSIONS, "regression")
+        check_choice(self.folds, FOLDS, "folds")
         if self.C is not None:
             check_number(self.C, "C", at_least=0.0)
         if self.epsilon is not None:
@@ -286,6 +293,11 @@ class _Tuner:
 
     def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
         """Rows to fit, and the trial or the piece of the only trial that is held out."""
+        if self.asked.folds == LARGEST_RUDDER:
+            largest = of_largest_rudder(self.trials, "folds")
+            rows = ~largest[self.samples.trial]
+            yield from ((rows, trial) for trial, held in zip(self.trials, largest, strict=True) if held)
+            return
         if len(self.trials) > 1:
             for index, trial in enumerate(self.trials):
                 yield self.samples.trial != index, trial

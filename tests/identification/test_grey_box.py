@@ -10,8 +10,9 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
+from identification.folds import of_largest_rudder
 from identification.pattern_search import pattern_search
-from identification.rm_svm import RMSVM
+from identification.rm_svm import NEARLY, RMSVM
 from identification.similarity import correlations, select_reference, similarity_vector
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -148,6 +149,29 @@ def test_the_tanker_as_reference_for_kvlcc2(target: ShipModel, trials: list[Tria
     assert ours < 0.7 * bare
 
 
+def test_the_weight_may_be_judged_by_the_largest_rudder(
+    target: ShipModel, trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The least weight with which a fit of the 10/10s predicts the 20/20 nearly as well as with any."""
+    weights = (0.0, 0.03, 3.0)
+    monkeypatch.setattr("identification.rm_svm.WEIGHTS", weights)
+    settings = {"method": "rm-svm", "reference_model": "tanker", "regression": "ls-svm"}
+    chosen = fit(target, trials, **settings, folds="largest-rudder").model.provenance["search"]["r"]["C"]
+    errors = []
+    for weight in weights:
+        learnt = fit(target, trials, **settings, C=weight, hold_out=["starboard-20"])
+        errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
+    assert chosen == next(w for w, e in zip(weights, errors, strict=True) if e <= NEARLY * min(errors))
+
+
+def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
+    assert of_largest_rudder(trials, "folds").tolist() == [False, False, True, True]
+    with pytest.raises(
+        InputError, match=r"folds: 'largest-rudder' found, but all trials to fit \(2\) reach 20"
+    ):
+        of_largest_rudder(trials[2:], "folds")
+
+
 def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
     provenance = rm_svm.model.provenance or {}
     assert provenance["reference"] == {"name": "kvlcc2", "similarity": {}, "shaft": True}
@@ -193,6 +217,10 @@ def test_the_exact_reference_leaves_nothing_to_learn(target: ShipModel, silent: 
         (
             {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "objective": "luck"},
             r"objective: 'luck' found",
+        ),
+        (
+            {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "folds": "luck"},
+            r"folds: 'luck' found",
         ),
     ],
 )
