@@ -30,6 +30,7 @@ from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
+from shipgym.weather import Current, Waves, Weather, Wind
 
 Floats = NDArray[np.float64]
 
@@ -166,6 +167,27 @@ def batched_physics(name: str, n_ships: int, aim: str) -> Row:
     )
 
 
+def weather(n_envs: int) -> Row:
+    """Environment steps per second of the batch with current, wind and waves, against calm water."""
+    sea = Weather(current=Current(1.0, variation=0.2), wind=Wind(12.0), waves=Waves(3.25, 9.7))
+    model = shipgym.load_model(MODEL)
+    speeds = []
+    for what in (sea, "calm"):
+        engine = CourseKeepingEngine(model, n_envs, CourseKeepingTask(what, episode_steps=10**9))
+        engine.advance()
+        steps = max(200_000 // n_envs, 1)
+        seconds = best_time(lambda engine=engine, steps=steps: [engine.advance() for _ in range(steps)], 15)
+        speeds.append(steps * n_envs / seconds)
+    rough, calm = speeds
+    return Row(
+        f"{n_envs} ships in current, wind and waves",
+        f"{rough / 1e6:.1f} M steps/s",
+        f"calm {calm / 1e6:.1f} M steps/s",
+        rough / calm,
+        "0.5",
+    )
+
+
 def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
     """Correlated features and noisy targets."""
     random = np.random.default_rng(0)
@@ -287,6 +309,7 @@ def main(as_json: bool = typer.Option(False, "--json", help="Print JSON instead 
         single_environment(),
         *(batched_environment(n) for n in (64, 1024, 4096)),
         *(batched_physics(ship, n, aim) for ship, aim in FLEET.items() for n in (1024, 4096)),
+        weather(4096),
         truncated_fit(1800, "500 times"),
         truncated_fit(6000, "5000 times"),
         *(bee_colony_search(objective) for objective in ("training", "k-fold")),

@@ -77,13 +77,14 @@ def numpy_step(
     ship = on_arrays(model.accelerations_source, rows)
     names = ("ROLL", "SHAFT", "accelerations", "shaft_acceleration")
     motion = on_arrays(
-        (KERNELS / "motion.py").read_text(encoding="utf-8"), rows | {name: ship[name] for name in names}
+        (KERNELS / "motion.py").read_text(encoding="utf-8"),
+        rows | {name: ship[name] for name in names} | {"WEATHER": False},
     )
     tile = model.ship_tile(depth)
 
     def step(state: Batch, rudder: Floats, shaft: Floats, h: float) -> Batch:
         with np.errstate(divide="ignore"):  # of the branch that is not chosen
-            after: Batch = motion["runge_kutta"](state, rudder, shaft, h, tile, 0)
+            after: Batch = motion["runge_kutta"](state, rudder, shaft, h, motion["CALM"], tile, 0)
         return after
 
     return step

@@ -33,7 +33,10 @@ class Trial:
     without jumps), surge ``u`` and sway ``v`` of midship (m/s; forward, to starboard), yaw rate ``r`` and
     roll rate ``p`` (rad/s), heel ``phi`` (rad), rudder ``delta`` (rad, positive steers to starboard) and
     shaft speed ``n`` (rev/s), with the orders ``delta_command`` and ``n_command``; of captive tests the
-    forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship (N m).
+    forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship (N m). Simulated in
+    weather: first-order motion in waves ``psi_wave``, ``r_wave``, ``phi_wave`` and ``p_wave``, which is not
+    in psi, r, phi and p, the current ``current_north`` and ``current_east`` (m/s) and the wind
+    ``wind_speed`` (m/s) and ``wind_from`` (rad).
 
     Parameters
     ----------

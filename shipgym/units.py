@@ -39,6 +39,14 @@ QUANTITIES: dict[str, str] = {
     "X": "force",
     "Y": "force",
     "N": "moment",
+    "psi_wave": "angle",
+    "r_wave": "angular rate",
+    "phi_wave": "angle",
+    "p_wave": "angular rate",
+    "current_north": "speed",
+    "current_east": "speed",
+    "wind_speed": "speed",
+    "wind_from": "angle",
 }
 
 #: Names of the channels, without time.

@@ -22,8 +22,10 @@ from shipgym.envs.course_keeping_task import (
 )
 from shipgym.errors import InputError
 from shipgym.kernels import course_keeping_rows as rows
-from shipgym.kernels import layout
+from shipgym.kernels import layout, weather_rows
 from shipgym.models import ShipModel, load_model
+from shipgym.simulation.weather_column import weather_column
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
@@ -44,7 +46,8 @@ class CourseKeepingEngine:
     Raises
     ------
     InputError
-        If `num_envs` is not positive, or the number of models or their structures do not fit.
+        If `num_envs` is not positive, the number of models or their structures do not fit, or a ship's
+        particulars are not enough for the weather.
     """
 
     def __init__(
@@ -71,11 +74,12 @@ class CourseKeepingEngine:
         self.task = task or CourseKeepingTask()
         self.dt = self.task.interval(self.model)
         tiles = -(-num_envs // layout.LANES)
-        self._kernel = self.model.kernel("course_keeping")
+        self.weather = self.task.weather
+        self._kernel = self.model.kernel("course_keeping", not self.weather.calm)
         self._settings = self.task.settings(self.model)
-        self._ships = _ship_tiles(fleet, tiles)
+        self._ships = _ship_tiles(fleet, tiles, self.weather, self.task.substep(self.model))
         self._states = np.zeros((tiles, rows.END))
-        self._keys = np.zeros((tiles, 2, layout.LANES), dtype=np.uint64)
+        self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
         self._actions = np.zeros((tiles, layout.LANES), dtype=np.float32)
         self._observations = np.zeros((tiles, layout.LANES, rows.N_OBSERVATIONS), dtype=np.float32)
         self.reset(np.arange(num_envs))
@@ -184,13 +188,30 @@ class CourseKeepingEngine:
         return np.stack([self.outcome(row) for row in parts], axis=-1)
 
     def physical_state(self) -> dict[str, Floats]:
-        """State and set-point in SI units by name, each of shape (num_envs,)."""
+        """State, set-point and, unless it is calm, the weather by name, SI units, each of shape (num_envs,).
+
+        Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
+        the weather (`weather_rows.CHANNEL_NAMES`).
+        """
         offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
         state = {
             name: self.outcome(offsets[row])
             for name, row in zip(self.model.state_names, self.model.kernel_names, strict=True)
         }
-        return {**state, "set_point": self.outcome(rows.SET_POINT)}
+        state["set_point"] = self.outcome(rows.SET_POINT)
+        return state if self.weather.calm else {**state, **self._weather_now()}
+
+    def _weather_now(self) -> dict[str, Floats]:
+        """What the weather is in each lane, by the names of the channels of trials."""
+        waves = {"psi_wave": weather_rows.PSI_WAVE, "r_wave": weather_rows.R_WAVE}
+        if "phi" in self.model.state_names:
+            waves |= {"phi_wave": weather_rows.PHI_WAVE, "p_wave": weather_rows.P_WAVE}
+        currents = {"current_north": weather_rows.CURRENT_NORTH, "current_east": weather_rows.CURRENT_EAST}
+        now = {name: self.outcome(row) for name, row in (waves | currents).items()}
+        mean = self.weather.wind.speed if self.weather.wind else 0.0
+        now["wind_speed"] = mean + self.outcome(weather_rows.GUST)
+        east, north = self.outcome(weather_rows.WIND_EAST), self.outcome(weather_rows.WIND_NORTH)
+        return {**now, "wind_from": np.arctan2(east, north)}
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
@@ -205,11 +226,12 @@ def _key(random: np.random.Generator) -> int:
     return int(random.integers(2**63))
 
 
-def _ship_tiles(fleet: list[ShipModel], tiles: int) -> Floats:
-    """Ships as the kernels read them: one tile for all, or a column for each lane."""
+def _ship_tiles(fleet: list[ShipModel], tiles: int, weather: Weather, step: float) -> Floats:
+    """Ships and their weather as the kernels read them: one tile for all, or a column for each lane."""
+    seas = [None if weather.calm else weather_column(model, weather, step) for model in fleet]
     if len(fleet) == 1:
-        return fleet[0].ship_tile()[None]
-    columns = [model.ship_column() for model in fleet]
+        return fleet[0].ship_tile(weather=seas[0])[None]
+    columns = [model.ship_column(weather=sea) for model, sea in zip(fleet, seas, strict=True)]
     columns += [columns[0]] * (tiles * layout.LANES - len(fleet))
     return np.stack(columns).reshape(tiles, layout.LANES, -1).transpose(0, 2, 1).reshape(tiles, -1)
 
@@ -250,7 +272,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def __init__(
         self,
         model: str | Path | ShipModel = "mariner-tls-svm",
-        sea: str = "calm",
+        sea: str | Weather = "calm",
         dt: float | None = None,
         episode_steps: int = 600,
         course_change_deg: float = 30.0,
@@ -349,7 +371,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._seen.copy(), reward, terminated > 0.0, truncated > 0.0, info
 
     def physical_state(self) -> dict[str, float]:
-        """State and set-point by name, SI units."""
+        """State, set-point and weather by name, SI units (see `CourseKeepingEngine.physical_state`)."""
         return {name: float(value[0]) for name, value in self._engine.physical_state().items()}
 
 

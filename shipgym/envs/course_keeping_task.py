@@ -7,9 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_number
 from shipgym.kernels import course_keeping_rows as rows
 from shipgym.models import ShipModel
+from shipgym.simulation.weather_column import as_weather
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 
@@ -26,7 +28,6 @@ OBSERVATION_NAMES = (
 OBSERVATION_LOW = np.array([-1, -1, -5, -2, -2, -1, -1, -1], dtype=np.float32)
 OBSERVATION_HIGH = np.array([1, 1, 5, 2, 3, 1, 1, 1], dtype=np.float32)
 REWARD_PARTS = ("reward_heading", "reward_rudder", "reward_rudder_rate", "reward_end")
-SEAS = ("calm",)
 
 HEADING_SCALE = np.radians(30.0)  # heading error and rudder angle that cost 1 and RUDDER_WEIGHT a step
 RUDDER_WEIGHT = 0.1  # Norrbin 1972
@@ -42,8 +43,8 @@ class CourseKeepingTask:
 
     Attributes
     ----------
-    sea : {"calm"}
-        Sea state.
+    sea : {"calm", "slight", "moderate", "rough"} or Weather
+        Sea state, whose wind and waves come from a direction drawn for each episode, or any weather.
     dt : float or None
         Control interval, s; by default about a twentieth of the time to travel one ship length,
         rounded to 1, 2 or 5 times a power of ten.
@@ -60,7 +61,7 @@ class CourseKeepingTask:
         ends (see `Envelope.distance`).
     """
 
-    sea: str = "calm"
+    sea: str | Weather = "calm"
     dt: float | None = None
     episode_steps: int = 600
     course_change_deg: float = 30.0
@@ -69,7 +70,7 @@ class CourseKeepingTask:
     max_envelope_distance: float = 5.0
 
     def __post_init__(self) -> None:
-        check_choice(self.sea, SEAS, "sea")
+        as_weather(self.sea, "sea", None)
         if self.dt is not None:
             check_number(self.dt, "dt", above=0.0)
         check_number(self.episode_steps, "episode_steps", at_least=1)
@@ -81,6 +82,16 @@ class CourseKeepingTask:
     def interval(self, model: ShipModel) -> float:
         """Control interval for a ship, s."""
         return control_interval(model) if self.dt is None else float(self.dt)
+
+    @property
+    def weather(self) -> Weather:
+        """What the sea is like."""
+        return as_weather(self.sea, "sea", None)
+
+    def substep(self, model: ShipModel) -> float:
+        """Step of the integration, s."""
+        settings = self.settings(model)
+        return float(settings[rows.DT] / settings[rows.SUBSTEPS])
 
     def settings(self, model: ShipModel) -> Floats:
         """The task as the kernel reads it."""

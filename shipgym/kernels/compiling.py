@@ -30,3 +30,9 @@ def kernel(signature: str) -> Callable[[_Function], _Function]:
     """Compile a loop for one signature when its file is imported, or read it from the on-disk cache."""
     compiled: Callable[[_Function], _Function] = njit(signature, cache=True, nogil=True, **_SEMANTICS)
     return compiled
+
+
+@inlined
+def pick(condition: bool, yes: float, no: float) -> float:
+    """One of two numbers, without a branch."""
+    return yes if condition else no

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import accelerations as equations
 from .accelerations import ROLL, SHAFT
-from .compiling import inlined, kernel, rare
+from .compiling import inlined, kernel, pick, rare
 from .course_keeping_rows import (
     CHANGE_INTERVAL,
     DISTANCE,
@@ -68,9 +68,29 @@ from .layout import (
     X,
     Y,
 )
-from .motion import clip, runge_kutta, runs_away
-from .random import uniform
+from .motion import CALM, Push, clip, runge_kutta, runs_away
+from .random import stream, uniform
 from .trigonometry import sin_cos, wrap
+from .weather import WEATHER, begin_weather, evolve, feel
+from .weather_rows import (
+    CURRENT_EAST,
+    CURRENT_NORTH,
+    PSI_WAVE,
+    PUSH_P,
+    PUSH_R,
+    PUSH_U,
+    PUSH_V,
+    R_WAVE,
+)
+
+
+@inlined
+def measured(state: Any, lane: int) -> tuple[float, float]:
+    """Heading and yaw rate as compass and rate gyro show them: with the first-order motion in waves."""
+    if WEATHER:
+        return state[PSI + lane] + state[PSI_WAVE + lane], state[R + lane] + state[R_WAVE + lane]
+    return state[PSI + lane], state[R + lane]
+
 
 KEEPS_P = ROLL or getattr(equations, "MEMORY", False)  # the row holds a roll rate or a memory of yaw
 
@@ -85,10 +105,11 @@ def observe(state: Any, settings: Any, ship: Any, lanes: int) -> None:
     per_reach = 1.0 / settings[INTEGRAL_SCALE]
     for lane in range(lanes):
         per_speed = 1.0 / ship[SERVICE_SPEED + lane]
-        sin, cos = sin_cos(state[SET_POINT + lane] - state[PSI + lane])
+        heading, rate = measured(state, lane)
+        sin, cos = sin_cos(state[SET_POINT + lane] - heading)
         state[sine + lane] = clip(sin, -1.0, 1.0)
         state[cosine + lane] = clip(cos, -1.0, 1.0)
-        state[yaw_rate + lane] = clip(state[R + lane] * ship[LENGTH + lane] * per_speed, -5.0, 5.0)
+        state[yaw_rate + lane] = clip(rate * ship[LENGTH + lane] * per_speed, -5.0, 5.0)
         state[sway + lane] = clip(state[V + lane] * per_speed, -2.0, 2.0)
         state[surge + lane] = clip(state[U + lane] * per_speed, -2.0, 3.0)
         state[rudder + lane] = clip(state[DELTA + lane] / ship[RUDDER_LIMIT + lane], -1.0, 1.0)
@@ -131,6 +152,10 @@ def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: Any)
     state[PSI + lane] = draw(state, lane, keys, tile, -pi, pi)
     state[SET_POINT + lane] = state[PSI + lane]
     change_set_point(state, lane, keys, tile, settings)
+    if WEATHER:
+        words = keys[tile, 2]
+        words[lane] = stream(keys[tile, 0, lane], keys[tile, 1, lane])
+        begin_weather(state[PSI + lane], state[U + lane], state[V + lane], state, words, ship, lane)
 
 
 @kernel(
@@ -138,7 +163,10 @@ def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, ship: Any)
     " boolean[:, ::1])"
 )
 def reset(states: Any, keys: Any, settings: Any, ships: Any, observations: Any, which: Any) -> None:
-    """Begin an episode in the lanes of `which`; `keys` holds each lane's seed and episode number."""
+    """Begin an episode in the lanes of `which`.
+
+    `keys` holds each lane's seed, its episode number and the state of the random numbers of its weather.
+    """
     for tile in range(states.shape[0]):
         ship = ships[tile % ships.shape[0]]
         for lane in range(LANES):
@@ -149,9 +177,18 @@ def reset(states: Any, keys: Any, settings: Any, ships: Any, observations: Any, 
 
 
 @inlined
-def pick(condition: bool, yes: float, no: float) -> float:
-    """One of two numbers, without a branch."""
-    return yes if condition else no
+def pushed(state: Any, lane: int) -> Push:
+    """What the weather does to a ship."""
+    if WEATHER:
+        return (
+            state[PUSH_U + lane],
+            state[PUSH_V + lane],
+            state[PUSH_R + lane],
+            state[PUSH_P + lane] if ROLL else 0.0,
+            state[CURRENT_NORTH + lane],
+            state[CURRENT_EAST + lane],
+        )
+    return CALM
 
 
 @inlined
@@ -171,7 +208,7 @@ def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
             state[N + lane] if SHAFT else 0.0,
         )
         order = state[LAST_COMMAND + lane] * ship[RUDDER_LIMIT + lane]
-        new = runge_kutta(old, order, ship[SERVICE_SHAFT + lane], h, ship, lane)
+        new = runge_kutta(old, order, ship[SERVICE_SHAFT + lane], h, pushed(state, lane), ship, lane)
         away = runs_away(new[3], new[4], new[5], ship, lane)
         stays = away | (state[ENDED + lane] != 0.0)
         state[X + lane] = pick(stays, old[0], new[0])
@@ -188,6 +225,14 @@ def sail(state: Any, h: float, ship: Any, lanes: int) -> None:
         if SHAFT:
             state[N + lane] = pick(stays, old[9], new[9])
         state[TERMINATED + lane] = pick(away, 1.0, state[TERMINATED + lane])
+
+
+@inlined
+def weather_goes_on(state: Any, words: Any, h: float, ship: Any, lanes: int) -> None:
+    """Let the weather of each lane go on for h seconds; where an episode is over, it stays as it is."""
+    for lane in range(lanes):
+        over = state[ENDED + lane] != 0.0
+        evolve(state[PSI + lane], state[U + lane], state[V + lane], h, over, state, words, ship, lane)
 
 
 @inlined
@@ -261,7 +306,12 @@ def step(
         state, ship = states[tile], ships[tile % ships.shape[0]]
         order_rudder(state, actions[tile], lanes)
         for _ in range(substeps):
+            if WEATHER:
+                for lane in range(lanes):
+                    feel(state[PSI + lane], state[U + lane], state[V + lane], state, ship, lane)
             sail(state, settings[DT] / substeps, ship, lanes)
+            if WEATHER:
+                weather_goes_on(state, keys[tile, 2], settings[DT] / substeps, ship, lanes)
         judge(state, settings, ship, lanes)
         for lane in range(lanes):
             if state[STEPS + lane] >= state[NEXT_CHANGE + lane] and state[ENDED + lane] == 0.0:

@@ -1,21 +1,21 @@
-"""Rows of the arrays of the course-keeping environment, after those of the ship (`layout`)."""
+"""Rows of the arrays of the course-keeping environment, after those of ship and weather (`layout`)."""
 
 from __future__ import annotations
 
-from .layout import LANES, STATE_END, offsets
+from .layout import LANES, TASK, offsets
 
 # the task of a lane
-SET_POINT = STATE_END  # heading to keep, rad
-INTEGRAL = STATE_END + LANES  # of the heading error, rad s
-LAST_COMMAND = STATE_END + 2 * LANES  # part of the rudder limit
-LAST_RUDDER = STATE_END + 3 * LANES  # rudder angle one control interval ago, rad
-STEPS = STATE_END + 4 * LANES  # taken in this episode
-NEXT_CHANGE = STATE_END + 5 * LANES  # step at which the set-point changes
-DRAWS = STATE_END + 6 * LANES  # random numbers used in this episode
-ENDED = STATE_END + 7 * LANES  # 1 once the episode is over
+SET_POINT = TASK  # heading to keep, rad
+INTEGRAL = TASK + LANES  # of the heading error, rad s
+LAST_COMMAND = TASK + 2 * LANES  # part of the rudder limit
+LAST_RUDDER = TASK + 3 * LANES  # rudder angle one control interval ago, rad
+STEPS = TASK + 4 * LANES  # taken in this episode
+NEXT_CHANGE = TASK + 5 * LANES  # step at which the set-point changes
+DRAWS = TASK + 6 * LANES  # random numbers used in this episode
+ENDED = TASK + 7 * LANES  # 1 once the episode is over
 
 # the outcome of the last step
-OUTCOME = STATE_END + 8 * LANES
+OUTCOME = TASK + 8 * LANES
 REWARD, HEADING_REWARD, RUDDER_REWARD, RATE_REWARD, END_REWARD = offsets(OUTCOME, 5)
 TERMINATED, TRUNCATED, EXTRAPOLATING, DISTANCE, HEADING_ERROR = offsets(OUTCOME + 5 * LANES, 5)
 

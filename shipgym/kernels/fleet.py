@@ -1,4 +1,4 @@
-"""Bare ships through time, 64 at once: physics without a task around it."""
+"""Bare ships through time in calm water, 64 at once: physics without a task around it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from .compiling import inlined, kernel
 from .layout import DELTA, LANES, PHI, PSI, N, P, R, U, V, X, Y
-from .motion import runge_kutta
+from .motion import CALM, runge_kutta
 
 
 @inlined
@@ -25,7 +25,7 @@ def sail_tile(state: Any, command: Any, h: float, ship: Any) -> None:
             state[DELTA + lane],
             state[N + lane],
         )
-        new = runge_kutta(old, command[lane], command[LANES + lane], h, ship, lane)
+        new = runge_kutta(old, command[lane], command[LANES + lane], h, CALM, ship, lane)
         state[X + lane] = new[0]
         state[Y + lane] = new[1]
         state[PSI + lane] = new[2]

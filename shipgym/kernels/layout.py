@@ -27,8 +27,10 @@ STATE_NAMES = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
 N_STATE = 10
 X, Y, PSI, U, V, R, P, PHI, DELTA, N = offsets(0, N_STATE)
 STATE_END = N_STATE * LANES
+# after it 22 rows of weather (`weather_rows`), then those of an environment's task
+TASK = STATE_END + 22 * LANES
 
-# a ship: its constants, its operating envelope, then the coefficients of its accelerations
+# a ship: its constants, its operating envelope, the weather, then the coefficients of its accelerations
 LENGTH, SERVICE_SPEED = offsets(0, 2)  # m; m/s
 RUDDER_LIMIT, RUDDER_RATE = offsets(2 * LANES, 2)  # rad; rad/s
 GEAR_FREQUENCY = 4 * LANES  # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
@@ -37,7 +39,8 @@ ENVELOPE_LOW = 7 * LANES  # 4 rows: least u, v, r, delta of the training data
 ENVELOPE_HIGH = 11 * LANES  # 4 rows: largest
 ENVELOPE_CENTRE = 15 * LANES  # 4 rows: centre of the ellipsoid around the training data
 ENVELOPE_SHAPE = 19 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
-COEFFICIENTS = 29 * LANES
+WEATHER = 29 * LANES  # 83 rows, not used in calm water (`weather_rows`)
+COEFFICIENTS = 112 * LANES
 
 # a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
 RUNAWAY_SPEED = 3.0

@@ -21,7 +21,11 @@ from .layout import (
     WATER_DEPTH,
 )
 from .trigonometry import sin_cos
+from .weather import WEATHER
 
+#: Accelerations by the weather in surge, sway, yaw and roll, and the current north and east.
+Push = tuple[float, float, float, float, float, float]
+CALM = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 State = tuple[float, float, float, float, float, float, float, float, float, float]
 
 
@@ -81,7 +85,21 @@ def shaft_rate(n: float, command: float, ship: Any, lane: int) -> float:
 
 
 @inlined
-def runge_kutta(state: State, command: float, n_command: float, h: float, ship: Any, lane: int) -> State:
+def driven(
+    u: float, v: float, r: float, p: float, phi: float, delta: float, n: float, depth: float, push: Push,
+    ship: Any, lane: int,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Accelerations by the ship's own forces and by the weather."""
+    a, b, c, d = accelerations(u, v, r, p, phi, delta, n, depth, ship, lane)
+    if WEATHER:
+        return a + push[0], b + push[1], c + push[2], d + push[3]
+    return a, b, c, d
+
+
+@inlined
+def runge_kutta(
+    state: State, command: float, n_command: float, h: float, push: Push, ship: Any, lane: int
+) -> State:
     """State after one classical Runge-Kutta step of h seconds with the commands held.
 
     Parameters
@@ -94,6 +112,8 @@ def runge_kutta(state: State, command: float, n_command: float, h: float, ship: 
         Commanded shaft speed, 1/s.
     h : float
         Step, s.
+    push : tuple of 6 float
+        What the weather does (`Push`), held over the step.
     ship, lane
         See `accelerations`.
     """
@@ -106,7 +126,7 @@ def runge_kutta(state: State, command: float, n_command: float, h: float, ship: 
 
     g1 = rudder_rate(delta, order, ship, lane)
     s1 = shaft_rate(n1, n_command, ship, lane)
-    a1, b1, c1, d1 = accelerations(u, v, r, p, phi, delta, n1, depth, ship, lane)
+    a1, b1, c1, d1 = driven(u, v, r, p, phi, delta, n1, depth, push, ship, lane)
     x1, y1, e1 = kinematics(psi, phi, u, v, r)
 
     u2, v2, r2, p2 = u + half * a1, v + half * b1, r + half * c1, p + half * d1
@@ -114,7 +134,7 @@ def runge_kutta(state: State, command: float, n_command: float, h: float, ship: 
     delta2 = rudder_after(delta, g1, order, half, ship, lane)
     g2 = rudder_rate(delta2, order, ship, lane)
     s2 = shaft_rate(n2, n_command, ship, lane)
-    a2, b2, c2, d2 = accelerations(u2, v2, r2, p2, phi2, delta2, n2, depth, ship, lane)
+    a2, b2, c2, d2 = driven(u2, v2, r2, p2, phi2, delta2, n2, depth, push, ship, lane)
     x2, y2, e2 = kinematics(psi2, phi2, u2, v2, r2)
 
     u3, v3, r3, p3 = u + half * a2, v + half * b2, r + half * c2, p + half * d2
@@ -122,7 +142,7 @@ def runge_kutta(state: State, command: float, n_command: float, h: float, ship: 
     delta3 = rudder_after(delta, g2, order, half, ship, lane)
     g3 = rudder_rate(delta3, order, ship, lane)
     s3 = shaft_rate(n3, n_command, ship, lane)
-    a3, b3, c3, d3 = accelerations(u3, v3, r3, p3, phi3, delta3, n3, depth, ship, lane)
+    a3, b3, c3, d3 = driven(u3, v3, r3, p3, phi3, delta3, n3, depth, push, ship, lane)
     x3, y3, e3 = kinematics(psi3, phi3, u3, v3, r3)
 
     u4, v4, r4, p4 = u + h * a3, v + h * b3, r + h * c3, p + h * d3
@@ -130,12 +150,17 @@ def runge_kutta(state: State, command: float, n_command: float, h: float, ship: 
     delta4 = rudder_after(delta, g3, order, h, ship, lane)
     g4 = rudder_rate(delta4, order, ship, lane)
     s4 = shaft_rate(n4, n_command, ship, lane)
-    a4, b4, c4, d4 = accelerations(u4, v4, r4, p4, phi4, delta4, n4, depth, ship, lane)
+    a4, b4, c4, d4 = driven(u4, v4, r4, p4, phi4, delta4, n4, depth, push, ship, lane)
     x4, y4, e4 = kinematics(psi4, phi4, u4, v4, r4)
 
+    x_new = x + sixth * (x1 + 2.0 * (x2 + x3) + x4)
+    y_new = y + sixth * (y1 + 2.0 * (y2 + y3) + y4)
+    if WEATHER:
+        x_new += h * push[4]
+        y_new += h * push[5]
     return (
-        x + sixth * (x1 + 2.0 * (x2 + x3) + x4),
-        y + sixth * (y1 + 2.0 * (y2 + y3) + y4),
+        x_new,
+        y_new,
         psi + sixth * (e1 + 2.0 * (e2 + e3) + e4),
         u + sixth * (a1 + 2.0 * (a2 + a3) + a4),
         v + sixth * (b1 + 2.0 * (b2 + b3) + b4),

@@ -24,7 +24,7 @@ from .layout import (
     X,
     Y,
 )
-from .motion import runge_kutta
+from .motion import CALM, runge_kutta
 
 
 @kernel("void(float64[::1], float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1])")
@@ -70,7 +70,9 @@ def sail(state: Any, ship: Any, offsets: Any, inputs: Any, samples: Any, out: An
                 state[X + lane], state[Y + lane], state[PSI + lane], state[U + lane], state[V + lane],
                 state[R + lane], state[P + lane], state[PHI + lane], state[DELTA + lane], state[N + lane],
             )  # fmt: skip
-            x, y, psi, u, v, r, p, phi, _, n = runge_kutta(s, order + offsets[lane], shaft, h, ship, lane)
+            x, y, psi, u, v, r, p, phi, _, n = runge_kutta(
+                s, order + offsets[lane], shaft, h, CALM, ship, lane
+            )
             state[X + lane], state[Y + lane], state[PSI + lane] = x, y, psi
             state[U + lane], state[V + lane], state[R + lane] = u, v, r
             state[P + lane], state[PHI + lane] = p, phi

@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.zigzags import number_of_steps
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
+from shipgym.simulation.conditions import Conditions
 from shipgym.simulation.simulate import simulate
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
-Seed = int | np.random.Generator
 
 CLOCK = 0.5  # of the binary sequence, L / U0
 LONGEST_PERIOD, SHORTEST_PERIOD = 20.0, 2.0  # of the multi-sine, L / U0
@@ -34,6 +35,7 @@ def prbs_rudder(
     duration: float = 600.0,
     dt: float = 0.1,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
 ) -> Trial:
     """Simulate a pseudo-random binary rudder: from one side to the other at multiples of a clock period.
 
@@ -51,6 +53,8 @@ def prbs_rudder(
         s. The samples are dt apart.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state, with the same seed; by default calm.
 
     Returns
     -------
@@ -74,7 +78,7 @@ def prbs_rudder(
     bits, _ = max_len_seq(REGISTER, state=register)
     tick = np.floor(times / clock * (1.0 + 1e-12)).astype(int)
     rudder = amplitude * (2.0 * bits[tick % len(bits)] - 1.0)
-    return _sail(model, rudder, None, dt, water_depth)
+    return _sail(model, rudder, None, dt, Conditions(water_depth, weather, seed))
 
 
 def multi_sine_rudder(
@@ -86,6 +90,7 @@ def multi_sine_rudder(
     duration: float = 600.0,
     dt: float = 0.1,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
 ) -> Trial:
     """Simulate a multi-sine rudder: all harmonics of 1 / duration in a band, of equal amplitude.
 
@@ -105,6 +110,8 @@ def multi_sine_rudder(
         s. The samples are dt apart.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state, with the same seed; by default calm.
 
     Returns
     -------
@@ -138,7 +145,9 @@ def multi_sine_rudder(
     waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
     crests = np.abs(waves).max(axis=1)
     best = int(np.argmin(crests))
-    return _sail(model, amplitude * waves[best] / crests[best], None, dt, water_depth)
+    return _sail(
+        model, amplitude * waves[best] / crests[best], None, dt, Conditions(water_depth, weather, seed)
+    )
 
 
 def random_rudder_steps(
@@ -150,6 +159,7 @@ def random_rudder_steps(
     duration: float = 600.0,
     dt: float = 0.1,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
 ) -> Trial:
     """Simulate rudder steps of random angle and length, both evenly distributed.
 
@@ -167,6 +177,8 @@ def random_rudder_steps(
         s. The samples are dt apart.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state, with the same seed; by default calm.
 
     Returns
     -------
@@ -184,7 +196,7 @@ def random_rudder_steps(
     shortest = _length_times(model, SHORTEST_HOLD) if shortest_s is None else shortest_s
     longest = _length_times(model, LONGEST_HOLD) if longest_s is None else longest_s
     rudder = _steps(times, -largest, largest, shortest, longest, seed)
-    return _sail(model, rudder, None, dt, water_depth)
+    return _sail(model, rudder, None, dt, Conditions(water_depth, weather, seed))
 
 
 def shaft_speed_steps(
@@ -198,6 +210,7 @@ def shaft_speed_steps(
     duration: float = 1200.0,
     dt: float = 0.1,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
 ) -> Trial:
     """Simulate steps of the ordered shaft speed, of random speed and length, both evenly distributed.
 
@@ -217,6 +230,8 @@ def shaft_speed_steps(
         s. The samples are dt apart.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state, with the same seed; by default calm.
 
     Returns
     -------
@@ -240,7 +255,7 @@ def shaft_speed_steps(
     longest = _length_times(model, LONGEST_SHAFT_HOLD) if longest_s is None else longest_s
     shaft = service * _steps(times, lowest_ratio, highest_ratio, shortest, longest, seed)
     rudder = np.full(len(times), np.radians(rudder_deg))
-    return _sail(model, rudder, shaft, dt, water_depth)
+    return _sail(model, rudder, shaft, dt, Conditions(water_depth, weather, seed))
 
 
 def shaft_of(model: ShipModel) -> float:
@@ -288,10 +303,11 @@ def _times(duration: float, dt: float) -> Floats:
     return dt * np.arange(number_of_steps(duration, dt), dtype=float)
 
 
-def _sail(model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, water_depth: float) -> Trial:
+def _sail(model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, conditions: Conditions) -> Trial:
     """The trial with a rudder, rad, and a shaft speed, 1/s, for each step."""
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder
     if shaft is not None:
         commands[:, 1] = shaft
-    return simulate(model, commands, dt, None, water_depth, kind="random")
+    depth, weather, seed = conditions.water_depth, conditions.weather, conditions.seed
+    return simulate(model, commands, dt, None, depth, "random", weather, seed)

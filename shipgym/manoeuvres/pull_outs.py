@@ -13,8 +13,10 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.settling import Voyage
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
+from shipgym.simulation.conditions import Conditions
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,8 @@ def pull_out(
     rudder_deg: float = 20.0,
     dt: float | None = None,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
 
@@ -53,6 +57,10 @@ def pull_out(
         Time between samples, s; by default a fortieth of the time to travel one ship length.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -69,7 +77,7 @@ def pull_out(
     check_number(rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit")
     if rudder_deg == 0.0:
         raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
-    voyage = Voyage(model, dt, water_depth)
+    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     for angle in (np.radians(rudder_deg), 0.0):
         voyage.settle(voyage.hold(angle, model.service_shaft_speed))
     return voyage.trial("pull-out")

@@ -12,6 +12,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.ship_model import ShipModel
+from shipgym.simulation.conditions import Conditions, Passage
 from shipgym.simulation.simulate import as_trial, unstable
 from shipgym.trial import Trial
 
@@ -24,7 +25,7 @@ HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
 HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
 STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
 
-#: Sails on: kernel states of shape (n_steps + 1, 10) with the start in row 0 and commands (n_steps, 2)
+#: Sails on: kernel states of shape (n_steps + 1, n_columns) with the start in row 0 and commands (n_steps, 2)
 #: to be filled; returns the last row before the ship ran away.
 Sail = Callable[[Floats, Floats], int]
 
@@ -46,35 +47,35 @@ class Voyage:
         The ship.
     dt : float or None
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m.
+    conditions : Conditions
+        Depth of the water and weather. In weather the motion is never steady: legs that wait for it last
+        their longest.
     state : array of shape (n_state,), optional
         Where to start.
     """
 
     def __init__(
-        self, model: ShipModel, dt: float | None, water_depth: float, state: Floats | None = None
+        self, model: ShipModel, dt: float | None, conditions: Conditions, state: Floats | None = None
     ) -> None:
         self.model = model
         self.length_time = model.particulars["length"] / model.particulars["speed"]
         default = self.length_time / STEPS_PER_LENGTH
         self.dt = default if dt is None else check_number(dt, "dt", above=0.0, at_most=self.length_time)
-        self.water_depth = water_depth
-        self.ship = model.ship_tile(water_depth)
+        self.water_depth = conditions.water_depth
+        self.passage = Passage(model, conditions, self.dt)
         start = model.service_state if state is None else state
-        self._states = [model.kernel_states(start[None])]
+        self._states = [self.passage.states(model.kernel_states(start[None])[0], 0)]
         self._commands: list[Floats] = []
 
     @property
     def state(self) -> Floats:
-        """The state of the kernels now, shape (10,)."""
+        """The state of the kernels now, and what is recorded of the weather, shape (n_columns,)."""
         state: Floats = self._states[-1][-1]
         return state
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
-        """Sail some steps; states of shape (n_steps, 10) and commands of shape (n_steps, 2)."""
-        states, commands = np.empty((n_steps + 1, layout.N_STATE)), np.empty((n_steps, 2))
-        states[0] = self.state
+        """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
+        states, commands = self.passage.states(self.state, n_steps), np.empty((n_steps, 2))
         reached = sail(states, commands)
         if reached < n_steps:
             sailed = sum(map(len, self._commands)) + reached
@@ -85,11 +86,11 @@ class Voyage:
 
     def hold(self, rudder: float, shaft: float) -> Sail:
         """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
-        kernel = self.model.kernel("trajectories").simulate
+        passage, kernel = self.passage, self.passage.kernel("trajectories").simulate
 
         def sail(states: Floats, commands: Floats) -> int:
             commands[:] = rudder, shaft
-            reached: int = kernel(states, commands, self.dt, self.ship)
+            reached: int = kernel(states, commands, self.dt, passage.sky, passage.words, passage.ship)
             return reached
 
         return sail
@@ -99,8 +100,8 @@ class Voyage:
 
         He is designed from the rudder's effect at service speed, and remembers his integral part.
         """
-        model, memory = self.model, np.zeros(1)
-        steer, shaft = model.kernel("rate_steering").steer_rate, model.service_shaft_speed
+        model, memory, passage = self.model, np.zeros(1), self.passage
+        steer, shaft = passage.kernel("rate_steering").steer_rate, model.service_shaft_speed
         gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
         reset_time = HELMSMAN_RESET * self.length_time
 
@@ -108,8 +109,9 @@ class Voyage:
             def sail(states: Floats, commands: Floats) -> int:
                 orders = np.empty(len(commands))
                 reached: int = steer(
-                    states, orders, memory, rate, shaft, self.dt, gain, reset_time, self.ship
-                )
+                    states, orders, memory, rate, shaft, self.dt, gain, reset_time,
+                    passage.sky, passage.words, passage.ship,
+                )  # fmt: skip
                 commands[:, 0], commands[:, 1] = orders, shaft
                 return reached
 

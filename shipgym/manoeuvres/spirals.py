@@ -16,8 +16,10 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.settling import Voyage
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
+from shipgym.simulation.conditions import Conditions
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]
@@ -78,6 +80,8 @@ def direct_spiral(
     rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
     dt: float | None = None,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Spiral:
     """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
 
@@ -92,6 +96,10 @@ def direct_spiral(
         Time between samples, s; by default a fortieth of the time to travel one ship length.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -106,7 +114,7 @@ def direct_spiral(
     """
     limit = model.steering.rudder_limit_deg
     angles = _one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")
-    voyage = Voyage(model, dt, water_depth)
+    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     points = [
         voyage.settle(voyage.hold(np.radians(angle), model.service_shaft_speed))
         for angle in [*angles, *angles[-2::-1]]
@@ -120,6 +128,8 @@ def reverse_spiral(
     yaw_rate_deg_s: Sequence[float] | None = None,
     dt: float | None = None,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Spiral:
     """Simulate a reverse spiral (Bech): a helmsman holds one yaw rate after the other until it is steady.
 
@@ -136,6 +146,10 @@ def reverse_spiral(
         Time between samples, s; by default a fortieth of the time to travel one ship length.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -149,7 +163,7 @@ def reverse_spiral(
     UnstableModelError
         If the ship runs away.
     """
-    voyage = Voyage(model, dt, water_depth)
+    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     usual = [float(np.degrees(rate / voyage.length_time)) for rate in REVERSE_RATES]
     given = usual if yaw_rate_deg_s is None else yaw_rate_deg_s
     most = float(np.degrees(1.0 / voyage.length_time))

@@ -12,8 +12,10 @@ from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, ship_length
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.models.equations import Equations
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
+from shipgym.simulation.conditions import Conditions
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 CREEP = 1e-3  # of the service shaft speed: a stopped shaft where the equations divide by its speed
 LONGEST = 300.0  # of a stopping trial, L / U0
@@ -68,6 +70,8 @@ def stopping(
     speed_ratio: float = 0.1,
     dt: float | None = None,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
 
@@ -89,6 +93,10 @@ def stopping(
         Time between samples, s; by default a fortieth of the time to travel one ship length.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -111,7 +119,7 @@ def stopping(
             "speed_ratio: 0 found, but a ship without an order astern is never dead in the water; expected "
             "a number > 0, such as 0.1"
         )
-    voyage = Voyage(model, dt, water_depth)
+    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     sail, n_steps = voyage.hold(0.0, order), max(round(voyage.length_time / voyage.dt), 2)
     target = speed_ratio * model.particulars["speed"]
     for stretch in range(round(LONGEST)):
@@ -211,6 +219,8 @@ def acceleration(
     duration: float | None = None,
     dt: float | None = None,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
 
@@ -228,6 +238,10 @@ def acceleration(
         Time between samples, s; by default a fortieth of the time to travel one ship length.
     water_depth : float
         m, for ships that know shallow water.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -246,7 +260,7 @@ def acceleration(
     for name in ("u", "n"):
         if name in model.state_names:
             start[model.state_names.index(name)] *= start_ratio
-    voyage = Voyage(model, dt, water_depth, start)
+    voyage = Voyage(model, dt, Conditions(water_depth, weather, seed), start)
     seconds = ACCELERATION * voyage.length_time if duration is None else duration
     check_number(seconds, "duration", at_least=2.0 * voyage.dt, hint="two samples")
     voyage.go(voyage.rate_helmsman()(0.0), round(seconds / voyage.dt))

@@ -11,9 +11,10 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, ship_length
 from shipgym.manoeuvres.zigzags import number_of_steps
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
 from shipgym.simulation.simulate import simulate
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 
@@ -52,6 +53,8 @@ def turning_circle(
     duration: float = 900.0,
     dt: float = 0.1,
     water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a turning circle from straight ahead at service speed, without an approach run.
 
@@ -65,6 +68,10 @@ def turning_circle(
         s. The samples are dt apart.
     water_depth : float
         m.
+    weather : Weather or str, optional
+        A weather or the name of a sea state; by default calm.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -83,7 +90,7 @@ def turning_circle(
     n_steps = number_of_steps(duration, dt)
     commands = np.repeat(model.service_command[None], n_steps, axis=0)
     commands[:, 0] = np.radians(rudder_deg)
-    return simulate(model, commands, dt, None, water_depth, kind="turning-circle")
+    return simulate(model, commands, dt, None, water_depth, "turning-circle", weather, seed)
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError
-from shipgym.kernels import layout
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
-from shipgym.models.ship_model import ShipModel
+from shipgym.models.ship_model import Seed, ShipModel
+from shipgym.simulation.conditions import Conditions, Passage
 from shipgym.simulation.simulate import as_trial, unstable
 from shipgym.trial import Trial
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,8 @@ def zigzag(
     switch: Literal["inside", "step"] = "inside",
     water_depth: float = np.inf,
     must_reverse: bool = True,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
@@ -70,6 +73,11 @@ def zigzag(
         m, for ships that know shallow water.
     must_reverse : bool
         Whether a ship that never reaches the heading of the first reversal is an error.
+    weather : Weather or str, optional
+        A weather or the name of a sea state. The rudder is reversed by the heading without first-order
+        motion in waves, as a helmsman does who sees through it.
+    seed : int or Generator
+        Of the weather.
 
     Returns
     -------
@@ -89,14 +97,14 @@ def zigzag(
     threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
-    states = np.empty((n_steps + 1, layout.N_STATE))
-    states[0] = model.kernel_states(model.service_state[None])[0]
+    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
     commands = np.empty(n_steps + 1)
     first = -angle if port_first else angle
-    ship = model.ship_tile(water_depth)
-    reached, turns = model.kernel("trajectories").zigzag(
-        states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside", ship
-    )
+    reached, turns = passage.kernel("trajectories").zigzag(
+        states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside",
+        passage.sky, passage.words, passage.ship,
+    )  # fmt: skip
     times = dt * np.arange(n_steps + 1, dtype=float)
     if reached < n_steps:
         raise unstable(model, times[reached], states[reached])

@@ -21,8 +21,10 @@ from shipgym.steering import SteeringGear
 
 if TYPE_CHECKING:
     from shipgym.trial import Trial
+    from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
+Seed = int | np.random.Generator
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +219,13 @@ class ShipModel:
         return tuple("p" if name == "q" else name for name in self.state_names)
 
     def simulate(
-        self, commands: ArrayLike, dt: float, state: ArrayLike | None = None, water_depth: float = np.inf
+        self,
+        commands: ArrayLike,
+        dt: float,
+        state: ArrayLike | None = None,
+        water_depth: float = np.inf,
+        weather: Weather | str | None = None,
+        seed: Seed = 0,
     ) -> Trial:
         """Simulate with commands held over each step (classical Runge-Kutta).
 
@@ -231,11 +239,19 @@ class ShipModel:
             Where to start; by default straight ahead at service speed.
         water_depth : float
             In m, for ships that know shallow water.
+        weather : Weather or str, optional
+            A weather or the name of a sea state; by default calm.
+        seed : int or Generator
+            Of the weather.
 
         Returns
         -------
         Trial
-            n_steps + 1 samples with the state and the commands (`delta_command`).
+            n_steps + 1 samples with the state and the commands (`delta_command`). In weather x and y are over
+            ground, u and v through the water; psi, r, p and phi are without the first-order motion in waves,
+            which is in `psi_wave`, `r_wave`, `phi_wave`, `p_wave`; `current_north`, `current_east`,
+            `wind_speed` and `wind_from` tell the weather. What instruments show of it all:
+            `shipgym.simulation.Sensors`.
 
         Raises
         ------
@@ -244,7 +260,7 @@ class ShipModel:
         """
         from shipgym.simulation.simulate import simulate
 
-        return simulate(self, commands, dt, state, water_depth)
+        return simulate(self, commands, dt, state, water_depth, weather=weather, seed=seed)
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[ShipModel]:
         """Models whose coefficients are drawn from the identified covariance.
@@ -307,14 +323,17 @@ class ShipModel:
         """Source of the accelerations that are compiled into the kernels."""
         return self.dynamics.accelerations_source(self.coefficients)
 
-    def kernel(self, name: str) -> ModuleType:
-        """One file of kernels, compiled together with this ship."""
+    def kernel(self, name: str, weather: bool = False) -> ModuleType:
+        """One file of kernels, compiled together with this ship, for calm water or for weather."""
         from shipgym.simulation.compiled import kernel
 
-        return kernel(self.accelerations_source, name)
+        return kernel(self.accelerations_source, name, weather)
 
-    def ship_column(self, water_depth: float = np.inf) -> Floats:
-        """Constants and coefficients in the order of the kernels' rows, shape (n_rows,)."""
+    def ship_column(self, water_depth: float = np.inf, weather: Floats | None = None) -> Floats:
+        """Constants and coefficients in the order of the kernels' rows, shape (n_rows,).
+
+        `weather` holds the rows that tell of it (`shipgym.simulation.conditions`); none in calm water.
+        """
         p, gear = self.particulars, self.steering
         coefficients = self.dynamics.kernel_coefficients(self.coefficients, p, self.service_shaft_speed)
         column = np.zeros(layout.row(layout.COEFFICIENTS) + len(coefficients))
@@ -325,22 +344,24 @@ class ShipModel:
         column[layout.row(layout.GEAR_FREQUENCY)] = 1.0 / gear.time_constant if gear.time_constant else 0.0
         column[layout.row(layout.SERVICE_SHAFT)] = self.service_shaft_speed
         column[layout.row(layout.WATER_DEPTH)] = water_depth
-        low, high, centre, shape, end = map(layout.row, (
+        low, high, centre, shape, weather_at, end = map(layout.row, (
             layout.ENVELOPE_LOW, layout.ENVELOPE_HIGH, layout.ENVELOPE_CENTRE, layout.ENVELOPE_SHAPE,
-            layout.COEFFICIENTS,
+            layout.WEATHER, layout.COEFFICIENTS,
         ))  # fmt: skip
         column[low:high], column[high:centre] = -np.inf, np.inf
         if self.envelope is not None:
             column[low:high], column[high:centre] = self.envelope.low, self.envelope.high
             column[centre:shape] = self.envelope.centre
-            column[shape:end] = self.envelope.shape[np.triu_indices(4)]
+            column[shape:weather_at] = self.envelope.shape[np.triu_indices(4)]
+        if weather is not None:
+            column[weather_at:end] = weather
         column[end:] = coefficients
         return column
 
-    def ship_tile(self, water_depth: float = np.inf) -> Floats:
+    def ship_tile(self, water_depth: float = np.inf, weather: Floats | None = None) -> Floats:
         """A tile with the ship in each lane, as the kernels read it, shape (n_rows * 64,), a new array."""
         self.check_depth(water_depth)
-        return np.repeat(self.ship_column(water_depth), layout.LANES)
+        return np.repeat(self.ship_column(water_depth, weather), layout.LANES)
 
 
 def _expect_last_axis(argument: str, array: Floats, names: tuple[str, ...]) -> None:

@@ -207,10 +207,10 @@ class Structure:
         """Power of U in the feature: in the prime system 2 (memory: 3) less one per velocity, else none."""
         if self.normalisation != "prime":
             return 0
-        return self._speeds(equation) - term.power(*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
+        return self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
 
     @staticmethod
-    def _speeds(equation: str) -> int:
+    def unit_speeds(equation: str) -> int:
         """Power of the speed in the unit of what an equation makes up."""
         return 3 if equation == "q" else 2
 
@@ -228,11 +228,11 @@ class Structure:
         """
         if self.normalisation == "si":
             return 1.0
-        lengths = term.power(*TURN_RATES) + 1 - self._speeds(equation) - (equation in ANGULAR)
+        lengths = term.power(*TURN_RATES) + 1 - self.unit_speeds(equation) - (equation in ANGULAR)
         turns = term.power(*SHAFT_SPEEDS)
         if self.normalisation == "prime":
             return float(length ** float(lengths + turns))
-        speeds = self._speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
+        speeds = self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
         return float(length ** float(lengths) * speed ** float(speeds) / (shaft**turns if turns else 1.0))
 
     def features(

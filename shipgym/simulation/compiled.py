@@ -2,8 +2,8 @@
 
 The folder `shipgym/kernels` is copied into the user's cache under a name that hashes its contents,
 the ship's `accelerations.py`, the versions of Python and Numba and the processor; Numba's own on-disk
-cache lies beside the copied files. The folder is written beside its target and renamed, so any number
-of processes may compile at once.
+cache lies beside the copied files. Where there is weather, `open_sea.py` is its `weather.py`. The folder is
+written beside its target and renamed, so any number of processes may compile at once.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ CACHE_VARIABLE = "SHIPGYM_CACHE"
 
 
 @cache
-def kernel(accelerations: str, name: str) -> ModuleType:
+def kernel(accelerations: str, name: str, weather: bool = False) -> ModuleType:
     """One file of kernels, compiled together with a ship.
 
     Parameters
@@ -38,20 +38,24 @@ def kernel(accelerations: str, name: str) -> ModuleType:
         Source of the ship's `accelerations.py`.
     name : str
         File of `shipgym/kernels`, without its ending.
+    weather : bool
+        Whether there is current, wind or waves.
 
     Returns
     -------
     module
         With the compiled functions of that file.
     """
-    return importlib.import_module(f"{_package(accelerations)}.{name}")
+    return importlib.import_module(f"{_package(accelerations, weather)}.{name}")
 
 
 @cache
-def _package(accelerations: str) -> str:
+def _package(accelerations: str, weather: bool) -> str:
     """Name of the imported package that holds the kernels of one ship."""
     files = {path.name: path.read_bytes() for path in sorted(KERNELS.glob("*.py"))}
     files["accelerations.py"] = accelerations.encode()
+    if weather:
+        files["weather.py"] = files["open_sea.py"]
     name = f"shipgym_kernels_{_fingerprint(files)}"
     folder = _write_once(name, files)
     spec = importlib.util.spec_from_file_location(

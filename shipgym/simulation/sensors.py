@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
+from shipgym.kernels.weather_rows import CHANNEL_NAMES
 from shipgym.trial import Trial
 from shipgym.units import CHANNELS, check_channel
 
@@ -173,7 +174,8 @@ class Sensors:
         Returns
         -------
         Trial
-            Of the same channels and name; samples in gaps are left out.
+            Of the same channels and name; samples in gaps are left out. Heading, heel and their rates have
+            the first-order motion in waves in them; the weather itself is not measured.
 
         Raises
         ------
@@ -189,9 +191,9 @@ class Sensors:
             )
             if name not in ORDERS
             else held(t, trial.t, values)
-            for name, values in trial.channels.items()
+            for name, values in on_board(trial).items()
         }
-        kept = self._logged(len(t), np.random.default_rng([seed, len(CHANNELS)]))
+        kept = self._logged(len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])]))
         if kept.sum() < FEWEST_SAMPLES:
             raise InputError(
                 f"trial {trial.name!r}: {kept.sum()} of {len(t)} samples outside the gaps, expected at least "
@@ -232,6 +234,17 @@ class Sensors:
 
 PERFECT = Sensor()
 ORDERS = ("delta_command", "n_command")
+WEATHER = CHANNEL_NAMES  # known of a simulation, to no instrument
+
+
+def on_board(trial: Trial) -> dict[str, Floats]:
+    """What there is to measure: first-order motion in waves added, the weather left out."""
+    channels = trial.channels
+    return {
+        name: values + channels[f"{name}_wave"] if f"{name}_wave" in channels else values
+        for name, values in channels.items()
+        if name not in WEATHER
+    }
 
 
 def held(times: Floats, t: Floats, orders: Floats) -> Floats:

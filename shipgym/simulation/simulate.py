@@ -6,11 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.kernels import layout
-from shipgym.models.ship_model import ShipModel, two_commands
+from shipgym.kernels import layout, weather_rows
+from shipgym.models.ship_model import Seed, ShipModel, two_commands
+from shipgym.simulation.conditions import Conditions, Passage
 from shipgym.simulation.orders import checked_orders
 from shipgym.trial import Trial
 from shipgym.units import CHANNELS
+from shipgym.weather.conditions import Weather
 
 Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
@@ -23,15 +25,18 @@ def simulate(
     state: ArrayLike | None = None,
     water_depth: float = np.inf,
     kind: str | None = None,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
 ) -> Trial:
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
-    states = np.empty((len(held) + 1, layout.N_STATE))
-    states[0] = model.kernel_states(initial_state(model, state)[None])[0]
-    ship = model.ship_tile(water_depth)
-    reached = model.kernel("trajectories").simulate(states, two_commands(held), dt, ship)
+    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    states = passage.states(model.kernel_states(initial_state(model, state)[None])[0], len(held))
+    reached = passage.kernel("trajectories").simulate(
+        states, two_commands(held), dt, passage.sky, passage.words, passage.ship
+    )
     times = dt * np.arange(len(states), dtype=float)
     if reached < len(held):
         raise unstable(model, times[reached], states[reached])
@@ -103,8 +108,11 @@ def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
 
 
 def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
-    """States of the kernels and the commands held from each sample on as a Trial."""
+    """States of the kernels, the weather behind them and the commands held from each sample on as a Trial."""
     channels = _channels(model, states)
+    for name, values in zip(weather_rows.CHANNEL_NAMES, states[:, layout.N_STATE :].T, strict=False):
+        if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
+            channels[name] = values
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
         if name == "n":

@@ -1,0 +1,382 @@
+"""Weather in simulations, manoeuvres and the course-keeping environment."""
+
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import InputError, manoeuvres
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.kernels.random import DRAW, normal, stream
+from shipgym.simulation import Sensors, open_loop
+from shipgym.simulation.conditions import Conditions, Passage
+from shipgym.simulation.simulate import simulate
+from shipgym.weather import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
+from shipgym.weather.drift import wave_drift
+from shipgym.weather.mobility import mobility_matrix
+
+GALE = Weather(
+    current=Current(1.0, 90.0, 0.2, 300.0), wind=Wind(12.0, 45.0), waves=Waves(3.25, 9.7, 45.0), name="gale"
+)
+ZERO = np.zeros(720)
+STATE = ("x", "y", "psi", "u", "v", "r", "delta")
+
+
+@pytest.fixture(scope="module")
+def mariner():
+    return shipgym.load_model("mariner")
+
+
+def ahead(model, weather=None, steps=1200, dt=0.5, seed=0, state=None, rudder=0.0):
+    return simulate(model, np.full((steps, 1), rudder), dt, state, weather=weather, seed=seed)
+
+
+def inert(model, speed=1e-9):
+    """The ship's body without any force of water on it, and its state at a speed."""
+    state = model.service_state.copy()
+    state[3] = speed
+    return replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0)), state
+
+
+def steady_wind(from_deg, speed=15.0):
+    return Weather(wind=Wind(speed, from_deg, gust=False))
+
+
+def sampling_error(correlation_time, duration):
+    """Relative standard error of a variance from a record of a Gauss-Markov process (Bendat & Piersol)."""
+    return np.sqrt(2.0 * correlation_time / duration)
+
+
+@pytest.mark.parametrize("weather", ["calm", Weather(), Weather(current=Current(0.0), wind=Wind(0.0))])
+def test_calm_weather_is_no_weather(mariner, weather):
+    there, here = ahead(mariner, weather, rudder=0.1), ahead(mariner, rudder=0.1)
+    assert there.channels.keys() == here.channels.keys()
+    for name in here.channels:
+        np.testing.assert_array_equal(there[name], here[name])
+
+
+def test_a_constant_current_is_a_moving_frame(mariner):
+    drifting = ahead(mariner, Weather(current=Current(1.5, 60.0)), rudder=0.2)
+    still = ahead(mariner, rudder=0.2)
+    for name in ("psi", "u", "v", "r"):
+        np.testing.assert_array_equal(drifting[name], still[name])
+    way = 1.5 * still.t
+    np.testing.assert_allclose(drifting["x"], still["x"] + way * np.cos(np.radians(60.0)), atol=1e-9)
+    np.testing.assert_allclose(drifting["y"], still["y"] + way * np.sin(np.radians(60.0)), atol=1e-9)
+
+
+def test_a_ship_is_carried_along_by_a_varying_current(mariner):
+    trial, still = ahead(mariner, Weather(current=Current(0.0, 0.0, 0.5, 100.0))), ahead(mariner)
+    np.testing.assert_array_equal(trial["u"], still["u"])
+    carried = np.concatenate([[0.0], np.cumsum(0.5 * trial["current_north"][:-1])])
+    np.testing.assert_allclose(trial["x"] - still["x"], carried, atol=1e-8)
+
+
+@pytest.mark.parametrize("from_deg", [0.0, 30.0, 90.0, 150.0, -120.0])
+def test_the_first_push_of_the_wind_is_its_force_by_the_inertia(mariner, from_deg):
+    body, at_rest = inert(mariner)
+    dt, speed = 1e-3, 15.0
+    trial = ahead(body, steady_wind(from_deg, speed), 2, dt, state=at_rest)
+    curves = wind_curves(mariner.particulars)
+    pressure = 0.5 * AIR_DENSITY * speed**2
+    forces = [
+        pressure * np.interp(np.radians(from_deg % 360.0), curves.angle, curve)
+        for curve in (curves.X, curves.Y, curves.N, curves.K)
+    ]
+    expected = mobility_matrix(mariner) @ forces
+    felt = [(trial[name][1] - trial[name][0]) / dt for name in "uvr"]
+    scale = np.abs(mobility_matrix(mariner)) @ [
+        pressure * np.abs(curve).max() for curve in (curves.X, curves.Y, curves.N, curves.K)
+    ]
+    assert np.all(np.abs(felt - expected[:3]) < 0.04 * scale[:3])  # six harmonics
+
+
+def test_waves_push_by_the_mean_drift_force_times_one_plus_its_variation(mariner):
+    body, at_rest = inert(mariner)
+    waves = Waves(3.0, 9.0, 60.0)
+    passage, pushes = Passage(body, Conditions(weather=Weather(waves=waves)), 1e-3), []
+    for word in range(300):
+        passage.words[0] = word
+        states = passage.states(body.kernel_states(at_rest[None])[0], 2)
+        passage.kernel("trajectories").simulate(
+            states, np.zeros((2, 2)), 1e-3, passage.sky, passage.words, passage.ship
+        )
+        pushes.append(states[1, 4])
+    drift = wave_drift(waves, mariner.particulars)
+    at = np.argmin(np.abs(drift.chi - np.radians(60.0)))
+    mean = (mobility_matrix(mariner) @ [drift.X[at], drift.Y[at], drift.N[at], 0.0])[1] * 1e-3
+    assert np.mean(pushes) == pytest.approx(mean, rel=4.0 / np.sqrt(300))
+    assert np.std(pushes) == pytest.approx(abs(mean), rel=4.0 / np.sqrt(600))
+
+
+def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
+    crooked = [name for name in mariner.coefficients if name[:3] in ("Y_0", "N_0")]
+    symmetric = replace(mariner, coefficients=mariner.coefficients | dict.fromkeys(crooked, 0.0))
+    port, starboard = (ahead(symmetric, steady_wind(side * 70.0), rudder=side * 0.05) for side in (-1.0, 1.0))
+    sign = {"y": -1.0, "psi": -1.0, "v": -1.0, "r": -1.0, "delta": -1.0}
+    for name in STATE:
+        np.testing.assert_allclose(port[name], sign.get(name, 1.0) * starboard[name], rtol=1e-9, atol=1e-9)
+
+
+def test_head_wind_slows_and_following_wind_does_not(mariner):
+    calm, head, stern = (
+        ahead(mariner, weather, 60)["u"][-1] for weather in (None, steady_wind(0.0), steady_wind(180.0))
+    )
+    assert head < calm < stern
+
+
+def test_wind_and_waves_from_abeam_set_a_ship_to_leeward(mariner):
+    body, at_rest = inert(mariner)
+    for weather in (steady_wind(90.0), Weather(waves=Waves(3.0, 9.0, 90.0))):
+        trial = ahead(body, weather, 40, state=at_rest)
+        assert trial["v"][-1] < 0.0  # from starboard to port
+        assert trial["y"][-1] < 0.0
+
+
+def test_the_air_a_ship_meets_in_her_own_way_is_in_her_model_already(mariner):
+    """The least wind there is changes nothing: still air is no force."""
+    windy = ahead(mariner, steady_wind(0.0, 1e-6), 100)
+    np.testing.assert_allclose(windy["u"], ahead(mariner, steps=100)["u"], rtol=1e-7)
+
+
+def test_the_current_has_its_variance_and_correlation(mariner):
+    T, steps, dt = 50.0, 20000, 2.0
+    trial = ahead(mariner, Weather(current=Current(1.0, 30.0, 0.3, T)), steps, dt)
+    error = sampling_error(T, steps * dt)
+    for name, mean in (("current_north", np.cos(np.pi / 6)), ("current_east", np.sin(np.pi / 6))):
+        variation = trial[name] - mean
+        assert variation.var() == pytest.approx(0.09, rel=4.0 * error)
+        lag = round(T / dt)
+        correlation = np.mean(variation[:-lag] * variation[lag:]) / 0.09
+        assert correlation == pytest.approx(np.exp(-1.0), abs=4.0 * error)
+    north, east = trial["current_north"], trial["current_east"]
+    assert abs(np.corrcoef(north, east)[0, 1]) < 4.0 * error
+
+
+def test_gusts_have_the_variance_of_their_spectrum(mariner):
+    wind, steps, dt = Wind(12.0, 0.0), 20000, 2.0
+    trial = ahead(mariner, Weather(wind=wind), steps, dt)
+    T, deviation = gust_filter(wind)
+    assert trial["wind_speed"].std() == pytest.approx(deviation, rel=2.0 * sampling_error(T, steps * dt))
+    assert trial["wind_speed"].mean() == pytest.approx(
+        12.0, abs=4.0 * deviation * np.sqrt(2.0 * T / (steps * dt))
+    )
+
+
+@pytest.mark.parametrize("dt", [0.2, 1.0])
+def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, monkeypatch, dt):
+    """With a body on which nothing acts, so that it keeps its course: variance, correlation and yaw rate."""
+    none = lambda waves, ship: replace(wave_drift(waves, ship), X=ZERO, Y=ZERO, N=ZERO)  # noqa: E731
+    monkeypatch.setattr("shipgym.simulation.weather_column.wave_drift", none)
+    waves, steps = Waves(3.25, 9.7, 60.0), 40000
+    model, state = inert(mariner, mariner.particulars["speed"])
+    trial = ahead(model, Weather(waves=waves), steps, dt, state=state)
+    assert np.ptp(trial["psi"]) == 0.0
+    motion = wave_motion(waves, model.particulars)
+    variance = motion.heading_variance[np.argmin(np.abs(motion.chi - np.radians(60.0)))]
+    w0 = 2.0 * np.pi / 9.7
+    w = w0 + w0**2 / 9.80665 * model.particulars["speed"] * np.cos(np.radians(60.0))
+    damping = 0.1056
+    error = sampling_error(0.5 / (damping * w), steps * dt)
+    assert trial["psi_wave"].var() == pytest.approx(variance, rel=0.03 + 4.0 * error)
+    assert trial["r_wave"].var() == pytest.approx(variance * w**2, rel=0.03 + 4.0 * error)
+    lag = round(4.0 / dt)
+    theta, s = w * lag * dt, np.sqrt(1.0 - damping**2)
+    expected = np.exp(-damping * theta) * (np.cos(s * theta) - damping / s * np.sin(s * theta))
+    psi = trial["psi_wave"]
+    assert np.mean(psi[lag:] * psi[:-lag]) / psi.var() == pytest.approx(expected, abs=4.0 * error)
+
+
+def test_waves_roll_a_ship_that_can_roll():
+    trial = shipgym.load_model("container").simulate(
+        np.tile([0.0, 1.0], (2000, 1)), 0.5, weather=Weather(waves=Waves(3.0, 9.0, 90.0))
+    )
+    assert trial["phi_wave"].std() > 0.0
+    assert "phi_wave" not in ahead(shipgym.load_model("mariner"), GALE, 2).channels
+
+
+def test_numbers_of_the_generator_are_normal():
+    words = [np.uint64(stream(np.uint64(7), np.uint64(k))) for k in range(4)]
+    z = np.array([normal(word, draw) for word in words for draw in DRAW])
+    assert len(set(z.tolist())) == len(z)
+    trial = ahead(shipgym.load_model("mariner"), Weather(current=Current(0.0, 0.0, 1.0, 1e-6)), 40000, 0.1)
+    white = np.concatenate([trial["current_north"], trial["current_east"]])
+    n = len(white)
+    assert abs(white.mean()) < 4.0 / np.sqrt(n)
+    assert white.var() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / n))
+    assert np.mean(white**3) == pytest.approx(0.0, abs=4.0 * np.sqrt(15.0 / n))
+    assert np.mean(white**4) == pytest.approx(3.0, abs=4.0 * np.sqrt(96.0 / n))
+    assert np.mean(np.abs(white) > 3.0) == pytest.approx(0.0027, abs=4.0 * np.sqrt(0.0027 / n))
+    assert abs(np.mean(white[1:] * white[:-1])) < 4.0 / np.sqrt(n)
+
+
+def test_a_simulation_is_a_function_of_its_seed(mariner):
+    first, second, other = (ahead(mariner, GALE, 50, seed=seed) for seed in (4, 4, 5))
+    for name in first.channels:
+        np.testing.assert_array_equal(first[name], second[name])
+    assert not np.array_equal(first["psi_wave"], other["psi_wave"])
+    through = mariner.simulate(np.zeros((50, 1)), 0.5, weather=GALE, seed=4)
+    np.testing.assert_array_equal(through["psi"], first["psi"])
+
+
+def test_instruments_show_the_motion_in_waves(mariner):
+    trial = ahead(mariner, GALE, 50)
+    logged = Sensors({}).measure(trial)
+    np.testing.assert_allclose(logged["psi"], trial["psi"] + trial["psi_wave"], atol=1e-14)
+    np.testing.assert_allclose(logged["r"], trial["r"] + trial["r_wave"], atol=1e-14)
+    assert set(logged.channels) == {*STATE, "delta_command"}
+
+
+def test_prediction_of_a_trial_knows_no_weather(mariner):
+    trial = ahead(mariner, rudder=0.1)
+    np.testing.assert_allclose(open_loop(mariner, trial)["psi"], trial["psi"], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "run",
+    [
+        lambda ship, **sea: manoeuvres.zigzag(ship, duration=200.0, **sea),
+        lambda ship, **sea: manoeuvres.turning_circle(ship, duration=100.0, **sea),
+        lambda ship, **sea: manoeuvres.prbs_rudder(ship, duration=60.0, **sea),
+        lambda ship, **sea: manoeuvres.multi_sine_rudder(ship, duration=300.0, **sea),
+        lambda ship, **sea: manoeuvres.random_rudder_steps(ship, duration=60.0, **sea),
+    ],
+)
+def test_manoeuvres_in_weather(mariner, run):
+    rough, again, calm = (
+        run(mariner, weather="rough", seed=1),
+        run(mariner, weather="rough", seed=1),
+        run(mariner),
+    )
+    np.testing.assert_array_equal(rough["psi"], again["psi"])
+    assert rough["wind_speed"].mean() > 8.0
+    assert rough["u"].mean() < calm["u"].mean()
+
+
+def test_voyages_in_weather_go_on_from_leg_to_leg():
+    tanker = shipgym.load_model("tanker")
+    sea = {"weather": Weather(current=Current(1.0, 90.0), wind=Wind(10.0, 0.0)), "seed": 2}
+    for trial in (
+        manoeuvres.stopping(tanker, speed_ratio=0.6, **sea),
+        manoeuvres.acceleration(tanker, duration=200.0, **sea),
+        manoeuvres.shaft_speed_steps(tanker, duration=100.0, **sea),
+    ):
+        np.testing.assert_allclose(trial["current_east"], 1.0, rtol=1e-12)
+        assert np.abs(np.diff(trial["wind_speed"])).max() < 3.0  # no leg begins another weather
+        assert np.ptp(trial["wind_speed"]) > 0.5
+
+
+def engine(model, lanes, sea="rough", **task):
+    return CourseKeepingEngine(model, lanes, CourseKeepingTask(sea, **task))
+
+
+def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
+    small, large = engine(mariner, 3), engine(mariner, 70)
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model="mariner", sea="rough").unwrapped
+    seen, many = small.reset([65, 66, 67]), large.reset(np.arange(70))
+    single, _ = env.reset(seed=66)
+    for k in range(150):
+        np.testing.assert_array_equal(seen, many[65:68])
+        np.testing.assert_array_equal(single, many[66])
+        action = np.float32(0.3 * np.sin(0.1 * k))
+        seen, *_ = small.step(np.full((3, 1), action))
+        many, rewards, *_ = large.step(np.full((70, 1), action))
+        single, reward, *_ = env.step(np.array([action]))
+        assert reward == rewards[66]
+    assert len(np.unique(large.physical_state()["wind_from"])) == 70
+
+
+def test_lanes_with_ships_of_their_own_and_the_same_weather(mariner):
+    several, one = engine([mariner] * 5, 5), engine(mariner, 5)
+    several.reset(np.arange(5)), one.reset(np.arange(5))
+    for _ in range(20):
+        observations = [e.step(np.full((5, 1), 0.1))[0] for e in (several, one)]
+    np.testing.assert_array_equal(*observations)
+
+
+def test_the_environment_shows_the_measured_and_judges_the_slow_heading(mariner):
+    rough = engine(mariner, 8)
+    rough.reset(np.arange(8))
+    for _ in range(30):
+        observations, *_ = rough.step(np.zeros((8, 1)))
+    state = rough.physical_state()
+    shown = state["set_point"] - state["psi"] - state["psi_wave"]
+    np.testing.assert_allclose(observations[:, 0], np.sin(shown), atol=1e-6)
+    scale = mariner.particulars["speed"] / mariner.particulars["length"]
+    np.testing.assert_allclose(observations[:, 2] * scale, state["r"] + state["r_wave"], atol=1e-7)
+    cost = (state["set_point"] - state["psi"] + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(-rough.reward_parts[:, 0], (cost / np.radians(30.0)) ** 2, rtol=1e-9)
+
+
+def test_the_sea_changes_no_task(mariner):
+    rough, calm = engine(mariner, 4), engine(mariner, 4, "calm")
+    for e in (rough, calm):
+        e.reset(np.arange(4))
+    np.testing.assert_array_equal(rough.physical_state()["set_point"], calm.physical_state()["set_point"])
+
+
+def test_a_finished_lane_stays_in_weather(mariner):
+    short = engine(mariner, 2, episode_steps=4)
+    for _ in range(4):
+        short.step(np.zeros((2, 1)))
+    before, observations = short.physical_state(), short.observations
+    after, *_ = short.step(np.ones((2, 1)))
+    for name, value in short.physical_state().items():
+        np.testing.assert_array_equal(value, before[name])
+    np.testing.assert_array_equal(np.delete(after, 6, axis=1), np.delete(observations, 6, axis=1))
+
+
+def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
+    given = engine(mariner, 3, GALE)
+    assert given.physical_state()["wind_from"] == pytest.approx(np.pi / 4)
+    drawn = engine(mariner, 500, "slight")
+    drawn.reset(np.arange(500))
+    directions = drawn.physical_state()["wind_from"]
+    assert abs(np.exp(1j * directions).mean()) < 4.0 / np.sqrt(500)
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model="mariner", sea="slight").unwrapped
+    env.reset(seed=0)
+    first = env.physical_state()["wind_from"]
+    env.reset()
+    assert env.physical_state()["wind_from"] != first
+
+
+FLY = """
+import numpy as np, shipgym
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2, CourseKeepingTask("rough"))
+engine.reset([1, 2])
+for k in range(30):
+    observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
+trial = shipgym.load_model("mariner").simulate(np.full((50, 1), 0.2), 0.5, weather="rough")
+print(repr([*observations[1].tolist(), float(trial["r_wave"][-1]), float(trial["psi"][-1])]))
+"""
+
+
+def test_without_compiling_the_weather_is_the_same():
+    runs = [
+        subprocess.run([sys.executable, "-c", FLY], env={**os.environ, **extra}, capture_output=True,
+                       text=True, check=True).stdout
+        for extra in ({}, {"NUMBA_DISABLE_JIT": "1"})
+    ]  # fmt: skip
+    np.testing.assert_allclose(eval(runs[0]), eval(runs[1]), rtol=1e-6, atol=1e-8)
+
+
+def test_wrong_weather(mariner):
+    bare = replace(mariner, particulars=replace(mariner.particulars, beam=None))
+    with pytest.raises(InputError, match="weather without the particulars it needs"):
+        ahead(bare, "rough", 2)
+    with pytest.raises(InputError, match="weather without the particulars it needs"):
+        engine(bare, 1)
+    with pytest.raises(InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"):
+        ahead(mariner, "rugh", 2)
+    with pytest.raises(InputError, match="sea: 7 found"):
+        CourseKeepingTask(7)
+    with pytest.raises(InputError, match="seed: -1 found"):
+        ahead(mariner, "rough", 2, seed=-1)
