@@ -37,8 +37,8 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
     InputError
         If all of them have the same rudder.
     """
-    rudders = np.array([np.abs(trial["delta"]).max() for trial in trials])
-    largest = rudders > ALIKE * rudders.max()
+    rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
+    largest: NDArray[np.bool_] = rudders > ALIKE * rudders.max()
     if largest.all():
         raise InputError(
             f"{where}: {LARGEST_RUDDER!r} found, but all trials to fit ({len(trials)}) reach "

@@ -12,7 +12,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["PAPERS", "Paper", "Row", "get_paper"]
 
-PAPERS = ("cao2015",)
+PAPERS = ("cao2015", "mei2019")
 
 
 def get_paper(name: str) -> Paper:
