@@ -162,7 +162,8 @@ def identify(
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     call = {
         "structure": structure, "method": method, "samples": samples, **sampling, "guarded": guarded,
-        "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength, **settings,
+        "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
+        "prior_folds": prior_folds, **settings,
         "particulars": particulars, "steering": steering,
     }  # fmt: skip
     return _judged(model, fit, problem, call)

@@ -23,9 +23,10 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.machine import Machine
-from identification.pattern_search import PatternSearch, pattern_search
+from identification.pattern_search import pattern_search
 from identification.prediction import predict
 from identification.samples import Samples
+from identification.tuning.search import BAND, SearchResult
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.models import GreyBox, ShipModel
@@ -243,17 +244,19 @@ def fit_rm_svm(
     asked.check()
     if not isinstance(blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
-            "which has a reference ship; or choose another method, such as 'tls-svm'"
+            f"method: 'rm-svm' found with structure {blank.structure!r}, which has no reference ship, "
+            "expected structure 'grey-box' with a reference_model: 'auto', a shipped model's name or a model "
+            "file; or choose another method, such as 'tls-svm'"
         )
     tuner = _Tuner(asked, samples, blank, trials)
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
     machines: Machines = {}
-    for q, band in zip(samples.features, bands.tolist(), strict=True):
+    for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
         machine = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
         machine.chosen_ = {"C": weight, "epsilon": band}
-        machine.search_ = search
+        if search is not None:
+            machine.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
         machines[q] = machine
     return machines
 
@@ -331,7 +334,7 @@ class _Tuner:
             piece = Trial(trial.t[held], channels, name=trial.name)
             yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
 
-    def bands(self, weight: float) -> tuple[Floats, PatternSearch | None]:
+    def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
         count = len(self.samples.features)
         if self.asked.epsilon is not None or weight == BARE or self.asked.regression == "ls-svm":

@@ -15,7 +15,8 @@ from identification.folds import LARGEST_RUDDER, TRIALS
 from identification.grey_box import structure_samples
 from identification.guarded_fit import with_coefficients
 from identification.methods import fit_all, get_method
-from identification.pipeline import IdentificationResult, identify
+from identification.pipeline import identify
+from identification.result import IdentificationResult
 from identification.samples import build_samples
 from identification.similarity import select_reference
 from shipgym.errors import UnstableModelError

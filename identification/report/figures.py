@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.diagnostics import autocorrelation, cross_correlation, without_overlap
 from identification.report.predictions import legend_above, overview_figure, prediction_figure
+from identification.tuning.search import BAND, LOG_C
 from identification.uncertainty import residuals
 from shipgym.plots import (
     LIMIT,
@@ -199,20 +200,22 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
 
 
 def search_figure(result: IdentificationResult) -> Figure:
-    """What a search had found after each of its rounds: objective, and weight C of the errors."""
-    figure = subplots(1, 2, titles=["best objective, by its last", "best C"], horizontal_spacing=0.1)
+    """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
+    logarithmic = all(search.variable == LOG_C for search in result.searches.values())
+    titles = ["best objective, by its last", "best C" if logarithmic else f"best {BAND}"]
+    figure = subplots(1, 2, titles=titles, horizontal_spacing=0.1)
     for (q, search), colour in zip(result.searches.items(), PALETTE, strict=False):
         rounds = np.arange(len(search.history))
         scale = search.value if search.value > 0.0 else 1.0
         name = EQUATIONS.get(q, q)
         figure.add_trace(line(rounds, search.history / scale, name, colour), row=1, col=1)
-        figure.add_trace(
-            line(rounds, 10.0 ** search.course[:, 0], name, colour, showlegend=False), row=1, col=2
-        )
+        best = 10.0 ** search.course[:, 0] if logarithmic else search.course[:, 0]
+        figure.add_trace(line(rounds, best, name, colour, showlegend=False), row=1, col=2)
     for column in (1, 2):
         figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
     figure.update_yaxes(axis(""), row=1, col=1)
-    figure.update_yaxes(axis("", type="log", exponentformat="power"), row=1, col=2)
+    decades = {"type": "log", "exponentformat": "power"} if logarithmic else {"range": [0.0, 1.0]}
+    figure.update_yaxes(axis("", **decades), row=1, col=2)
     margin = {"l": 62, "r": 18, "t": 76, "b": 48}
     figure.update_layout(layout(340, margin=margin, legend=legend_above(340), hovermode="closest"))
     return figure

@@ -58,7 +58,7 @@ CAPTIONS = {
         "directions make the solution larger and the residuals hardly smaller, is chosen, unless its "
         "residuals exceed those of full rank by more than chance."
     ),
-    "search": "The search for the weight C of the errors, round by round.",
+    "search": "The search for the weight C of the errors, or for insensitive bands, round by round.",
     "coefficients": (
         "95 % intervals in per cent of the estimate; those beyond the frame are cut. Grey intervals reach 0."
     ),

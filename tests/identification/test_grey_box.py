@@ -12,6 +12,7 @@ import shipgym
 from identification import IdentificationResult, identify
 from identification.folds import of_largest_rudder
 from identification.pattern_search import pattern_search
+from identification.report.figures import search_figure
 from identification.rm_svm import NEARLY, RMSVM
 from identification.similarity import correlations, select_reference, similarity_vector
 from shipgym import ShipModel, Trial
@@ -180,6 +181,16 @@ def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
     assert set(provenance["search"]) == {"u", "v", "r"}
     assert all(0.0 <= chosen["epsilon"] <= 1.0 for chosen in provenance["search"].values())
     assert "bare reference ship 'kvlcc2'" in rm_svm.summary()
+
+
+def test_the_search_for_the_bands_is_drawn(rm_svm: IdentificationResult) -> None:
+    chosen = (rm_svm.model.provenance or {})["search"]
+    for q, search in rm_svm.searches.items():
+        assert search.x.tolist() == search.course[-1].tolist() == [chosen[q]["epsilon"]]
+        assert list(search.history) == sorted(search.history, reverse=True)
+    figure = search_figure(rm_svm)
+    assert [note.text for note in figure.layout.annotations][1] == "best insensitive band"
+    assert figure.data[-1].y[-1] == pytest.approx(chosen["r"]["epsilon"], abs=1e-6)
 
 
 @pytest.fixture(scope="module")
