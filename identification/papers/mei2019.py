@@ -159,8 +159,8 @@ def tanker_rows() -> Iterator[Row]:
                 met,
                 ""
                 if met or limit is None
-                else "the limit is the structure: tanker and linear terms, by "
-                f"least squares of the zigzags and of these turns themselves, are off by {limit:+.1f} %",
+                else "the limit is the form, not the zigzags: tanker and linear terms, by least "
+                f"squares of the zigzags and of these turns themselves, are off by {limit:+.1f} %",
             )
 
 
@@ -176,7 +176,7 @@ def figure_rows(target: Target | None) -> Iterator[Row]:
     for q, word, printed in (("u", "surge", 0.005), ("v", "sway", 1.0), ("r", "yaw", 1.0)):
         yield _measured_row(
             "Figure 6", f"insensitive band of {word}", printed, pairs.get(f"band {q}", ()),
-            note="the best bands depend on C, which is not printed: there are many as good",
+            note="the best bands depend on C, which is not printed",
         )  # fmt: skip
     yield _measured_row(
         "Figure 6", "correlation of headings, 20/20 zigzag", 0.993, pairs.get("heading", ()),
