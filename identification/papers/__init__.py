@@ -1,6 +1,7 @@
 """The papers' cases, run again: what they print, what comes out their way, and what is best.
 
-One file per paper. Each holds a `PAPER`: a citation and a function that yields the rows of its tables.
+One file or folder per paper. Each holds a `PAPER`: a citation and a function that yields the rows of its
+tables.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["PAPERS", "Paper", "Row", "get_paper"]
 
-PAPERS = ("cao2015",)
+PAPERS = ("cao2015", "zhu2018")
 
 
 def get_paper(name: str) -> Paper:
