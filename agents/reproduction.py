@@ -103,7 +103,7 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
     ]
     lines += ["| " + " | ".join((*map(_escaped, _cells(row)), _escaped(row.note))) + " |" for row in rows]
-    return "\n".join([*lines, "", *([paper.appendix, ""] if paper.appendix else [])])
+    return "\n".join([*lines, ""])
 
 
 def _cells(row: Row) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from identification.following import Course, follow
     from identification.forces import ForceRegression, force_regression, identify_forces
     from identification.lssvm import LSSVM, TruncatedLSSVM
-    from identification.pipeline import IdentificationResult, identify
+    from identification.pipeline import identify
     from identification.polynomial import polynomial_coefficients
     from identification.recursive import (
         MultiInnovationLeastSquares,
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         StochasticGradient,
     )
     from identification.reduction import Reduction, backward_elimination, forward_selection, sensitivity
+    from identification.result import IdentificationResult
     from identification.rm_svm import RMSVM
     from identification.samples import Samples, build_samples
     from identification.tuning import (
@@ -38,7 +39,7 @@ _HOME = {
     "DifferentialEvolution": "identification.tuning",
     "ForceRegression": "identification.forces",
     "GridSearch": "identification.tuning",
-    "IdentificationResult": "identification.pipeline",
+    "IdentificationResult": "identification.result",
     "LSSVM": "identification.lssvm",
     "MultiInnovationLeastSquares": "identification.recursive",
     "ParticleSwarm": "identification.tuning",

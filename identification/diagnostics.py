@@ -163,7 +163,7 @@ def diagnose(
         By equation: those of `u`, `v`, `r` that the structure has.
     """
     errors = residuals(machines, samples)
-    apart = _without_overlap(samples)
+    apart = without_overlap(samples)
     found = {}
     for q, machine in machines.items():
         names = structure.regression_names(q)
@@ -209,6 +209,33 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
 
 
+def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
+    """Correlation of one series with another that is shifted.
+
+    Parameters
+    ----------
+    first, second : array of shape (n_samples,)
+        Two series at the same times.
+    lags : array of int of shape (n_lags,)
+        Samples by which the first comes after the second; negative where it comes before.
+
+    Returns
+    -------
+    array of shape (n_lags,)
+        Between -1 and 1; 0 where a series is constant or shorter than the lag.
+    """
+    a, b = first - first.mean(), second - second.mean()
+    power = float(np.sqrt((a @ a) * (b @ b)))
+    if power == 0.0:
+        return np.zeros(len(lags))
+    n = len(a)
+    return np.array([_shifted(a, b, int(k)) / power if abs(k) < n else 0.0 for k in lags])
+
+
+def _shifted(a: Floats, b: Floats, lag: int) -> float:
+    return float(a[lag:] @ b[: len(b) - lag]) if lag >= 0 else float(a[:lag] @ b[-lag:])
+
+
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
@@ -227,7 +254,7 @@ def variance_inflation(scaled: Floats) -> Floats:
     return factors
 
 
-def _without_overlap(samples: Samples) -> NDArray[np.int64]:
+def without_overlap(samples: Samples) -> NDArray[np.int64]:
     """Rows whose windows do not overlap."""
     step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
     return np.arange(0, len(samples), step)

@@ -12,7 +12,7 @@ from rich.table import Table
 from shipgym.particulars import ADDED_MASSES
 
 if TYPE_CHECKING:
-    from identification.pipeline import IdentificationResult
+    from identification.result import IdentificationResult
 
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
 PRIME = 1e-5
@@ -30,7 +30,7 @@ def summary_table(result: IdentificationResult) -> str:
         f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
     )
     console.print(_coefficients(result), _inertia(result), _equations(result))
-    for line in _undetermined(result):
+    for line in undetermined(result):
         console.print(line, highlight=False)
     if "reference" in result.metrics:
         console.print(_against_reference(result))
@@ -97,7 +97,7 @@ def _equations(result: IdentificationResult) -> Table:
     return table
 
 
-def _undetermined(result: IdentificationResult) -> list[str]:
+def undetermined(result: IdentificationResult) -> list[str]:
     """For each equation the terms that the data do not tell apart, of directions that the fit left out."""
     return [
         f"{EQUATIONS.get(name, name)}: not told apart by the data, their combination was left out: "

@@ -13,7 +13,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["PAPERS", "Paper", "Row", "get_paper"]
 
-PAPERS = ("cao2015", "zhu2018")
+PAPERS = ("cao2015", "zhu2018", "mei2019")
 
 
 def get_paper(name: str) -> Paper:

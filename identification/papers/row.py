@@ -59,12 +59,9 @@ class Paper:
         One sentence: which cases, on which data.
     rows : callable
         Yields the rows, in the order of the paper.
-    appendix : str
-        What the page of the documentation says below them, Markdown.
     """
 
     name: str
     citation: str
     what: str
     rows: Callable[[], Iterator[Row]]
-    appendix: str = ""

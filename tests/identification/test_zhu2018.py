@@ -1,22 +1,16 @@
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-from identification.papers import get_paper
 from identification.papers.zhu2018 import (
     container_ship,
     recursive_start,
-    requirements,
     response_models,
     sample_counts,
     small_vessel,
     steering_forms,
 )
-from identification.papers.zhu2018.fits import SEARCHES, steering_terms
+from identification.papers.zhu2018.fits import SEARCHES
 from identification.prediction import predict
-from identification.tuning import TunedLSSVM
 
 
 def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():
@@ -126,40 +120,3 @@ def test_the_small_vessel_is_predicted_better_than_printed():
     for (q, angle), printed in small_vessel.PRINTED.items():
         truth = small_vessel.sailed(angle)
         assert container_ship.mean_square(predict(model, truth), truth, q) < printed
-
-
-def yaw_regression():
-    trial = container_ship.zigzag_trial(10)
-    return steering_terms(trial)[:-1], np.diff(trial["r"])
-
-
-def test_the_cost_is_strictly_convex_and_the_fit_is_its_minimum():
-    """R7: w'w / 2 + C / 2 |e|^2 has a Hessian of which no eigenvalue is below 1, and no slope at the fit."""
-    X, y = yaw_regression()
-    machine = container_ship.search("ABC", "r").fit(X, y)
-    centred, target = X - X.mean(axis=0), y - y.mean()
-    hessian = np.eye(X.shape[1]) + machine.C_ * centred.T @ centred
-    assert np.linalg.eigvalsh(hessian).min() > 1.0 - 1e-9
-    slope = machine.coef_ - machine.C_ * centred.T @ (target - centred @ machine.coef_)
-    assert np.abs(slope).max() < 1e-9 * machine.C_ * np.abs(centred.T @ target).max()
-
-
-def test_the_fit_has_no_start_and_its_search_forgets_its_own():
-    """R6: from any seed C and coefficients are those of the finest grid."""
-    X, y = yaw_regression()
-    bounds = (1e-2, 1e6)
-    machines = [TunedLSSVM("abc", bounds=bounds, seed=seed).fit(X, y) for seed in range(5)]
-    grid = np.linspace(-2.0, 6.0, 4001)[:, None]
-    errors = machines[0]._objective(X, y, None, machines[0]._machine(bounds[1]))(grid)
-    for machine in machines:
-        assert machine.search_.value <= errors.min() * (1.0 + 1e-6)
-        np.testing.assert_allclose(machine.coef_, machines[0].coef_, rtol=1e-3)
-
-
-def test_each_requirement_names_what_shows_it():
-    tests = Path(__file__).parents[2]
-    assert [name for name, _, _ in requirements.REQUIREMENTS] == [f"R{k}" for k in range(1, 9)]
-    for _, _, where in requirements.REQUIREMENTS:
-        assert all((tests / path).exists() for path in re.findall(r"`(tests/\S+)`", where))
-        assert all(name in globals() for name in re.findall(r"`(test_\w+)`", where))
-    assert get_paper("zhu2018").appendix.count("\n| R") == 8

@@ -13,7 +13,6 @@ from identification.papers.row import Paper, Row
 from identification.papers.zhu2018 import (
     container_ship,
     recursive_start,
-    requirements,
     response_models,
     sample_counts,
     small_vessel,
@@ -36,5 +35,4 @@ PAPER = Paper(
     "by least squares, recursive least squares and LS-SVR with C by cross-validation, particle swarm and bee "
     "colony.",
     rows,
-    requirements.table(),
 )

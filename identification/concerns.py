@@ -6,7 +6,7 @@ from pathlib import PurePath
 
 import numpy as np
 
-from identification import IdentificationResult
+from identification.result import IdentificationResult
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable, steering_state_space
