@@ -152,7 +152,10 @@ def autopilot_command(
 @answered
 def reproduce_command(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020 or all.")
+        str,
+        typer.Argument(
+            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
+        ),
     ],
     markdown: Annotated[
         Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")

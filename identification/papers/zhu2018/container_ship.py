@@ -85,9 +85,9 @@ PRINTED_REGRESSION = {"u": 4.0346e-6, "v": 3.5005e-6, "r": 4.3924e-6}
 TABLES = {"u": "7.4.5", "v": "7.4.6", "r": "7.4.7"}
 BOUND = "bounds of the search are not printed; the training objective drives C to the upper one, here "
 
-#: Terms of `WITH_SPEED`: u^2, n^2; these and v r; U v, U r, v^2 r/U, U^2 delta: row 6 of Tables 7.4.9 and
-#: 7.4.10 with the speed of the moment, and the smooth v^2 in place of |v|.
-SURGE_ALONE, SURGE_IN_TURNS, FOUR_WITH_SPEED = (0, 2), (0, 1, 2), (0, 3, 7, 6)
+#: Terms of `WITH_SPEED`: u^2, n^2, n u; u^2, v r, n^2; U v, U r, v^2 r/U, U^2 delta, which is row 6 of Tables
+#: 7.4.9 and 7.4.10 with the speed of the moment and the smooth v^2 in place of |v|.
+SURGE_ALONE, SURGE_IN_TURNS, FOUR_WITH_SPEED = (0, 2, 3), (0, 1, 2), (0, 3, 7, 6)
 
 
 @cache
@@ -163,7 +163,7 @@ def predicted_errors(fits: dict[str, Difference]) -> dict[str, float]:
 
 @cache
 def best_surge() -> ShipModel:
-    """Surge on u^2 and n^2 (in equation 4.7), from spline samples of the first straight line."""
+    """Surge on u^2, n^2 and n u, from spline samples of the first straight line."""
     return spline_fit(straight_line("learned"), ship(), {"u": SURGE_ALONE})
 
 
@@ -252,7 +252,7 @@ def prediction_rows() -> Iterator[Row]:
                 best,
                 f"below {least:g}" + (f" (accepted: {ACCEPTED:g})" if q == "u" else ""),
                 best < least,
-                "shaft orders of the straight lines are not printed: a stand-in; at best: equation 4.7"
+                "shaft orders of the straight lines are not printed: a stand-in; at best: u^2, n^2 and n u"
                 if q == "u"
                 else "at best: row 6 of Table 7.4.9 with the instantaneous speed and surge",
             )

@@ -35,12 +35,12 @@ RAN_AWAY = 1e3  # m/s or rad/s: beyond every physical range
 SEARCHES = {"CV": ("grid", "k-fold"), "PSO": ("pso", "training"), "ABC": ("abc", "training")}
 
 #: The seven terms with the speed of the moment in them, so that they follow the loss of speed in a turn, two
-#: cubic ones, and surge to know that speed.
+#: cubic ones, and surge to know that speed: resistance, and a thrust that falls with the advance ratio.
 STEERING_WITH_SPEED = "U v, |v| v, |r| v, U r, |v| r, |r| r, U^2 delta, v^2 r/U, v^3/U"
 WITH_SPEED = accelerations(
     "zhu-with-speed",
     f"{ZHU}, equation 7.1, with the instantaneous speed, and surge",
-    u="u^2, v r, n^2",
+    u="u^2, v r, n^2, n u",
     v=STEERING_WITH_SPEED,
     r=STEERING_WITH_SPEED,
 )
