@@ -107,11 +107,14 @@ def test_kvlcc2_nomoto_overshoots_like_the_ship_within_its_form():
     assert found.mean() == pytest.approx(truth.mean(), abs=0.3)
 
 
-@pytest.mark.parametrize("name", ["kvlcc2-rm-svm", "kvlcc2-nomoto"])
-@pytest.mark.parametrize("design", [PID, LQ])
-def test_kvlcc2_is_steered_by_controllers_designed_on_her_models(name, design):
-    """The true ship keeps her course: no model of her, on the verge of stability, misleads the design."""
-    env = gymnasium.make("shipgym/CourseKeeping-v0", model="kvlcc2")
+@pytest.mark.parametrize(
+    ("name", "design"),
+    [("kvlcc2-rm-svm", PID), ("kvlcc2-rm-svm", LQ), ("kvlcc2-nomoto", PID), ("kvlcc2-nomoto", LQ),
+     ("container-abc-lssvr", LQ), ("container-nomoto", PID), ("mariner-nomoto", PID)],
+)  # fmt: skip
+def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
+    """The true ship keeps its course: no model of KVLCC2, on the verge of stability, misleads the design."""
+    env = gymnasium.make("shipgym/CourseKeeping-v0", model=name.split("-")[0])
     controller = design.from_model(shipgym.load_model(name))
     observation, _ = env.reset(seed=0)
     terminated = truncated = False

@@ -183,14 +183,20 @@ def best_errors() -> dict[str, float]:
     return {"u": mean_square(predict(best_surge(), line), line, "u")} | errors
 
 
-def seconds(equation: str, method: str, repeats: int = REPEATS) -> float:
-    """Processor time of a search with its fit, s: the least of several, so that other work does not count."""
-    times = []
-    for _ in range(repeats):
-        start = process_time()
-        fit_equation(equation, search(method, equation))
-        times.append(process_time() - start)
-    return min(times)
+@cache
+def seconds() -> dict[tuple[str, str], float]:
+    """Processor time of each search with its fit by method and equation, s.
+
+    The least of several, taken in turns, so that other work on the machine does not count.
+    """
+    searches = [(method, q) for method in PRINTED_TIME for q in EQUATIONS]
+    least = dict.fromkeys(searches, np.inf)
+    for _ in range(REPEATS):
+        for method, q in searches:
+            start = process_time()
+            fit_equation(q, search(method, q))
+            least[method, q] = min(least[method, q], process_time() - start)
+    return least
 
 
 def weight_rows() -> Iterator[Row]:
@@ -262,7 +268,7 @@ def time_rows() -> Iterator[Row]:
     """Table 7.4.4: time of search and fit at 1800 samples."""
     for method, printed in PRINTED_TIME.items():
         for q, value in printed.items():
-            best = seconds(q, method)
+            best = seconds()[method, q]
             yield Row(
                 "Table 7.4.4",
                 f"{method}, {EQUATIONS[q]}: time, s",
