@@ -24,7 +24,7 @@ def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():
 
 def test_with_the_printed_c_come_the_printed_coefficients_of_surge_and_yaw():
     rows = {(row.case, row.quantity): row for row in container_ship.coefficient_rows()}
-    assert len(rows) == 3 * (3 + 7 + 7)
+    assert len(rows) == 4 * (3 + 7 + 7)
     for method in SEARCHES:
         for case, name, within in (
             ("Table 7.4.5", "a1", 0.001),
