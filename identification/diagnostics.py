@@ -25,6 +25,7 @@ MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
+MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
 
 
 @dataclass(frozen=True)
@@ -126,13 +127,20 @@ def _is_still(t: Floats, delta: Floats) -> bool:
 
 
 def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
-    """Refuse a regression with fewer rows than terms.
+    """Refuse a regression with fewer rows than terms, or of a motion that never changes.
 
     Raises
     ------
     InputError
-        Naming the shortest trial.
+        Naming the shortest trial, or the channel.
     """
+    for q, change in samples.targets.items():
+        if not np.any(change):
+            raise InputError(
+                f"trial {trials[0].name!r}: channel {q!r} never changes, in none of the {len(trials)} trials "
+                f"to fit, expected the {MOTIONS.get(q, q)} to be excited and measured; leave the column out "
+                "if it was not measured, or choose a structure without that equation"
+            )
     terms = max(len(structure.regression_names(q)) for q in structure.regressed)
     if len(samples) <= terms:
         shortest = min(trials, key=len)

@@ -104,8 +104,8 @@ class Method:
         return True
 
 
-def _least_squares(**settings: Any) -> Machine:
-    return TruncatedLSSVM(selection="full", fit_intercept=False, **settings)
+def _least_squares(scale: bool = True, robust: bool = False) -> Machine:
+    return TruncatedLSSVM(selection="full", fit_intercept=False, scale=scale, robust=robust)
 
 
 def _ls_svm(C: float = 1e6, **settings: Any) -> Machine:

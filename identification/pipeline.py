@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import shipgym
 from identification.bootstrap import bootstrap_covariance, influence_covariance
 from identification.diagnostics import diagnose
+from identification.folds import TRIALS
 from identification.grey_box import bare_metrics
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
@@ -57,7 +58,7 @@ def identify(
     reference_model: str | ShipModel | None = None,
     prior: str | ShipModel | None = None,
     prior_strength: float | None = None,
-    prior_folds: str = "trials",
+    prior_folds: str = TRIALS,
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -140,6 +141,8 @@ def identify(
     blank, regression, used = problem.blank, problem.samples, problem.used
     if prior is None and prior_strength is not None:
         raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
+    if prior is None and prior_folds != TRIALS:
+        raise InputError(f"prior_folds: {prior_folds!r} found without a prior; name one, or leave it out")
     if prior is not None:
         chosen = with_prior(chosen, prior, prior_strength, blank, prior_folds)
     refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)

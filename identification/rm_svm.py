@@ -244,8 +244,8 @@ def fit_rm_svm(
     asked.check()
     if not isinstance(blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {blank.structure!r}, which has no reference ship, "
-            "expected structure 'grey-box' with a reference_model: 'auto', a shipped model's name or a model "
+            f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
+            "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
             "file; or choose another method, such as 'tls-svm'"
         )
     tuner = _Tuner(asked, samples, blank, trials)

@@ -13,7 +13,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["CASES", "PAPERS", "Paper", "Requirement", "Row", "get_paper"]
 
-PAPERS = ("cao2015", "zhu2018", "xu2020", "song2020", "mei2019")
+PAPERS = ("cao2015", "xu2020", "zhu2018", "mei2019", "song2020")
 CASES = (*PAPERS, "requirements")
 
 

@@ -14,7 +14,7 @@ from identification.lssvm import LSSVM, check_weight, validated
 from identification.tuning.objectives import ErrorOfC, held_out_error, time_blocks, training_error
 from identification.tuning.optimisers import get_optimiser
 from identification.tuning.search import Optimiser
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -101,6 +101,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self
         """
         check_choice(self.objective, OBJECTIVES, "objective")
+        check_whole(self.seed, "seed", at_least=0)
         if self.objective == "free-running":
             raise InputError(
                 "objective: 'free-running' found, expected 'k-fold' or 'training': samples alone cannot be "

@@ -61,7 +61,11 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
 @pytest.mark.parametrize(
     ("identify", "options", "said"),
     [
-        ('method = "rm-svm"', [], "'abkowitz', which has no reference ship, expected structure 'grey-box'"),
+        (
+            'method = "rm-svm"',
+            [],
+            "found with structure 'abkowitz', expected structure 'grey-box', which has a reference ship",
+        ),
         (
             OWN,
             ["--method", "rm-svm"],

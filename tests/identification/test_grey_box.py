@@ -129,6 +129,20 @@ def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 
 
+@pytest.mark.parametrize(("weight", "band"), [(0.1, 0.1), (1.0, 0.5), (30.0, 0.0)])
+def test_coordinate_descent_and_minimal_optimisation_agree(
+    weight: float, band: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((150, 3)) @ [[1.0, 0.5, 0.0], [0.0, 1.0, 0.3], [0.0, 0.0, 1.0]]
+    y = X @ [1.0, -2.0, 0.5] + rng.standard_normal(150)
+    quick = RMSVM(C=weight, epsilon=band).fit(X, y)
+    monkeypatch.setattr("identification.rm_svm.MOST_SWEEPS", 1)
+    exact = RMSVM(C=weight, epsilon=band).fit(X, y)
+    assert quick.coef_ == pytest.approx(exact.coef_, abs=5e-3)
+    assert not np.array_equal(quick.coef_, exact.coef_)
+
+
 def test_a_weight_of_zero_is_the_bare_reference_ship(target: ShipModel, trials: list[Trial]) -> None:
     result = fit(target, trials, method="rm-svm", reference_model="kvlcc2", C=0.0)
     assert set(result.coefficients.values()) == {0.0}
