@@ -257,7 +257,7 @@ def _judged(
         samples=problem.samples,
         machines=fit.machines,
         settings=_call(call, problem.trials),
-        searches={q: m.search_ for q, m in fit.machines.items() if hasattr(m, "search_")},
+        searches={q: search for q, m in fit.machines.items() if (search := getattr(m, "search_", None))},
     )
 
 

@@ -45,3 +45,4 @@ COEFFICIENTS = 112 * LANES
 # a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
 RUNAWAY_SPEED = 3.0
 RUNAWAY_YAW_RATE = 6.0
+CAPSIZED = 1.5707963267948966  # rad; nor does it heel beyond a right angle

@@ -120,6 +120,11 @@ class GreyBox(Structure):
 
     def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
         """Source of the compiled accelerations; the coefficients of the terms are read at run time."""
+        return self._source
+
+    @cached_property
+    def _source(self) -> str:
+        """Written once, however many models share the grey box."""
         from shipgym.simulation.grey_box_source import grey_box_source
 
         return grey_box_source(self)
