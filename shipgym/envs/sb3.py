@@ -155,7 +155,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         return observations
 
     def step_async(self, actions: Any) -> None:
-        """Take the actions of the next `step_wait`, shape (num_envs, n_commands) or, discrete, (num_envs,)."""
+        """Take the actions of the next `step_wait`, of shape (num_envs, n_commands) or (num_envs,)."""
         self._actions = actions
 
     def step_wait(

@@ -161,7 +161,7 @@ def test_what_is_wrong_is_said():
             make()
     env = ours(COURSE, 2)
     env.set_options({"depth": 3.0})
-    with pytest.raises(InputError, match="options: .*depth.* found, expected none"):
+    with pytest.raises(InputError, match=r"options: .*depth.* found, expected none"):
         env.reset()
     env.reset()
     with pytest.raises(InputError, match="expected numbers"):
