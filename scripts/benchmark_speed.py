@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import gymnasium
 import numpy as np
@@ -31,6 +31,7 @@ from identification.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.registration import TASKS
 from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
@@ -60,6 +61,21 @@ for _ in range(40):
             env.reset()
     least = min(least, time.perf_counter() - start)
 print(50 / least)
+"""
+SYNC_STEPS_IN_PYTHON = """
+import sys, time
+import gymnasium, numpy as np, shipgym
+n = int(sys.argv[3])
+env = gymnasium.make_vec(sys.argv[1], num_envs=n, vectorization_mode="sync", model=sys.argv[2])
+env.reset(seed=0)
+actions = np.zeros((n, 1), dtype=np.float32)
+least = float("inf")
+for _ in range(5):
+    start = time.perf_counter()
+    for _ in range(5):
+        env.step(actions)
+    least = min(least, time.perf_counter() - start)
+print(5 * n / least)
 """
 FIRST_STEP = """
 import time
@@ -126,6 +142,57 @@ def single_environment(n_steps: int = 1000) -> Row:
         f"plain Python {plain / 1e3:.2f} k steps/s",
         compiled / plain,
         "300 k steps/s, 30 times",
+    )
+
+
+def native_speed(env_id: str, n_envs: int, **options: Any) -> float:
+    """Steps per second of a native vector environment of Gymnasium, by all that its `step` returns."""
+    env = gymnasium.make_vec(env_id, num_envs=n_envs, vectorization_mode="vector_entry_point", **options)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = env.action_space.sample()
+    steps = max(SHORT_STEPS // n_envs, 1)
+    return steps * n_envs / best_time(lambda: [env.step(actions) for _ in range(steps)], SHORT_REPEATS)
+
+
+def native_against_python(task: str, n_envs: int = 64) -> Row:
+    """The native vector environment against SyncVectorEnv of the same files run as plain Python."""
+    env_id = f"shipgym/{task}-v0"
+    native = native_speed(env_id, n_envs, model=MODEL)
+    (plain,) = run_python(SYNC_STEPS_IN_PYTHON, env_id, MODEL, str(n_envs), NUMBA_DISABLE_JIT="1")
+    return Row(
+        f"{n_envs} {task}, gymnasium.make_vec",
+        f"{native / 1e6:.1f} M steps/s",
+        f"SyncVectorEnv in plain Python {plain / 1e3:.2f} k steps/s",
+        native / plain,
+        "100 times",
+    )
+
+
+def native_against_cart_pole(n_envs: int = 1024) -> Row:
+    """The native vector environment against Gymnasium's own of CartPole."""
+    native = native_speed("shipgym/CourseKeeping-v0", n_envs, model=MODEL)
+    poles = native_speed("CartPole-v1", n_envs)
+    return Row(
+        f"{n_envs} CourseKeeping, gymnasium.make_vec",
+        f"{native / 1e6:.1f} M steps/s",
+        f"Gymnasium's native CartPole {poles / 1e6:.1f} M steps/s",
+        native / poles,
+        "1 time",
+    )
+
+
+def learning(task: str) -> Row:
+    """Frames per second of PPO with the shipped settings, on two cores, and what part of it is ours."""
+    from learning_speed import ppo_speed  # here, because torch takes seconds to import
+
+    frames, share = ppo_speed(f"shipgym/{task}-v0")
+    return Row(
+        f"PPO, 64 {task}, two cores",
+        f"{frames / 1e3:.1f} k frames/s",
+        f"{100.0 * share:.1f} % of the time in the environment",
+        None,
+        "40 k frames/s, 15 %",
     )
 
 
@@ -320,7 +387,10 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         single_environment,
         *(partial(batched_environment, n) for n in (64, 1024, 4096)),
         *(partial(weather, n) for n in (1024, 4096)),
+        *(partial(native_against_python, task) for task in TASKS),
+        native_against_cart_pole,
     ],
+    "learning": [partial(learning, task) for task in TASKS],
     "physics": [
         *(partial(batched_physics, ship, n, aim) for ship, aim in FLEET.items() for n in (1024, 4096)),
         zigzag_run,
