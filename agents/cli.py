@@ -156,6 +156,22 @@ def autopilot_command(
         console.print(f"report: {report}", soft_wrap=True)
 
 
+@app.command("replay")
+@answered
+def replay_command(
+    episodes: Annotated[
+        list[Path], typer.Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
+) -> None:
+    """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
+    from agents.replay import write_replay
+    from agents.terminal import out as console
+
+    write_replay(episodes, out)
+    console.print(f"written: {out}", soft_wrap=True)
+
+
 @app.command("reproduce")
 @answered
 def reproduce_command(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from agents import output
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
 from shipgym.manoeuvres.imo import judge_imo
@@ -158,12 +158,7 @@ def check_page(path: Path) -> None:
         If plotly is missing, the ending is not .html, or the folder cannot be written.
     """
     graph_objects()
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write the figures to")
-    if not path.absolute().parent.is_dir() or not os.access(path.absolute().parent, os.W_OK):
-        raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")
+    output.check_page(path)
 
 
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
@@ -183,9 +178,7 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
         f"Simulated from service speed, {ship['speed']:.4g} m/s, in {found.water}; "
         f"ship length {ship['length']:.5g} m.{drawn}"
     )
-    body = {
-        "header": header("Standard manoeuvres", model.name, lead),
-    }
+    body = {"header": header("Standard manoeuvres", model.name, lead)}
     if found.criteria:
         body["imo"] = section("imo", TITLES["imo"], _criteria(found.criteria))
     for name, start in SECTIONS.items():
