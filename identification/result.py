@@ -12,7 +12,6 @@ import numpy as np
 
 from identification.diagnostics import EquationDiagnostics
 from identification.machine import Machine
-from identification.pattern_search import PatternSearch
 from identification.samples import Samples
 from identification.tuning import SearchResult
 from shipgym.errors import InputError
@@ -52,9 +51,9 @@ class IdentificationResult:
         Fitted to it, by equation.
     settings : dict
         The arguments that `identify` was called with, defaults among them, as JSON knows them.
-    searches : dict of str to SearchResult or PatternSearch
-        How the settings of each equation were found, for methods that search: log10 C, or the widths of the
-        bands that RM-SVM does not see.
+    searches : dict of str to SearchResult
+        How the settings of each equation were found, for methods that search: log10 C, or
+        the insensitive band of RM-SVM.
     """
 
     model: ShipModel
@@ -66,7 +65,7 @@ class IdentificationResult:
     samples: Samples
     machines: dict[str, Machine]
     settings: dict[str, Any]
-    searches: dict[str, SearchResult | PatternSearch] = field(default_factory=dict)
+    searches: dict[str, SearchResult] = field(default_factory=dict)
 
     @property
     def coefficients(self) -> dict[str, float]:

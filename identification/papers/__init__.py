@@ -1,7 +1,7 @@
 """The papers' cases, run again: what they print, what comes out their way, and what is best.
 
-One file per paper. Each holds a `PAPER`: a citation and a function that yields the rows of its tables. Beside
-them stand Zhu's requirements R1 to R8, in the same form.
+One file or folder per paper. Each holds a `PAPER`: a citation and a function that yields the rows of its
+tables. Beside them stand Zhu's requirements R1 to R8, in the same form.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from shipgym.checks import check_choice
 
 __all__ = ["CASES", "PAPERS", "Paper", "Requirement", "Row", "get_paper"]
 
-PAPERS = ("cao2015", "xu2020", "song2020")
+PAPERS = ("cao2015", "xu2020", "zhu2018", "mei2019", "song2020")
 CASES = (*PAPERS, "requirements")
 
 

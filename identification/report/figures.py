@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification.diagnostics import autocorrelation, cross_correlation, without_overlap
 from identification.lssvm import TruncatedLSSVM
 from identification.report.predictions import legend_above, overview_figure, prediction_figure
-from identification.tuning import SearchResult
+from identification.tuning.search import BAND, LOG_C
 from identification.uncertainty import residuals
 from shipgym.plots import (
     LIMIT,
@@ -207,25 +207,24 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
 
 
 def search_figure(result: IdentificationResult) -> Figure:
-    """What a search had found after each of its rounds: the objective, and the weight C of the errors."""
+    """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
     searches = {EQUATIONS.get(q, q): search for q, search in result.searches.items()}
-    if len({id(search) for search in searches.values()}) == 1:  # one for all
-        searches = {"all equations": next(iter(searches.values()))}
-    courses = {q: s.course[:, 0] for q, s in searches.items() if isinstance(s, SearchResult)}
-    titles = ["best objective, by its last", *(["best C"] if courses else [])]
-    figure = subplots(1, len(titles), titles=titles, horizontal_spacing=0.1)
-    for (name, search), colour in zip(searches.items(), PALETTE, strict=False):
-        history = np.asarray(search.history) / (search.value if search.value > 0.0 else 1.0)
-        rounds = np.arange(len(history))
-        figure.add_trace(line(rounds, history, name, colour), row=1, col=1)
-        if name in courses:
-            found = 10.0 ** courses[name]
-            figure.add_trace(line(rounds, found, name, colour, showlegend=False), row=1, col=2)
-    for column in range(1, len(titles) + 1):
+    logarithmic = all(search.variable == LOG_C for search in searches.values())
+    titles = ["best objective, by its last", "best C" if logarithmic else f"best {BAND}"]
+    figure = subplots(1, 2, titles=titles, horizontal_spacing=0.1)
+    common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
+    for k, ((name, search), colour) in enumerate(zip(searches.items(), PALETTE, strict=False)):
+        rounds = np.arange(len(search.history))
+        objective = search.history / (search.value if search.value > 0.0 else 1.0)
+        best = 10.0 ** search.course[:, 0] if logarithmic else search.course[:, 0]
+        if k == 0 or not common:
+            figure.add_trace(line(rounds, objective, name, colour, showlegend=False), row=1, col=1)
+        figure.add_trace(line(rounds, best, name, colour), row=1, col=2)
+    for column in (1, 2):
         figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
     figure.update_yaxes(axis(""), row=1, col=1)
-    if courses:
-        figure.update_yaxes(axis("", type="log", tickformat=".0e"), row=1, col=2)
+    decades = {"type": "log", "tickformat": ".0e"} if logarithmic else {"range": [0.0, 1.0]}
+    figure.update_yaxes(axis("", **decades), row=1, col=2)
     margin = {"l": 62, "r": 18, "t": 76, "b": 48}
     figure.update_layout(layout(340, margin=margin, legend=legend_above(340), hovermode="closest"))
     return figure

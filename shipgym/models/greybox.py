@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 from shipgym.models.ship_model import ShipModel
+from shipgym.models.structures import WITH_REFERENCE
 from shipgym.models.term_table import Structure
 from shipgym.models.terms import CHANNEL, Term, read_terms
 from shipgym.particulars import Particulars
@@ -24,7 +25,7 @@ from shipgym.steering import SteeringGear
 
 Floats = NDArray[np.float64]
 
-GREY_BOX = "grey-box"
+GREY_BOX = WITH_REFERENCE
 SOURCE = (
     "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with "
     "minor rudder"

@@ -331,11 +331,11 @@ class ShipModel:
         """Source of the accelerations that are compiled into the kernels."""
         return self.dynamics.accelerations_source(self.coefficients)
 
-    def kernel(self, name: str, weather: bool = False) -> ModuleType:
-        """One file of kernels, compiled together with this ship, for calm water or for weather."""
+    def kernel(self, name: str, weather: bool = False, task: str | None = None) -> ModuleType:
+        """One file of kernels, compiled with this ship, for calm water or weather, with a task or none."""
         from shipgym.simulation.compiled import kernel
 
-        return kernel(self.accelerations_source, name, weather)
+        return kernel(self.accelerations_source, name, weather, task)
 
     def ship_column(self, water_depth: float = np.inf, weather: Floats | None = None) -> Floats:
         """Constants and coefficients in the order of the kernels' rows, shape (n_rows,).
@@ -352,6 +352,7 @@ class ShipModel:
         column[layout.row(layout.GEAR_FREQUENCY)] = 1.0 / gear.time_constant if gear.time_constant else 0.0
         column[layout.row(layout.SERVICE_SHAFT)] = self.service_shaft_speed
         column[layout.row(layout.WATER_DEPTH)] = water_depth
+        column[layout.row(layout.SCALE_SPEED)] = p["speed"]
         low, high, centre, shape, weather_at, end = map(layout.row, (
             layout.ENVELOPE_LOW, layout.ENVELOPE_HIGH, layout.ENVELOPE_CENTRE, layout.ENVELOPE_SHAPE,
             layout.WEATHER, layout.COEFFICIENTS,

@@ -31,6 +31,7 @@ GENERAL = [
     'structure = "linear-steering"', 'samples = "integral"', 'name = "mine"', "window = 9", "smooth = false",
     'preprocessing = "savgol"', "repair = true", 'uncertainty = "bootstrap"', "guarded = false",
     'hold_out = ["zigzag_10_10.csv"]', 'prior = "clarke"', "prior_strength = 0.1",
+    'prior_folds = "largest-rudder"',
 ]  # fmt: skip
 
 
