@@ -13,6 +13,7 @@ from identification.refine import Refinement, refine
 from identification.segments import Shooter, compared_channels, cut
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
+from shipgym.models import converted_model
 
 
 def parameters(model: ShipModel) -> np.ndarray:
@@ -173,3 +174,30 @@ def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao
     lacking = Trial(cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking")
     with pytest.raises(InputError, match="extra trial 'lacking': channel 'v' is missing"):
         identify([cao_zigzag], method="output-error", particulars=mariner.particulars, extra_trials=[lacking])
+
+
+def test_an_anchor_keeps_the_steady_turn_of_the_reference_ship(mariner: ShipModel) -> None:
+    """Mild zigzags say nothing of hard turns; the heavier the anchor, the nearer to its turns."""
+    runs = [
+        zigzag(mariner, angle, angle, duration=300, dt=0.5).with_(name=f"zigzag {angle:g}")
+        for angle in (5.0, 10.0)
+    ]
+    settings: dict[str, object] = {"particulars": mariner.particulars, "steering": mariner.steering}
+    reference = converted_model("tanker", mariner.particulars, mariner.steering, 0.0)
+    length = mariner.particulars["length"]
+
+    def diameter(model: ShipModel) -> float:
+        found = turning_indices(turning_circle(model, 35.0), length).tactical_diameter_lengths
+        assert found is not None
+        return found
+
+    wanted, errors = diameter(reference), []
+    for weight in (1e-6, 1.0):
+        found = identify(
+            runs, method="output-error", anchor="tanker", anchor_weight=weight,
+            segment_start="measured", staggered=False, **settings,  # type: ignore[arg-type]
+        )  # fmt: skip
+        refinement = found.model.provenance["refinement"]  # type: ignore[index]
+        assert (refinement["decision"], refinement["anchor"]) == ("refined", "tanker")
+        errors.append(abs(diameter(found.model) / wanted - 1.0))
+    assert errors[1] < 0.1 < errors[0]
