@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,19 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verification
-from agents.concerns import why_unstable
+from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import check_folder, whole_folder
 from agents.spread import manoeuvre_spread
-from identification import IdentificationResult, identify
+from identification.concerns import why_unstable
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel
-from shipgym.models.greybox import GREY_BOX
 from shipgym.models.linear import is_course_stable, nomoto
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
-from shipgym.trial import Trial
 
 if TYPE_CHECKING:
     from agents.controller import Controller
@@ -63,7 +61,7 @@ def build_autopilot(
     seed : int
         Of the draws and of the episodes flown.
     structure, method, samples : str, optional
-        As in `identify`; by default what the ship file says.
+        As in `identify`; by default what the ship file says, as for all other options.
     progress : callable, optional
         Called as the work goes on.
 
@@ -112,11 +110,11 @@ def examine(
     """The chain without its files: see `build_autopilot`."""
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
-    trials = tuple(ship.trials())
+    given = {"structure": structure, "method": method, "samples": samples}
+    trials, arguments = trials_of(ship, identification_settings(ship, given))
     _tell(progress, "reading trials", 1, 1)
     _tell(progress, "identifying", 0, 1)
-    chosen = identification_settings(ship, structure, method, samples)
-    identification = identify_ship(ship, trials, chosen)
+    identification = identify_trials(ship, trials, arguments)
     _tell(progress, "identifying", 1, 1)
     instability = why_unstable(identification)
     verification = None
@@ -125,34 +123,7 @@ def examine(
             verification = verify(identification.model, draws, seed, progress)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
-    return AutopilotResult(ship, trials, identification, instability, verification)
-
-
-def identify_ship(
-    ship: ShipFile, trials: Sequence[Trial], settings: Mapping[str, Any]
-) -> IdentificationResult:
-    """`identify` on a ship file, which its errors name."""
-    try:
-        return identify(trials, particulars=ship.particulars, steering=ship.steering, **settings)
-    except InputError as error:
-        raise InputError(f"{ship.path}: {error}") from None
-
-
-def identification_settings(
-    ship: ShipFile, structure: str | None, method: str | None, samples: str | None
-) -> dict[str, Any]:
-    """Settings of `identify`: those given, else the ship file's, else the defaults of `identify`."""
-    given = {"structure": structure, "method": method, "samples": samples}
-    chosen = {key: value or ship.identify.get(key) for key, value in given.items()}
-    if chosen["structure"] == GREY_BOX:
-        chosen["reference_model"] = _reference_model(ship)
-    return {key: value for key, value in chosen.items() if value is not None}
-
-
-def _reference_model(ship: ShipFile) -> str:
-    """The reference ship that a ship file names, by default the most similar; paths relative to it."""
-    name = ship.identify.get("reference_model", "auto")
-    return str(ship.path.parent / name) if name.endswith(".json") else name
+    return AutopilotResult(ship, identification.trials, identification, instability, verification)
 
 
 def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = None) -> Verification:

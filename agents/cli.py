@@ -6,18 +6,13 @@ standard error and nothing written; 130 interrupted.
 
 from __future__ import annotations
 
-import functools
-import os
-from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, ParamSpec
+from typing import Annotated
 
 import typer
 
-P = ParamSpec("P")
-
-FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
-MODEL_FILES = ("model.json", "metrics.json")
+from agents.command import FAILED, Json, Method, Samples, ShipFileArgument, Structure, answered, fail
+from agents.identification_commands import advise_command, identify_command, reduce_command
 
 app = typer.Typer(
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
@@ -27,47 +22,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
-Structure = Annotated[
-    str | None, typer.Option(help="Terms of the model; default: the ship file's, else abkowitz.")
-]
-Method = Annotated[
-    str | None, typer.Option(help="tls-svm, ls-svm or ls; default: the ship file's, else tls-svm.")
-]
-Samples = Annotated[
-    str | None, typer.Option(help="spline, integral or euler; default: the ship file's, else spline.")
-]
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
-
-
-def answered(command: Callable[P, None]) -> Callable[P, None]:
-    """Turn what goes wrong in a command into one message and the exit code it stands for."""
-
-    @functools.wraps(command)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
-        from shipgym.errors import InputError, UnstableModelError
-
-        try:
-            command(*args, **kwargs)
-        except InputError as error:
-            _fail(str(error), WRONG_INPUT)
-        except UnstableModelError as error:
-            _fail(str(error), FAILED)
-        except KeyboardInterrupt:
-            _fail("interrupted, nothing was written", INTERRUPTED)
-        except BrokenPipeError:  # the reader of the output went away
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-            raise typer.Exit(FAILED) from None
-
-    return wrapped
-
-
-def _fail(message: str, code: int) -> None:
-    from agents.terminal import fail
-
-    fail(message)
-    raise typer.Exit(code) from None
 
 
 def _version(wanted: bool) -> None:
@@ -87,46 +41,9 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
-@app.command("identify")
-@answered
-def identify_command(
-    ship: ShipFileArgument,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for model.json and metrics.json.")],
-    structure: Structure = None,
-    method: Method = None,
-    samples: Samples = None,
-    as_json: Json = False,
-) -> None:
-    """Identify a manoeuvring model from recorded trials; write model.json and metrics.json.
-
-    Exits with 1 if the identified model is unstable.
-    """
-    from agents.autopilot import identification_settings, identify_ship
-    from agents.concerns import concerns, why_unstable
-    from agents.output import check_folder, whole_folder
-    from agents.terminal import err, prediction_table, print_json, warn
-    from agents.terminal import out as console
-    from shipgym.ship_file import ShipFile
-
-    check_folder(out, MODEL_FILES)
-    read = ShipFile.load(ship)
-    chosen = identification_settings(read, structure, method, samples)
-    with err.status("identifying"):
-        result = identify_ship(read, read.trials(), chosen)
-    with whole_folder(out, MODEL_FILES) as draft:
-        result.save(draft)
-    instability = why_unstable(result)
-    if as_json:
-        print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
-    else:
-        if instability is None:
-            console.print(result.summary(), markup=False, soft_wrap=True)
-            console.print(prediction_table(result))
-        console.print(f"\nwritten: {out / 'model.json'}, {out / 'metrics.json'}", soft_wrap=True)
-    if instability is not None:
-        _fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
-    for concern in concerns(result):
-        warn(concern)
+app.command("identify")(identify_command)
+app.command("advise")(advise_command)
+app.command("reduce")(reduce_command)
 
 
 @app.command("trials")
@@ -194,7 +111,6 @@ def autopilot_command(
     Exits with 1 if the identified model is unstable; the report then says so.
     """
     from agents.autopilot import build_autopilot
-    from agents.concerns import concerns
     from agents.terminal import (
         criteria_table,
         prediction_table,
@@ -204,6 +120,7 @@ def autopilot_command(
         warn,
     )
     from agents.terminal import out as console
+    from identification.concerns import concerns
 
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
@@ -222,7 +139,7 @@ def autopilot_command(
         console.print(ranking_table(result))
         console.print()
     if not result.stable:
-        _fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
+        fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
     for concern in concerns(result.identification):
         warn(concern)
     for name, reason in (result.verification.refused if result.verification else {}).items():
@@ -266,7 +183,7 @@ def reproduce_command(
             console.print(f"written: {markdown}", soft_wrap=True)
     late = missed(results)
     if late:
-        _fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
+        fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
 
 
 @app.command("doctor")

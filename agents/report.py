@@ -2,30 +2,35 @@
 
 from __future__ import annotations
 
-from importlib.resources import files
-from pathlib import Path, PurePath
-from string import Template
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 import shipgym
-from agents.concerns import concerns
 from agents.report_figures import CRITERIA
-from agents.report_html import NONE, Html, html, join, note, number, paragraph, percent, section, table
-from agents.report_sections import (
-    coefficients_section,
-    data_section,
-    prediction_section,
-    ship_tables,
-    trials_table,
-)
 from agents.report_verification import (
     autopilots_section,
     manoeuvres_section,
     ranking_section,
 )
-from shipgym.errors import InputError
+from identification.report.coefficients import coefficients_section
+from identification.report.facts import concerns_list, data_card, quality_card, remedy_section, ship_card
+from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
+from shipgym.pages import (
+    NONE,
+    Html,
+    card,
+    cards,
+    header,
+    note,
+    number,
+    page,
+    percent,
+    section,
+    table,
+)
+from shipgym.pages import verdict as box
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult, Verification
@@ -42,30 +47,7 @@ TITLES = {
     "ranking": "Ranking",
     "origin": "How this was made",
     "remedy": "What to do",
-    "imo": "IMO criteria",
-    "zigzags": "Zigzags",
-    "circles": "Turning circles",
-    "spirals": "Spirals",
-    "pull-outs": "Pull-outs",
-    "stops": "Stopping and acceleration",
 }
-
-
-def plotly_script() -> str:
-    """The source of plotly.js, to stand once in a page.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
-    try:
-        from plotly.offline import get_plotlyjs
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "plotly is not installed, the report needs it: pip install 'shipgym[report]'"
-        ) from error
-    return str(get_plotlyjs()).replace("</script", "<\\/script")
 
 
 def write_report(result: AutopilotResult, path: str | Path) -> None:
@@ -85,32 +67,17 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     """
     found = result.verification
     body = unstable_body(result) if found is None else stable_body(result, found)
-    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body), encoding="utf-8")
-
-
-def page(title: str, body: dict[str, Html]) -> str:
-    """A whole page from its sections by name, in order."""
-    template = Template(files("agents").joinpath("report_template.html").read_text(encoding="utf-8"))
-    contents = join(
-        Html(f'<li><a href="#{name}">{html(TITLES[name])}</a></li>') for name in body if name in TITLES
-    )
-    return template.substitute(
-        title=html(title),
-        version=html(shipgym.__version__),
-        plotly=plotly_script(),
-        contents=contents,
-        body=join(body.values(), "\n"),
-    )
+    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body, TITLES), encoding="utf-8")
 
 
 def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]:
     """All sections."""
     return {
-        "header": header(result),
+        "header": top(result),
         "verdict": verdict(result, found),
-        "data": data_section(result),
-        "coefficients": coefficients_section(result),
-        "prediction": prediction_section(result),
+        "data": data_section(result.identification),
+        "coefficients": coefficients_section(result.identification),
+        "prediction": prediction_section(result.identification),
         "manoeuvres": manoeuvres_section(result, found),
         "autopilots": autopilots_section(result, found),
         "ranking": ranking_section(found),
@@ -120,31 +87,16 @@ def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]
 
 def unstable_body(result: AutopilotResult) -> dict[str, Html]:
     """What can be said of an unstable model: that it is, and what to do; no numbers of its own."""
+    identification = result.identification
     headline = (
-        f'<div class="verdict bad" id="verdict"><div class="headline">The identified model is unstable: '
-        f"{html(result.instability)}. It must not be used, and no coefficients, predictions, manoeuvres or "
-        "autopilots are given.</div>"
-        f'<div class="cards">{ship_card(result)}{data_card(result)}</div></div>'
+        f"The identified model is unstable: {result.instability}. It must not be used, and no coefficients, "
+        "predictions, manoeuvres or autopilots are given."
     )
-    advice = section(
-        "remedy",
-        "What to do",
-        paragraph(
-            "An unstable fit usually means that the trials do not hold enough: manoeuvres with other "
-            "rudder angles and to the other side, a turning circle, more samples. Or that the data is not "
-            "what the ship file says: check the signs of the rudder and of sway and yaw, the units, and "
-            "whether the velocities are those of midship."
-        ),
-        paragraph(
-            "A simpler structure, or the default method with its guard against models that run away, may "
-            "hold as well."
-        ),
-    )
-    data = section("data", "Data", trials_table(result), ship_tables(result))
+    data = section("data", "Data", trials_table(result.identification), ship_tables(result.identification))
     return {
-        "header": header(result),
-        "verdict": Html(headline),
-        "remedy": advice,
+        "header": top(result),
+        "verdict": box(headline, "bad", cards(ship_card(identification), data_card(identification))),
+        "remedy": remedy_section(),
         "data": data,
         "origin": origin_section(result),
     }
@@ -155,21 +107,13 @@ def ship_name(result: AutopilotResult) -> str:
     return str(result.ship.particulars.name)
 
 
-def header(result: AutopilotResult) -> Html:
+def top(result: AutopilotResult) -> Html:
     """Title of the page."""
-    return Html(
-        "<header><p class=kicker>Identified manoeuvring model and "
-        f"autopilots</p><h1>{html(ship_name(result))}</h1><p class=lead>Identified from recorded "
-        "manoeuvres, with the uncertainty of every coefficient carried through to the manoeuvring "
-        "criteria and to the autopilots.</p></header>"
-    )
-
-
-def card(label: str, value: object, detail: object) -> Html:
-    """One fact of the verdict."""
-    return Html(
-        f'<div class="card"><div class="label">{html(label)}</div><div class="value">{html(value)}</div>'
-        f'<div class="detail">{html(detail)}</div></div>'
+    return header(
+        "Identified manoeuvring model and autopilots",
+        ship_name(result),
+        "Identified from recorded manoeuvres, with the uncertainty of every coefficient carried through to "
+        "the manoeuvring criteria and to the autopilots.",
     )
 
 
@@ -206,10 +150,10 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
         found.manoeuvres.unstable.any()
     )
     lost = bool(np.any(best.flights.terminated))
-    cards = [
-        ship_card(result),
-        data_card(result),
-        quality_card(result),
+    facts = [
+        ship_card(result.identification),
+        data_card(result.identification),
+        quality_card(result.identification),
         imo_card(found),
         card(
             "Best autopilot",
@@ -221,60 +165,11 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
             ),
         ),
     ]
-    return Html(
-        f'<div class="verdict {"warn" if doubts or lost else "good"}" id="verdict">'
-        f'<div class="headline">{html(headline(found))}</div>'
-        f'<div class="cards">{join(cards)}</div>{concerns_list(result)}</div>'
-    )
-
-
-def concerns_list(result: AutopilotResult) -> Html:
-    """What has to be known before the model is used."""
-    items = join(
-        Html(f"<li>{html(text[0].upper() + text[1:])}.</li>") for text in concerns(result.identification)
-    )
-    return Html(f'<ul class="concerns">{items}</ul>' if items else "")
-
-
-def ship_card(result: AutopilotResult) -> Html:
-    """Size and speed."""
-    ship = result.model.particulars
-    return card(
-        "Ship",
-        f"L = {ship['length']:.4g} m",
-        Html(f"service speed {number(ship['speed'], 3)} m/s, mass {number(ship['mass'] / 1000.0, 3)} t"),
-    )
-
-
-def data_card(result: AutopilotResult) -> Html:
-    """How many trials."""
-    uses = [trial.use for trial in result.trials]
-    samples = sum(len(trial) for trial in result.trials)
-    minutes = sum(trial.duration for trial in result.trials) / 60.0
-    return card(
-        "Data",
-        f"{uses.count('fit')} trials to fit",
-        Html(f"{uses.count('validate')} to validate; {samples} samples, {number(minutes, 2)} min"),
-    )
-
-
-def quality_card(result: AutopilotResult) -> Html:
-    """Heading error on the trials that were not fitted, else on those that were."""
-    trials = result.identification.metrics["trials"]
-    unseen = {name: metrics for name, metrics in trials.items() if metrics["use"] == "validate"}
-    errors = {
-        name: float(np.degrees(metrics["rmse"]["psi"]))
-        for name, metrics in (unseen or trials).items()
-        if metrics["rmse"]["psi"] is not None
-    }
-    if not errors:
-        return card("Prediction", NONE, "no heading was measured")
-    worst = max(errors, key=lambda name: errors[name])
-    which = "trials not fitted" if unseen else "fitted trials, none to validate"
-    return card(
-        "Prediction",
-        f"{np.median(list(errors.values())):.1f}°",
-        f"heading rmse, median of {which}; largest {errors[worst]:.1f}° ({PurePath(worst).name})",
+    return box(
+        headline(found),
+        "warn" if doubts or lost else "good",
+        cards(*facts),
+        concerns_list(result.identification),
     )
 
 

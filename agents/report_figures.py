@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from pathlib import PurePath
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from agents.spread import ManoeuvreSpread
+from identification.report.predictions import RUDDER, legend_above
 from shipgym.manoeuvres import Criterion
 from shipgym.plots import (
-    AXES,
     GRID,
     LIMIT,
     MEASURED,
@@ -26,14 +25,12 @@ from shipgym.plots import (
     subplots,
     translucent,
 )
-from shipgym.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 Floats = NDArray[np.float64]
 
-RUDDER = "#9aa5b1"
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
 MARGIN = {"l": 62, "r": 18, "t": 60, "b": 44}
 BAND = (0.05, 0.95)
@@ -60,83 +57,6 @@ def band(t: Floats, values: Floats, name: str, colour: str, showlegend: bool = F
             fill="toself", fillcolor=translucent(colour, 0.18), hoverinfo="skip",
         )
     ]  # fmt: skip
-
-
-def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | None]) -> Figure:
-    """Heading and rudder of the trials, one panel each, with the model's open-loop simulation."""
-    rows = -(-len(trials) // 2)
-    figure = subplots(
-        rows, 2, titles=[PurePath(trial.name).name for trial in trials], vertical_spacing=0.36 / max(rows, 2)
-    )
-    for k, trial in enumerate(trials):
-        place = {"row": k // 2 + 1, "col": k % 2 + 1}
-        first, start = k == 0, trial["psi"][0]
-        rudder, heading = np.degrees(trial["delta"]), np.degrees(trial["psi"] - start)
-        for values, name, colour, width in (
-            (rudder, "rudder", RUDDER, 1.2),
-            (heading, "heading change, measured", MEASURED, 1.5),
-        ):
-            figure.add_trace(line(trial.t, values, name, colour, width, showlegend=first), **place)
-        prediction = predictions.get(trial.name)
-        if prediction is not None:
-            values = np.degrees(prediction["psi"] - start)
-            figure.add_trace(
-                line(prediction.t, values, "heading change, model", MODEL, 1.9, showlegend=first), **place
-            )
-        figure.update_xaxes(axis("time, s" if place["row"] == rows else ""), **place)
-        figure.update_yaxes(axis("deg" if place["col"] == 1 else ""), **place)
-    figure.update_layout(
-        layout(230 * rows + 80, margin={"l": 62, "r": 18, "t": 60, "b": 44}, legend=_legend(230 * rows + 80))
-    )
-    return figure
-
-
-def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
-    """A recorded trial and its open-loop prediction: five channels and the path."""
-    figure = subplots(3, 2, vertical_spacing=0.1)
-    for k, channel in enumerate(("psi", "r", "u", "v", "delta")):
-        if channel not in measured.channels:
-            continue
-        title, factor = AXES[channel]
-        place = {"row": k // 2 + 1, "col": k % 2 + 1}
-        figure.add_trace(
-            line(measured.t, factor * measured[channel], "measured", MEASURED, 1.3, showlegend=k == 0),
-            **place,
-        )
-        if predicted is not None and channel != "delta":
-            figure.add_trace(
-                line(predicted.t, factor * predicted[channel], "predicted", MODEL, 2.0, showlegend=k == 0),
-                **place,
-            )
-        figure.update_xaxes(axis("time, s" if k > 2 else ""), **place)
-        figure.update_yaxes(axis(title if channel != "delta" else "rudder (given), deg"), **place)
-    if "x" in measured.channels and "y" in measured.channels:
-        _add_paths(figure, measured, predicted)
-    figure.update_layout(layout(600, legend=_legend(600, 8), hovermode="closest"))
-    return figure
-
-
-def _add_paths(figure: Figure, measured: Trial, predicted: Trial | None) -> None:
-    """The paths in the last panel, along and across the first course; a turning circle to one scale."""
-    place = {"row": 3, "col": 2}
-    c, s = np.cos(measured["psi"][0]), np.sin(measured["psi"][0])
-    for trial, name, colour, width in (
-        (measured, "measured", MEASURED, 1.3),
-        (predicted, "predicted", MODEL, 2.0),
-    ):
-        if trial is not None:
-            north, east = trial["x"] - measured["x"][0], trial["y"] - measured["y"][0]
-            ahead, aside = north * c + east * s, east * c - north * s
-            turning = measured.kind == "turning-circle"
-            x, y = (aside, ahead) if turning else (ahead, aside)
-            figure.add_trace(line(x, y, name, colour, width, showlegend=False), **place)
-    ahead_axis, aside_axis = "along the first course, m", "to starboard, m"
-    if measured.kind == "turning-circle":
-        figure.update_xaxes(axis(aside_axis), **place)
-        figure.update_yaxes(axis(ahead_axis, scaleanchor="x6", scaleratio=1), **place)
-    else:
-        figure.update_xaxes(axis(ahead_axis), **place)
-        figure.update_yaxes(axis(aside_axis, autorange="reversed"), **place)
 
 
 def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
@@ -201,7 +121,9 @@ def manoeuvres_figure(spread: ManoeuvreSpread, length: float) -> Figure:
     figure.update_xaxes(axis("east, ship lengths"), row=1, col=2)
     figure.update_yaxes(axis("north, ship lengths", scaleanchor="x2", scaleratio=1), row=1, col=2)
     figure.update_layout(
-        layout(430, margin={"l": 62, "r": 18, "t": 76, "b": 48}, legend=_legend(430), hovermode="closest")
+        layout(
+            430, margin={"l": 62, "r": 18, "t": 76, "b": 48}, legend=legend_above(430), hovermode="closest"
+        )
     )
     return figure
 
@@ -260,15 +182,3 @@ def costs_figure(costs: Mapping[str, Floats]) -> Figure:
     figure.update_xaxes(axis("steering cost of an episode"))
     figure.update_yaxes(axis("", autorange="reversed"))
     return figure
-
-
-def _legend(height: int, lift: int = 26) -> dict[str, Any]:
-    """A legend above the titles of the panels."""
-    plot_height = height - 120
-    return {
-        "orientation": "h",
-        "x": 0.0,
-        "y": 1.0 + lift / plot_height,
-        "yanchor": "bottom",
-        "font": {"size": 12},
-    }

@@ -14,7 +14,7 @@ from agents.report_figures import (
     manoeuvres_figure,
     steps_figure,
 )
-from agents.report_html import (
+from shipgym.pages import (
     Html,
     badge,
     columns,

@@ -19,7 +19,7 @@ from shipgym.trial import Trial
 from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
-    from agents.report_html import Html
+    from shipgym.pages import Html
 
 HISTORIES = ("psi", "delta", "r", "speed", "drift")
 #: Sections of the page, and how the names of their manoeuvres begin.
@@ -29,6 +29,14 @@ SECTIONS: dict[str, str | tuple[str, ...]] = {
     "spirals": ("direct spiral", "reverse spiral"),
     "pull-outs": "pull-out",
     "stops": ("inertia stop", "crash stop", "acceleration"),
+}
+TITLES = {
+    "imo": "IMO criteria",
+    "zigzags": "Zigzags",
+    "circles": "Turning circles",
+    "spirals": "Spirals",
+    "pull-outs": "Pull-outs",
+    "stops": "Stopping and acceleration",
 }
 CAPTIONS = {
     "zigzag": "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed.",
@@ -135,15 +143,14 @@ def check_page(path: Path) -> None:
 
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
-    from agents.report import page
+    from shipgym.pages import page
 
-    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found)), path)
+    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found), TITLES), path)
 
 
 def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
     """The sections of the page."""
-    from agents.report import TITLES
-    from agents.report_html import Html, html, section
+    from shipgym.pages import header, section
 
     drawn = f" Intervals: 95 % of {found.draws} models drawn from its covariance." if found.draws else ""
     ship = model.particulars
@@ -152,10 +159,7 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
         f"ship length {ship['length']:.5g} m.{drawn}"
     )
     body = {
-        "header": Html(
-            f"<header><p class=kicker>Standard manoeuvres</p><h1>{html(model.name)}</h1>"
-            f"<p class=lead>{html(lead)}</p></header>"
-        ),
+        "header": header("Standard manoeuvres", model.name, lead),
         "imo": section("imo", TITLES["imo"], _criteria(found.criteria)),
     }
     for name, start in SECTIONS.items():
@@ -168,7 +172,7 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
 def _criteria(criteria: Mapping[str, Criterion]) -> Html:
     """The table of criteria."""
     from agents.report_figures import CRITERIA
-    from agents.report_html import NONE, Html, badge, fixed, html, percent, table
+    from shipgym.pages import NONE, Html, badge, fixed, html, percent, table
 
     rows = []
     for name, criterion in criteria.items():
@@ -193,14 +197,14 @@ def _criteria(criteria: Mapping[str, Criterion]) -> Html:
 
 
 def _interval(interval: tuple[float, float] | None) -> Html:
-    from agents.report_html import NONE, Html, fixed
+    from shipgym.pages import NONE, Html, fixed
 
     return Html(NONE) if interval is None else Html(f"{fixed(interval[0], 2)} to {fixed(interval[1], 2)}")
 
 
 def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
     """Indices and figures of one family of manoeuvres."""
-    from agents.report_html import figure, note
+    from shipgym.pages import figure, note
 
     parts = [_indices(chosen, found)]
     parts += [note(f"{key}: {found.refused[key]}", "warn") for key in chosen if key in found.refused]
@@ -230,7 +234,7 @@ def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
 
 def _indices(chosen: list[str], found: StandardTrials) -> Html:
     """One row for each index, one column for each manoeuvre."""
-    from agents.report_html import Html, fixed, table
+    from shipgym.pages import Html, fixed, table
 
     def cell(index: IndexInterval) -> Html:
         lost = index.n_ran_away + index.n_never_reached

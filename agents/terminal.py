@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from agents.autopilot import Progress
     from agents.autopilot_result import AutopilotResult
     from identification import IdentificationResult
+    from identification.comparison import Comparison
     from shipgym.manoeuvres import Criterion, IndexInterval
 
 WIDTH_WITHOUT_TERMINAL = 110
@@ -80,9 +81,10 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
         yield tell
 
 
-def prediction_table(result: IdentificationResult) -> Table:
+def prediction_table(result: IdentificationResult, what: str = "") -> Table:
     """Errors of the open-loop simulation of each trial, and its indices."""
-    table = plain_table("Open-loop simulation of the trials: root mean square errors")
+    title = "Open-loop simulation of the trials: root mean square errors"
+    table = plain_table(f"{title}, {what}" if what else title)
     table.add_column("trial", overflow="fold")
     table.add_column("use")
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
@@ -94,6 +96,26 @@ def prediction_table(result: IdentificationResult) -> Table:
         errors = [_number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
         found = "[bold red]ran away[/]" if metrics["diverged"] else _indices(metrics)
         table.add_row(PurePath(name).name, metrics["use"], *errors, found)
+    return table
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """Methods by how well they predict the trials held out, the best first."""
+    held = "each trial in turn" if comparison.in_turn else "trials held out"
+    table = plain_table(f"Methods by how they predict {held}")
+    table.add_column("method")
+    table.add_column("model")
+    for heading in ("error by\nspread", "heading\ndeg", "yaw rate\ndeg/s", "ran away\ntrials"):
+        table.add_column(heading, justify="right")
+    for standing in comparison.standings:
+        table.add_row(
+            standing.method,
+            "stable" if standing.stable else "[bold red]unstable[/]",
+            _number(standing.error, 4),
+            _number(standing.heading_deg, 2),
+            _number(standing.yaw_rate_deg_s, 4),
+            str(standing.ran_away),
+        )
     return table
 
 

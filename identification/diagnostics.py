@@ -25,6 +25,7 @@ MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
+MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
 
 
 @dataclass(frozen=True)
@@ -126,13 +127,20 @@ def _is_still(t: Floats, delta: Floats) -> bool:
 
 
 def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
-    """Refuse a regression with fewer rows than terms.
+    """Refuse a regression with fewer rows than terms, or of a motion that never changes.
 
     Raises
     ------
     InputError
-        Naming the shortest trial.
+        Naming the shortest trial, or the channel.
     """
+    for q, change in samples.targets.items():
+        if not np.any(change):
+            raise InputError(
+                f"trial {trials[0].name!r}: channel {q!r} never changes, in none of the {len(trials)} trials "
+                f"to fit, expected the {MOTIONS.get(q, q)} to be excited and measured; leave the column out "
+                "if it was not measured, or choose a structure without that equation"
+            )
     terms = max(len(structure.regression_names(q)) for q in structure.regressed)
     if len(samples) <= terms:
         shortest = min(trials, key=len)
@@ -163,7 +171,7 @@ def diagnose(
         By equation: those of `u`, `v`, `r` that the structure has.
     """
     errors = residuals(machines, samples)
-    apart = _without_overlap(samples)
+    apart = without_overlap(samples)
     found = {}
     for q, machine in machines.items():
         names = structure.regression_names(q)
@@ -209,6 +217,33 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
 
 
+def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
+    """Correlation of one series with another that is shifted.
+
+    Parameters
+    ----------
+    first, second : array of shape (n_samples,)
+        Two series at the same times.
+    lags : array of int of shape (n_lags,)
+        Samples by which the first comes after the second; negative where it comes before.
+
+    Returns
+    -------
+    array of shape (n_lags,)
+        Between -1 and 1; 0 where a series is constant or shorter than the lag.
+    """
+    a, b = first - first.mean(), second - second.mean()
+    power = float(np.sqrt((a @ a) * (b @ b)))
+    if power == 0.0:
+        return np.zeros(len(lags))
+    n = len(a)
+    return np.array([_shifted(a, b, int(k)) / power if abs(k) < n else 0.0 for k in lags])
+
+
+def _shifted(a: Floats, b: Floats, lag: int) -> float:
+    return float(a[lag:] @ b[: len(b) - lag]) if lag >= 0 else float(a[:lag] @ b[-lag:])
+
+
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
@@ -227,7 +262,7 @@ def variance_inflation(scaled: Floats) -> Floats:
     return factors
 
 
-def _without_overlap(samples: Samples) -> NDArray[np.int64]:
+def without_overlap(samples: Samples) -> NDArray[np.int64]:
     """Rows whose windows do not overlap."""
     step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
     return np.arange(0, len(samples), step)

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from io import StringIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,17 +89,45 @@ class Advice:
     chosen: tuple[str, ...]
     after: dict[str, float]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON; of each trial's information the diagonal."""
+        names = list(self.before)
+        return {
+            "criterion": self.criterion,
+            "coefficient": self.coefficient,
+            "trials": {
+                trial.name: {
+                    "condition_number": trial.condition_number,
+                    "variance_inflation": trial.inflation,
+                    "information": dict(zip(names, np.diag(trial.information).tolist(), strict=True)),
+                }
+                for trial in self.trials
+            },
+            "relative_errors": {"now": self.before, "expected": self.after},
+            "gains": list(self.steps),
+            "run_next": list(self.chosen),
+        }
+
     def __str__(self) -> str:
         from rich.console import Console
         from rich.table import Table
 
         told = Table(
-            "trial", "condition number", "largest inflation", title="Trials so far", title_justify="left"
-        )
+            "trial", "condition number", "largest inflation", f"information on {self.coefficient}",
+            title="Trials so far", title_justify="left",
+        )  # fmt: skip
+        at = list(self.before).index(self.coefficient)
+        total = sum(float(trial.information[at, at]) for trial in self.trials)
         for trial in self.trials:
             worst = max(trial.inflation, key=lambda name: trial.inflation[name])
             numbers = ", ".join(f"{q} {value:.0f}" for q, value in trial.condition_number.items())
-            told.add_row(trial.name, numbers, f"{trial.inflation[worst]:.0f} ({worst})")
+            share = float(trial.information[at, at]) / total if total > 0.0 else 0.0
+            told.add_row(
+                trial.name,
+                numbers,
+                f"{trial.inflation[worst]:.0f} ({worst})",
+                f"{100.0 * share:.0f} % of all",
+            )
         title = f"Run next ({self.criterion}-optimal; least certain: {self.coefficient})"
         candidates = Table("candidate", title=title, title_justify="left")
         for k in range(len(self.steps)):

@@ -22,7 +22,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from identification.decomposition import Decomposition, centre_and_scale, decompose
 from identification.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.robust import reweighted
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -248,8 +248,8 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         check_choice(self.selection, SELECTIONS, "selection")
         check_weight(self.C)
-        if self.rank is not None and self.rank < 1:
-            raise InputError(f"rank: {self.rank} found, expected at least 1, or None")
+        if self.rank is not None:
+            check_whole(self.rank, "rank", at_least=1, hint="or None")
         if not 0.0 < self.explained_variance <= 1.0:
             raise InputError(
                 f"explained_variance: {self.explained_variance} found, expected a share above 0 and at most 1"

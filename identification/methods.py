@@ -85,17 +85,27 @@ class Method:
         InputError
             For settings that the method does not know.
         """
-        try:
-            self.machine(**settings)
-        except TypeError as error:
+        unknown = [name for name in settings if not self.knows(name)]
+        if unknown:
             raise InputError(
-                f"settings: {', '.join(settings)} found, method {self.name!r}: {error}"
-            ) from None
+                f"settings: {', '.join(unknown)} found, which method {self.name!r} does not know; leave them "
+                "out, or choose the method that they are for"
+            )
         return self.fit(partial(self.machine, **settings), task)
 
+    def knows(self, setting: str) -> bool:
+        """Whether the machine has a setting of that name."""
+        try:
+            self.machine(**{setting: 1})
+        except TypeError:
+            return False
+        except InputError:  # the value does not fit, the name does
+            return True
+        return True
 
-def _least_squares(**settings: Any) -> Machine:
-    return TruncatedLSSVM(selection="full", fit_intercept=False, **settings)
+
+def _least_squares(scale: bool = True, robust: bool = False) -> Machine:
+    return TruncatedLSSVM(selection="full", fit_intercept=False, scale=scale, robust=robust)
 
 
 def _ls_svm(C: float = 1e6, **settings: Any) -> Machine:

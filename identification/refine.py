@@ -50,7 +50,7 @@ class Refinement:
     segment_start : {"free", "measured"}
         Whether the state at the start of each segment is fitted with it, which leaves no bias by noise, or
         is the smoothed measurement.
-    prior : float
+    pull : float
         Strength of the pull toward the start: relative cost of a coefficient whose term changes by the whole
         acceleration (root mean squares over the trials).
     rudder_offsets : bool
@@ -70,7 +70,7 @@ class Refinement:
     segment_lengths: float = 3.4
     staggered: bool = True
     segment_start: str = "free"
-    prior: float = 1e-6
+    pull: float = 1e-6
     rudder_offsets: bool = False
     extra_trials: Sequence[Trial] = ()
     extra_weight: float = 1.0
@@ -80,7 +80,7 @@ class Refinement:
     def __post_init__(self) -> None:
         check_number(self.segment_lengths, "segment_lengths", above=0.0, hint="in ship lengths")
         check_choice(self.segment_start, STARTS, "segment_start")
-        check_number(self.prior, "prior", at_least=0.0)
+        check_number(self.pull, "pull", at_least=0.0)
         check_number(self.extra_weight, "extra_weight", above=0.0)
         check_number(self.anchor_weight, "anchor_weight", above=0.0)
 
@@ -155,7 +155,7 @@ def refine(
     if not start.stable or not problem.finite():
         return Refined(start, None, [], settings.plain() | {"decision": "not refined: the start runs away"})
     rejected: list[dict[str, Any]] = []
-    prior = settings.prior
+    prior = settings.pull
     for _ in range(ATTEMPTS):
         solution = problem.solve(prior)
         model = problem.model(solution.parameters)
@@ -163,12 +163,12 @@ def refine(
         if not reasons:
             fit = replace(start, model=model, machines=problem.machines(solution.parameters))
             covariance, influences = problem.covariance(solution, prior, memory)
-            report = settings.plain() | problem.report(solution) | {"decision": "refined", "prior": prior}
+            report = settings.plain() | problem.report(solution) | {"decision": "refined", "pull": prior}
             report |= {"rejected": rejected} if rejected else {}
             return Refined(
                 fit, covariance, influences, report, stretch(model, solution.segments[: problem.own])
             )
-        rejected.append({"prior": prior, "reasons": reasons})
+        rejected.append({"pull": prior, "reasons": reasons})
         prior = max(prior * STRONGER, 1e-9)
     report = settings.plain() | {"decision": "not refined: it runs away", "rejected": rejected}
     return Refined(start, None, [], report)

@@ -20,7 +20,7 @@ from scipy.ndimage import median_filter
 from identification import preprocess
 from identification.memory import eliminated, twice_integrated
 from identification.rudder import Rudder, rebuild, straight
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.models.structures import Structure
 from shipgym.particulars import Particulars
@@ -118,8 +118,8 @@ def build_samples(
     """
     if samples not in SAMPLE_STRUCTURES:
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
-    if window is not None and window < 1:
-        raise InputError(f"window: {window} found, expected a number of sampling steps, at least 1")
+    if window is not None:
+        check_whole(window, "window", at_least=1, hint="in sampling steps")
     preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
     check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
     parts = []

@@ -12,12 +12,13 @@ from rich.table import Table
 from shipgym.particulars import ADDED_MASSES
 
 if TYPE_CHECKING:
-    from identification.pipeline import IdentificationResult
+    from identification.result import IdentificationResult
 
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
 PRIME = 1e-5
 WIDTH = 100
-EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
+EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
+EXACT = 1e8  # condition number beyond which terms are in proportion but for rounding
 
 
 def summary_table(result: IdentificationResult) -> str:
@@ -30,7 +31,7 @@ def summary_table(result: IdentificationResult) -> str:
         f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
     )
     console.print(_coefficients(result), _inertia(result), _equations(result))
-    for line in _undetermined(result):
+    for line in undetermined(result) + exactly_collinear(result):
         console.print(line, highlight=False)
     if "reference" in result.metrics:
         console.print(_against_reference(result))
@@ -97,13 +98,24 @@ def _equations(result: IdentificationResult) -> Table:
     return table
 
 
-def _undetermined(result: IdentificationResult) -> list[str]:
+def undetermined(result: IdentificationResult) -> list[str]:
     """For each equation the terms that the data do not tell apart, of directions that the fit left out."""
     return [
         f"{EQUATIONS.get(name, name)}: not told apart by the data, their combination was left out: "
         + "; ".join(", ".join(group) for group in fit.dropped)
         for name, fit in result.diagnostics.items()
         if fit.dropped
+    ]
+
+
+def exactly_collinear(result: IdentificationResult) -> list[str]:
+    """For each equation of which no direction was left out the terms that are in proportion in the data."""
+    return [
+        f"{EQUATIONS.get(name, name)}: exactly collinear in the data: "
+        + "; ".join(f"{one} and {other}" for one, other, _ in fit.collinear_pairs)
+        + "; only combinations are determined, their shares are the method's choice"
+        for name, fit in result.diagnostics.items()
+        if fit.condition_number > EXACT and not fit.dropped
     ]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any
 
 from shipgym.errors import InputError
@@ -110,3 +110,17 @@ def check_number(
     if not within:
         raise InputError(f"{where}: {number:g} found, {expected}")
     return number
+
+
+def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int:
+    """Return `value`, which must be a whole number of at least so much.
+
+    Raises
+    ------
+    InputError
+        Naming the place, the value and what is expected.
+    """
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < at_least:
+        expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
+        raise InputError(f"{where}: {value!r} found, expected {expected}")
+    return int(value)

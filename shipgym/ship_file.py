@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import tomllib
 from collections.abc import Mapping
@@ -10,24 +9,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.columns import parse_columns
 from shipgym.csv_reader import check_readable, read_bytes
 from shipgym.errors import InputError
+from shipgym.identify_table import check_options
 from shipgym.particulars import Particulars
+from shipgym.plausibility import check_scale
 from shipgym.steering import SteeringGear
 from shipgym.trial import KINDS, USES, Trial
 from shipgym.trial_import import Conventions
 
 _SECTIONS = ("ship", "steering", "columns", "conventions", "identify", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
-_IDENTIFY = ("structure", "method", "samples", "reference_model")
 _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
-
-_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
-_FASTEST_TIP = 100.0  # m/s at the propeller's tip
 
 
 @dataclass(frozen=True)
@@ -73,8 +68,8 @@ class ShipFile:
         As given; ``particulars.completed()`` estimates the rest.
     steering : SteeringGear or None
         None where the file has no ``[steering]``.
-    identify : dict of str to str
-        Defaults for the identification: any of ``structure``, ``method``, ``samples``, ``reference_model``.
+    identify : dict
+        Defaults for the identification, by the names of :data:`shipgym.identify_table.OPTIONS`.
     entries : tuple of TrialEntry
         The trials, not read yet.
     """
@@ -82,7 +77,7 @@ class ShipFile:
     path: Path
     particulars: Particulars
     steering: SteeringGear | None
-    identify: dict[str, str]
+    identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]
 
     @classmethod
@@ -114,11 +109,8 @@ class ShipFile:
         steering = (
             SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
         )
-        identify = check_table(data.get("identify", {}), f"{path}: [identify]")
-        check_keys(identify, _IDENTIFY, f"{path}: [identify]")
-        for key, value in identify.items():
-            check_text(value, f"{path}: [identify] {key}")
-        return cls(path, particulars, steering, dict(identify), _entries(path, data, particulars))
+        identify = check_options(data.get("identify", {}), f"{path}: [identify]")
+        return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:
         """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
@@ -156,6 +148,23 @@ class ShipFile:
         wanted = [e for e in self.entries if (e.use == use if use is not None else e.use != "skip")]
         return [self._read(entry) for entry in wanted]
 
+    def trial(self, file: str) -> Trial:
+        """Read one trial, whatever its use.
+
+        Parameters
+        ----------
+        file : str
+            As written in the ship file.
+
+        Raises
+        ------
+        InputError
+            If no trial has that file, and for anything wrong with it.
+        """
+        files = [entry.file for entry in self.entries]
+        check_choice(file, files, f"{self.path}: trial")
+        return self._read(self.entries[files.index(file)])
+
     def _read(self, entry: TrialEntry) -> Trial:
         c = entry.conventions
         try:
@@ -174,7 +183,7 @@ class ShipFile:
             )
         except InputError as error:
             raise InputError(f"{entry.where}: {error}") from None
-        _check_scale(trial, self.particulars, entry)
+        check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
         return trial
 
 
@@ -254,27 +263,3 @@ def _entry(
 
 def _conventions(words: Mapping[str, Any], particulars: Particulars, where: str) -> Conventions:
     return Conventions(**words, xg=particulars.xg, where=where)
-
-
-def _check_scale(trial: Trial, particulars: Particulars, entry: TrialEntry) -> None:
-    """Refuse what no ship of this size does: |r| L / U, and the speed of the propeller's tip."""
-    head = f"{entry.where}: {entry.path}"
-    if "r" in trial and "u" in trial:
-        fastest = float(np.abs(trial["r"]).max())
-        speed = float(np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))).max())
-        limit = _FASTEST_TURN_PRIME * speed / particulars.length
-        if fastest > limit:
-            raise InputError(
-                f"{head}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
-                f"expected at most {math.degrees(limit):.4g} deg/s for a length of {particulars.length:g} m; "
-                "likely a wrong unit of r, psi, u or v in [columns], or of [ship] length"
-            )
-    diameter = particulars.propeller_diameter
-    if "n" in trial and diameter is not None:
-        fastest, limit = float(np.abs(trial["n"]).max()), _FASTEST_TIP / (math.pi * diameter)
-        if fastest > limit:
-            raise InputError(
-                f"{head}: shaft speed up to {fastest:.4g} rps found, expected at most {limit:.4g} rps for a "
-                f"propeller of {diameter:g} m; likely a wrong unit: "
-                'declare n = { column = "...", unit = "rpm" } in [columns]'
-            )

@@ -390,7 +390,10 @@ def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
     bad = ~np.isfinite(array)
     if bad.any():
         index = int(np.argmax(bad))
-        raise InputError(f"{where}: {array[index]} found at sample {index}, expected finite numbers")
+        raise InputError(
+            f"{where}: {array[index]} found at sample {index}, expected finite numbers; leave such samples "
+            'out, or import the file with repair = "interpolate"'
+        )
     array.setflags(write=False)
     return array
 

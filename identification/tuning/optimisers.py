@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -12,8 +13,9 @@ from identification.tuning.grid_search import GridSearch
 from identification.tuning.particle_swarm import ParticleSwarm
 from identification.tuning.search import Objective, Optimiser, SearchResult
 from shipgym.checks import check_choice
+from shipgym.errors import InputError
 
-OPTIMISERS: dict[str, Callable[[], Optimiser]] = {
+OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
     "abc": ArtificialBeeColony,
     "pso": ParticleSwarm,
     "grid": GridSearch,
@@ -21,17 +23,22 @@ OPTIMISERS: dict[str, Callable[[], Optimiser]] = {
 }
 
 
-def get_optimiser(optimiser: str | Optimiser) -> Optimiser:
-    """An optimiser by name, with its usual settings, or as given.
+def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
+    """An optimiser by name with its usual settings, as a table `{"name": "abc", "rounds": 60}`, or as given.
 
     Raises
     ------
     InputError
-        For a name that is not known.
+        For a name or a setting that is not known.
     """
     if hasattr(optimiser, "minimise"):
         return optimiser
-    return OPTIMISERS[check_choice(optimiser, OPTIMISERS, "optimiser")]()
+    settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
+    name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
+    try:
+        return OPTIMISERS[name](**settings)
+    except TypeError as error:
+        raise InputError(f"optimiser: {', '.join(settings)} found for {name!r}: {error}") from None
 
 
 def minimise(

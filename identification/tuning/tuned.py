@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
@@ -13,7 +14,7 @@ from identification.lssvm import LSSVM, check_weight, validated
 from identification.tuning.objectives import ErrorOfC, held_out_error, time_blocks, training_error
 from identification.tuning.optimisers import get_optimiser
 from identification.tuning.search import Optimiser
-from shipgym.checks import check_choice
+from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -35,8 +36,9 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     Parameters
     ----------
-    optimiser : {"abc", "pso", "grid", "de"} or Optimiser
-        Artificial bee colony, particle swarm, grid or differential evolution.
+    optimiser : {"abc", "pso", "grid", "de"}, mapping or Optimiser
+        Artificial bee colony, particle swarm, grid or differential evolution; with its settings as
+        `{"name": "abc", "rounds": 60}`.
     objective : {"k-fold", "training", "free-running"}
         Error of blocks of time held out; error on the samples fitted, as the thesis has it, whose
         optimum is the upper bound; error of simulated trials (through `identify` only).
@@ -64,7 +66,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def __init__(
         self,
-        optimiser: str | Optimiser = "abc",
+        optimiser: str | Mapping[str, Any] | Optimiser = "abc",
         objective: str = "k-fold",
         bounds: tuple[float, float] = (1e-2, 1e12),
         folds: int | str = 5,
@@ -99,6 +101,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self
         """
         check_choice(self.objective, OBJECTIVES, "objective")
+        check_whole(self.seed, "seed", at_least=0)
         if self.objective == "free-running":
             raise InputError(
                 "objective: 'free-running' found, expected 'k-fold' or 'training': samples alone cannot be "

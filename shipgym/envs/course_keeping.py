@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
@@ -20,6 +19,7 @@ from shipgym.envs.course_keeping_task import (
     CourseKeepingTask,
     observation_scales,
 )
+from shipgym.envs.stability import refuse_unstable
 from shipgym.errors import InputError
 from shipgym.kernels import course_keeping_rows as rows
 from shipgym.kernels import layout, weather_rows
@@ -42,12 +42,14 @@ class CourseKeepingEngine:
         Number of lanes.
     task : CourseKeepingTask
         What is asked.
+    allow_unstable : bool
+        Whether a model that was found unstable when it was identified may be sailed.
 
     Raises
     ------
     InputError
-        If `num_envs` is not positive, the number of models or their structures do not fit, or a ship's
-        particulars are not enough for the weather.
+        If `num_envs` is not positive, the number of models or their structures do not fit, a ship's
+        particulars are not enough for the weather, or a model is marked unstable.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class CourseKeepingEngine:
         models: ShipModel | Sequence[ShipModel],
         num_envs: int,
         task: CourseKeepingTask | None = None,
+        allow_unstable: bool = False,
     ) -> None:
         if num_envs < 1:
             raise InputError(f"num_envs: {num_envs} found, expected at least 1")
@@ -62,12 +65,7 @@ class CourseKeepingEngine:
         if len(fleet) not in (1, num_envs):
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
         self.model = fleet[0]
-        if (self.model.provenance or {}).get("stable") is False:
-            warnings.warn(
-                f"model {self.model.name!r} was found unstable when it was identified: it runs away in hard "
-                "turns, do not trust what is learned or tuned on it",
-                stacklevel=3,
-            )
+        refuse_unstable(fleet, allow_unstable)
         if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
         self.num_envs = num_envs
@@ -260,11 +258,13 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         See `CourseKeepingTask`.
     render_mode : None
         Reserved by Gymnasium; there is nothing to render yet.
+    allow_unstable : bool
+        Whether a model that was found unstable when it was identified may be sailed; it comes with a warning.
 
     Raises
     ------
     InputError
-        For an unknown model or an argument out of its range.
+        For an unknown model, one that is marked unstable, or an argument out of its range.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - Gymnasium declares it so
@@ -280,6 +280,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         max_heading_error_deg: float = 90.0,
         max_envelope_distance: float = 5.0,
         render_mode: str | None = None,
+        allow_unstable: bool = False,
     ) -> None:
         if render_mode is not None:
             raise InputError(f"render_mode: {render_mode!r} found, expected None: nothing is rendered")
@@ -293,7 +294,7 @@ class CourseKeepingEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self.observation_names = OBSERVATION_NAMES
         self.observation_scales = observation_scales(self.model)
         self.render_mode = None
-        self._engine = CourseKeepingEngine(self.model, 1, self.task)
+        self._engine = CourseKeepingEngine(self.model, 1, self.task, allow_unstable)
         self._command, self._seen, self._outcome = self._engine.first_lane()
         self._key = 0
         self._episode = -1

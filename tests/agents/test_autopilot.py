@@ -6,9 +6,9 @@ import pytest
 
 from agents.autopilot import build_autopilot, verify
 from agents.autopilot_result import verification_metrics
-from agents.concerns import concerns
 from agents.spread import manoeuvre_spread
 from identification import identify
+from identification.concerns import concerns
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
 

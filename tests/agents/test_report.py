@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents.report_figures import band, translucent
-from agents.report_html import Html, figure, fixed, html, number, percent, table
+from shipgym.pages import Html, figure, fixed, html, number, percent, table
 from shipgym.plots import graph_objects
 
 

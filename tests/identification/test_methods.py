@@ -153,7 +153,10 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
         ({"method": "tls-svm", "rank": 0}, "rank: 0"),
         ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
         ({"method": "svr", "C": float("inf")}, "C: inf"),
-        ({"method": "ls", "rank": 3, "depth": 2}, "settings: rank, depth found, method 'ls'"),
+        (
+            {"method": "ls", "rank": 3, "depth": 2},
+            "settings: rank, depth found, which method 'ls'",
+        ),
     ],
 )
 def test_wrong_settings_are_named(

@@ -146,7 +146,8 @@ def test_summary_is_a_table_with_errors_and_marks_estimates(noisy_trials: list[T
 
 def test_result_is_saved_whole_and_read_back(noisy_fit: IdentificationResult, tmp_path: Path) -> None:
     noisy_fit.save(tmp_path / "ship")
-    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == ["metrics.json", "model.json"]
+    names = ["metrics.json", "model.json", "report.html", "settings.json"]
+    assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     loaded = ShipModel.load(tmp_path / "ship" / "model.json")
     assert loaded.coefficients == noisy_fit.coefficients
     assert loaded.provenance == noisy_fit.model.provenance

@@ -69,7 +69,7 @@ def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zig
     for q, machine in start.machines.items():
         start.machines[q] = machine
         machine.coef_ = machine.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(machine.coef_))))
-    refined = refine(start, samples, [cao_zigzag], Refinement(prior=0.0), 20.0)
+    refined = refine(start, samples, [cao_zigzag], Refinement(pull=0.0), 20.0)
     truth = np.array(list(mariner.coefficients.values()))
     found = np.array(list(refined.fit.model.coefficients.values()))
     assert np.median(np.abs(found / truth - 1.0)) < 5e-3
@@ -161,7 +161,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
     [
         ({"segment_lengths": 0.0}, "segment_lengths: 0"),
         ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
-        ({"prior": -1.0}, "prior: -1"),
+        ({"pull": -1.0}, "pull: -1"),
         ({"extra_weight": float("nan")}, "extra_weight: nan"),
     ],
 )

@@ -208,9 +208,14 @@ def test_each_lane_of_a_batch_is_the_single_environment(mariner):
         assert rewards[lane] == reward
 
 
-def test_a_model_found_unstable_is_said_to_be(mariner):
+def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
+    marked = replace(mariner, provenance={"stable": False})
+    with pytest.raises(InputError, match=r"'mariner' was found unstable.*allow_unstable=True"):
+        make(model=marked)
+    with pytest.raises(InputError, match="was found unstable"):
+        CourseKeepingEngine([mariner, marked], 2)
     with pytest.warns(UserWarning, match="found unstable when it was identified"):
-        make(model=replace(mariner, provenance={"stable": False}))
+        make(model=marked, allow_unstable=True)
 
 
 def test_a_finished_lane_stays_and_earns_nothing(mariner):

@@ -267,7 +267,7 @@ def test_a_ship_of_known_length_cannot_spin_faster_than_any_ship(folder):
     table["u"] /= 100.0  # 0.011 m/s and 4 deg/s with 7 m
     write_csv(folder / "a.csv", table)
     message = refusal(folder, slow, slow, read=True)
-    assert "yaw rate up to 4 deg/s" in message
+    assert "yaw rate up to 3.98 deg/s" in message
     assert "for a length of 7 m" in message
 
 

@@ -1,4 +1,4 @@
-"""Sections of the report on the data and the model: trials, particulars, coefficients, predictions."""
+"""Sections of a report on the data, the fit and the predictions."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.report_figures import overview_figure, prediction_figure
-from agents.report_html import (
+from identification.report.predictions import overview_figure, prediction_figure
+from shipgym.pages import (
     MINUS,
     NONE,
     Html,
@@ -29,15 +29,13 @@ from shipgym.particulars import ADDED_MASSES
 from shipgym.trial import Trial
 
 if TYPE_CHECKING:
-    from agents.autopilot_result import AutopilotResult
+    from identification.result import IdentificationResult
     from shipgym.models import ShipModel
 
 KNOT = 1852.0 / 3600.0
 PRIME = 1e-5
-UNCERTAIN_T = 2.0  # a coefficient with a smaller |t| is not told from zero
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
-FORCES = {"X": "Surge force X", "Y": "Sway force Y", "N": "Yaw moment N"}
 INDICES = {
     "overshoot_1_deg": ("first overshoot", "deg"),
     "overshoot_2_deg": ("second overshoot", "deg"),
@@ -58,10 +56,10 @@ PARTICULARS = {
 }
 
 
-def data_section(result: AutopilotResult) -> Html:
+def data_section(result: IdentificationResult) -> Html:
     """The trials, how well the equations fit, and the ship."""
     fitted = [trial for trial in result.trials if trial.use == "fit"]
-    drawn = overview_figure(fitted, result.identification.predictions)
+    drawn = overview_figure(fitted, result.predictions)
     return section(
         "data",
         "Data and fit",
@@ -86,7 +84,7 @@ def short_names(trials: Sequence[Trial]) -> dict[str, str]:
     return short if len(set(short.values())) == len(short) else {name: name for name in short}
 
 
-def trials_table(result: AutopilotResult) -> Html:
+def trials_table(result: IdentificationResult) -> Html:
     """One row for each trial."""
     rows = []
     short = short_names(result.trials)
@@ -125,7 +123,7 @@ def trials_table(result: AutopilotResult) -> Html:
     return table(head, rows, text_columns=4, caption=caption)
 
 
-def fit_table(result: AutopilotResult) -> Html:
+def fit_table(result: IdentificationResult) -> Html:
     """Diagnostics of each equation, and what the guard against runaway models did."""
     rows = [
         [
@@ -137,7 +135,7 @@ def fit_table(result: AutopilotResult) -> Html:
             fixed(found.r_squared, 4),
             number(found.residual_rms, 2),
         ]
-        for name, found in result.identification.diagnostics.items()
+        for name, found in result.diagnostics.items()
     ]
     provenance = result.model.provenance or {}
     guard = provenance.get("guard", {})
@@ -160,7 +158,7 @@ def fit_table(result: AutopilotResult) -> Html:
     return join(parts)
 
 
-def ship_tables(result: AutopilotResult) -> Html:
+def ship_tables(result: IdentificationResult) -> Html:
     """Particulars and added masses, those estimated marked so."""
     model = result.model
     estimated = model.particulars.estimated
@@ -201,66 +199,7 @@ def _particular(model: ShipModel, name: str) -> float:
     return value / 1000.0 if name == "mass" else value
 
 
-def coefficients_section(result: AutopilotResult) -> Html:
-    """Every coefficient with its standard error and t."""
-    errors = result.identification.standard_errors
-    coefficients = result.identification.coefficients
-    weak = [name for name, value in coefficients.items() if _t(value, errors[name]) < UNCERTAIN_T]
-    tables = [
-        _coefficient_table(
-            title, {n: v for n, v in coefficients.items() if n.startswith(f"{force}_")}, errors
-        )
-        for force, title in FORCES.items()
-    ]
-    return section(
-        "coefficients",
-        "Coefficients",
-        paragraph(
-            "Hydrodynamic derivatives in the prime system with the instantaneous speed, times 10⁻⁵, "
-            "rudder positive to starboard. The standard error comes from the residuals of the fit, "
-            "correlated in time and between the equations; t is value by standard error. ",
-            f"{len(weak)} of {len(coefficients)} coefficients are not told from zero (|t| < 2) and are "
-            "printed pale: the manoeuvres of the fit hardly depend on them, one by one.",
-        ),
-        columns(*tables),
-        estimated_note(result),
-    )
-
-
-def _coefficient_table(title: str, values: Mapping[str, float], errors: Mapping[str, float]) -> Html:
-    def shade(cell: Any, name: str) -> Html:
-        pale = _t(values[name], errors[name]) < UNCERTAIN_T
-        return Html(f'<span style="color:var(--faint)">{html(cell)}</span>') if pale else html(cell)
-
-    rows = [
-        [
-            shade(name, name),
-            shade(fixed(value / PRIME, 1), name),
-            shade(Html(f"± {fixed(errors[name] / PRIME, 1)}"), name),
-            shade(fixed(value / errors[name], 1) if errors[name] > 0.0 else None, name),
-        ]
-        for name, value in values.items()
-    ]
-    return table([title, "value", "std. error", "t"], rows)
-
-
-def _t(value: float, error: float) -> float:
-    return abs(value / error) if error > 0.0 else np.inf
-
-
-def estimated_note(result: AutopilotResult) -> Html:
-    """What the coefficients rest on that was not given."""
-    names = sorted(result.model.particulars.estimated)
-    if not names:
-        return Html("")
-    return note(
-        f"Estimated from the ship's particulars, not given: {', '.join(names)}. From free-running trials "
-        "the inertia cannot be identified along with the forces: if an estimate is off, the coefficients "
-        "are off in proportion, while the simulated motions are not."
-    )
-
-
-def prediction_section(result: AutopilotResult) -> Html:
+def prediction_section(result: IdentificationResult) -> Html:
     """Open-loop predictions of the trials that had no part in the fit."""
     validated = [trial for trial in result.trials if trial.use == "validate"]
     parts = [errors_table(result)]
@@ -274,7 +213,7 @@ def prediction_section(result: AutopilotResult) -> Html:
         )
     short = short_names(result.trials)
     for k, trial in enumerate(validated):
-        drawn = prediction_figure(trial, result.identification.predictions.get(trial.name))
+        drawn = prediction_figure(trial, result.predictions.get(trial.name))
         parts.append(
             figure(
                 drawn,
@@ -293,11 +232,11 @@ def _caption(trial: Trial) -> str:
     )
 
 
-def errors_table(result: AutopilotResult) -> Html:
+def errors_table(result: IdentificationResult) -> Html:
     """RMSE and indices of each trial, measured and predicted."""
     rows = []
     short = short_names(result.trials)
-    for name, metrics in result.identification.metrics["trials"].items():
+    for name, metrics in result.metrics["trials"].items():
         rmse = metrics["rmse"]
         rows.append(
             [

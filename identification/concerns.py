@@ -6,7 +6,8 @@ from pathlib import PurePath
 
 import numpy as np
 
-from identification import IdentificationResult
+from identification.result import IdentificationResult
+from identification.summary import exactly_collinear
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.models.linear import is_course_stable, steering_state_space
@@ -53,6 +54,7 @@ def concerns(identification: IdentificationResult) -> list[str]:
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
             "held back; predictions far from the recorded manoeuvres deserve caution"
         )
+    found += exactly_collinear(identification)
     lost = {
         name: float(np.degrees(metrics["rmse"]["psi"]))
         for name, metrics in identification.metrics["trials"].items()

@@ -1,0 +1,150 @@
+"""Identification of a ship file: its options, those given beside it, and its trials."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from identification import IdentificationResult, identify
+from identification.comparison import Comparison, compare_methods
+from identification.methods import METHODS
+from identification.reduced import ReducedIdentification, identify_reduced
+from shipgym.errors import InputError
+from shipgym.identify_table import check_options
+from shipgym.models.greybox import GREY_BOX
+from shipgym.ship_file import ShipFile
+from shipgym.trial import Trial
+
+MODELS = ("reference_model", "prior")  # options that may name a model's file
+
+
+def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of `identify`: those given, else the ship file's; the others are left to their defaults.
+
+    Parameters
+    ----------
+    ship : ShipFile
+        Files that it names are found from its folder.
+    given : mapping
+        By option; None for those that were not given.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        For an option that does not exist or has a value of another kind.
+    """
+    own = dict(ship.identify)
+    for option in MODELS:
+        if str(own.get(option, "")).endswith(".json"):
+            own[option] = str(ship.path.parent / own[option])
+    chosen = own | check_options({k: v for k, v in given.items() if v is not None}, "options")
+    if chosen.get("structure") == GREY_BOX:
+        chosen.setdefault("reference_model", "auto")
+    elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:
+        chosen.pop("reference_model", None)  # of the structure that the ship file names
+    return chosen
+
+
+def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
+    """Options written as on the command line, `name=value` with a value as in the ship file.
+
+    Raises
+    ------
+    InputError
+        For one that is not, or has no such name.
+    """
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        if not sign or not name.strip():
+            raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
+        found[name.strip()] = _value(value.strip())
+    return check_options(found, "--set")
+
+
+def _value(text: str) -> Any:
+    """A value of TOML; what is none is a text without quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text
+
+
+def trials_of(ship: ShipFile, settings: Mapping[str, Any]) -> tuple[list[Trial], dict[str, Any]]:
+    """The trials of a ship file, and the settings with the extra trials read, which are left out of them."""
+    extra = settings.get("extra_trials", [])
+    trials = [trial for trial in ship.trials() if trial.name not in extra]
+    return trials, {**settings, **({"extra_trials": [ship.trial(file) for file in extra]} if extra else {})}
+
+
+def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> IdentificationResult:
+    """`identify` on a ship file, which its errors name.
+
+    Parameters
+    ----------
+    ship : ShipFile
+        Its trials are read.
+    settings : mapping
+        From `identification_settings`.
+
+    Returns
+    -------
+    IdentificationResult
+    """
+    trials, arguments = trials_of(ship, settings)
+    return identify_trials(ship, trials, arguments)
+
+
+def identify_trials(
+    ship: ShipFile, trials: Sequence[Trial], arguments: Mapping[str, Any]
+) -> IdentificationResult:
+    """`identify_ship` for trials that are read already, both from `trials_of`."""
+    try:
+        return identify(trials, particulars=ship.particulars, steering=ship.steering, **arguments)
+    except InputError as error:
+        raise InputError(f"{ship.path}: {error}") from None
+
+
+def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | None) -> Comparison:
+    """`compare_methods` on a ship file.
+
+    Parameters
+    ----------
+    ship : ShipFile
+        Its trials are read.
+    settings : mapping
+        From `identification_settings`; their method does not count.
+    methods : str or None
+        Names with commas between, "all", or None for the usual ones.
+
+    Returns
+    -------
+    Comparison
+    """
+    trials, arguments = trials_of(ship, settings)
+    arguments.pop("method", None)
+    names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
+    try:
+        return compare_methods(
+            trials, names or None, particulars=ship.particulars, steering=ship.steering, **arguments
+        )
+    except InputError as error:
+        raise InputError(f"{ship.path}: {error}") from None
+
+
+def reduce_ship(
+    ship: ShipFile, settings: Mapping[str, Any], direction: str, tolerance: float
+) -> ReducedIdentification:
+    """`identify_reduced` on a ship file."""
+    trials, arguments = trials_of(ship, settings)
+    try:
+        return identify_reduced(
+            trials, direction, tolerance, particulars=ship.particulars, steering=ship.steering, **arguments
+        )
+    except InputError as error:
+        raise InputError(f"{ship.path}: {error}") from None

@@ -1,0 +1,261 @@
+"""Figures of a fit: regression, residuals, choice of rank and of C, and intervals of the coefficients."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.diagnostics import autocorrelation, cross_correlation, without_overlap
+from identification.report.predictions import legend_above, overview_figure, prediction_figure
+from identification.uncertainty import residuals
+from shipgym.plots import (
+    LIMIT,
+    MEASURED,
+    MODEL,
+    MUTED,
+    PALETTE,
+    axis,
+    compact,
+    graph_objects,
+    layout,
+    line,
+    subplots,
+    translucent,
+)
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+    from identification.result import IdentificationResult
+
+Floats = NDArray[np.float64]
+
+EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
+UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
+MOST_ROWS = 2500  # drawn of one equation
+LAGS = 24  # windows
+NORMAL_95 = 1.96
+SHOWN = (-1.5, 3.5)  # of an interval, by the size of the coefficient
+
+
+def all_figures(result: IdentificationResult) -> dict[str, Figure]:
+    """Every figure of a result by its name; see `IdentificationResult.plots`."""
+    fitted = [trial for trial in result.trials if trial.use == "fit"]
+    found = {"fit": fit_figure(result), "residuals": residual_figure(result)}
+    if any(hasattr(machine, "l_curve_") for machine in result.machines.values()):
+        found["l-curve"] = l_curve_figure(result)
+    if result.searches:
+        found["search"] = search_figure(result)
+    found["coefficients"] = coefficients_figure(result)
+    if all("psi" in trial and "delta" in trial for trial in fitted):
+        found["trials"] = overview_figure(fitted, result.predictions)
+    return found | {
+        f"prediction: {trial.name}": prediction_figure(trial, result.predictions[trial.name])
+        for trial in result.trials
+        if trial.use == "validate"
+    }
+
+
+def fit_figure(result: IdentificationResult) -> Figure:
+    """Mean acceleration over each window, as the trials have it and as the regression explains it."""
+    samples, equations = result.samples, list(result.machines)
+    figure = subplots(
+        len(equations), 2, column_widths=[0.7, 0.3], horizontal_spacing=0.1,
+        vertical_spacing=0.24 / len(equations),
+    )  # fmt: skip
+    drawn = slice(None, None, max(len(samples) // MOST_ROWS, 1))
+    breaks = np.flatnonzero(np.diff(samples.trial[drawn])) + 1
+    for row, q in enumerate(equations, start=1):
+        factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
+        seen = (samples.targets[q] * factor)[drawn]
+        told = (result.machines[q].predict(samples.features[q]) * factor)[drawn]
+        for values, name, colour, width in (
+            (seen, "trials", MEASURED, 1.2),
+            (told, "regression", MODEL, 1.7),
+        ):
+            course = np.insert(values, breaks, np.nan)  # a gap between trials
+            figure.add_trace(
+                line(np.arange(len(course)), course, name, colour, width, showlegend=row == 1), row=row, col=1
+            )
+        figure.add_trace(
+            graph_objects().Scatter(
+                x=compact(told), y=compact(seen), mode="markers", showlegend=False,
+                marker={"color": translucent(MODEL, 0.35), "size": 4}, hoverinfo="skip",
+            ), row=row, col=2,
+        )  # fmt: skip
+        ends = [min(seen.min(), told.min()), max(seen.max(), told.max())]
+        figure.add_trace(line(ends, ends, "equal", MUTED, 1.0, showlegend=False), row=row, col=2)
+        last = row == len(equations)
+        figure.update_xaxes(axis("window, trial after trial" if last else ""), row=row, col=1)
+        figure.update_yaxes(axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5), row=row, col=1)
+        figure.update_xaxes(axis("regression" if last else "", nticks=4), row=row, col=2)
+        figure.update_yaxes(axis("", nticks=5), row=row, col=2)
+    height = 190 * len(equations) + 80
+    figure.update_layout(layout(height, legend=legend_above(height, 8), hovermode="closest"))
+    return figure
+
+
+def residual_figure(result: IdentificationResult) -> Figure:
+    """Autocorrelation of the residuals and their cross-correlation with the rudder, with 95 % bounds."""
+    errors, equations = residuals(result.machines, result.samples), list(result.machines)
+    rows = without_overlap(result.samples)
+    rudder = rudder_at_windows(result)
+    figure = subplots(
+        len(equations), 2, horizontal_spacing=0.1, vertical_spacing=0.24 / len(equations),
+        titles=["with themselves", "with the rudder" if rudder is not None else ""],
+    )  # fmt: skip
+    bound = NORMAL_95 / np.sqrt(len(rows))
+    for row, q in enumerate(equations, start=1):
+        own = autocorrelation(errors[q][rows], LAGS)
+        courses: list[tuple[NDArray[Any], Any]] = [(np.arange(1, len(own) + 1), own)]
+        if rudder is not None:
+            lags = np.arange(-LAGS, LAGS + 1)
+            courses.append((lags, cross_correlation(errors[q][rows], rudder[rows], lags)))
+        for column, (lags, values) in enumerate(courses, start=1):
+            place = {"row": row, "col": column}
+            figure.add_trace(_bars(lags, values), **place)
+            for side in (-bound, bound):
+                ends = [lags[0] - 0.5, lags[-1] + 0.5]
+                legend = row == column == 1 and bool(side > 0.0)
+                figure.add_trace(
+                    line(ends, [side, side], "95 % bounds of white noise", LIMIT, 1.2, line_dash="dash",
+                         showlegend=legend), **place,
+                )  # fmt: skip
+            figure.update_xaxes(axis("lag, windows" if row == len(equations) else ""), **place)
+            largest = max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound)
+            figure.update_yaxes(
+                axis(EQUATIONS[q] if column == 1 else "", range=[-min(largest, 1.05), min(largest, 1.05)]),
+                **place,
+            )
+    height = 170 * len(equations) + 100
+    figure.update_layout(
+        layout(height, margin={"l": 62, "r": 18, "t": 66, "b": 44}, legend=legend_above(height),
+               hovermode="closest", bargap=0.5)
+    )  # fmt: skip
+    return figure
+
+
+def _bars(lags: NDArray[Any], values: Any) -> Any:
+    return graph_objects().Bar(
+        x=lags, y=compact(values), marker={"color": MODEL}, showlegend=False,
+        hovertemplate="lag %{x}: %{y:.2f}<extra></extra>",
+    )  # fmt: skip
+
+
+def rudder_at_windows(result: IdentificationResult) -> Floats | None:
+    """Rudder in the middle of each row's window, rad; None where a trial has none."""
+    samples = result.samples
+    used = [trial for trial in result.trials if trial.use == "fit"]
+    if not all("delta" in trial for trial in used):
+        return None
+    middle, angles = samples.start + 0.5 * samples.duration, np.empty(len(samples))
+    for k, trial in enumerate(used):
+        own = samples.trial == k
+        angles[own] = np.interp(middle[own], trial.t, trial["delta"])
+    return angles
+
+
+def l_curve_figure(result: IdentificationResult) -> Figure:
+    """Size of residuals and of solution for every rank, one panel for each equation."""
+    curves = {q: m for q, m in result.machines.items() if hasattr(m, "l_curve_")}
+    titles = [
+        f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}"  # type: ignore[attr-defined]
+        for q, m in curves.items()
+    ]
+    figure = subplots(1, len(curves), titles=titles, horizontal_spacing=0.09)
+    go = graph_objects()
+    for column, machine in enumerate(curves.values(), start=1):
+        curve, rank = machine.l_curve_, machine.rank_  # type: ignore[attr-defined]
+        ranks = [str(k) for k in range(1, len(curve.residual_norm) + 1)]
+        place = {"row": 1, "col": column}
+        x, y = compact(curve.residual_norm), compact(curve.solution_norm)
+        figure.add_trace(
+            go.Scatter(
+                x=x, y=y, text=ranks, mode="lines+markers", showlegend=column == 1, name="rank 1, 2, ...",
+                legendgroup="ranks", line={"color": MUTED, "width": 1.2}, marker={"color": MUTED, "size": 5},
+                hovertemplate="rank %{text}<extra></extra>",
+            ), **place,
+        )  # fmt: skip
+        figure.add_trace(
+            go.Scatter(
+                x=x[rank - 1 : rank], y=y[rank - 1 : rank], mode="markers", name="chosen",
+                legendgroup="chosen", showlegend=column == 1,
+                marker={"color": LIMIT, "size": 9}, hoverinfo="skip", cliponaxis=False,
+            ), **place,
+        )  # fmt: skip
+        figure.update_xaxes(_logarithmic("norm of the residuals", x), **place)
+        figure.update_yaxes(_logarithmic("norm of the solution" if column == 1 else "", y), **place)
+    margin = {"l": 70, "r": 18, "t": 76, "b": 48}
+    figure.update_layout(layout(360, margin=margin, legend=legend_above(360), hovermode="closest"))
+    return figure
+
+
+def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
+    """An axis in decades, or in steps of 1, 2, 5 where there are few."""
+    few = float(np.log10(values.max() / max(values.min(), np.finfo(np.float32).tiny))) < 2.0
+    return axis(title, type="log", dtick="D2" if few else 1, tickformat="~g")
+
+
+def search_figure(result: IdentificationResult) -> Figure:
+    """What a search had found after each of its rounds: objective, and weight C of the errors."""
+    figure = subplots(1, 2, titles=["best objective, by its last", "best C"], horizontal_spacing=0.1)
+    for (q, search), colour in zip(result.searches.items(), PALETTE, strict=False):
+        rounds = np.arange(len(search.history))
+        scale = search.value if search.value > 0.0 else 1.0
+        name = EQUATIONS.get(q, q)
+        figure.add_trace(line(rounds, search.history / scale, name, colour), row=1, col=1)
+        figure.add_trace(
+            line(rounds, 10.0 ** search.course[:, 0], name, colour, showlegend=False), row=1, col=2
+        )
+    for column in (1, 2):
+        figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
+    figure.update_yaxes(axis(""), row=1, col=1)
+    figure.update_yaxes(axis("", type="log", exponentformat="power"), row=1, col=2)
+    margin = {"l": 62, "r": 18, "t": 76, "b": 48}
+    figure.update_layout(layout(340, margin=margin, legend=legend_above(340), hovermode="closest"))
+    return figure
+
+
+def coefficients_figure(result: IdentificationResult) -> Figure:
+    """95 % interval of each coefficient by its size: those that reach 0 are not told from it."""
+    go = graph_objects()
+    names = list(result.coefficients)
+    values = np.array(list(result.coefficients.values()))
+    errors = np.array(list(result.standard_errors.values()))
+    size = np.where(values == 0.0, 1.0, np.abs(values))
+    half = NORMAL_95 * np.nan_to_num(errors) / size
+    columns = 1 if len(names) < 12 else 2
+    rows = -(-len(names) // columns)
+    figure = subplots(1, columns, horizontal_spacing=0.16)
+    for column in range(columns):
+        part = slice(column * rows, (column + 1) * rows)
+        for sure, name, colour in ((True, "told from 0", MODEL), (False, "not told from 0", "#b3bcc7")):
+            own = np.flatnonzero((half[part] < 1.0) == sure)
+            centre = np.sign(values[part][own]) ** 2
+            low, high = (np.clip(centre + side * half[part][own], *SHOWN) for side in (-1.0, 1.0))
+            figure.add_trace(
+                go.Scatter(
+                    x=compact(100.0 * centre), y=own, mode="markers", name=name, legendgroup=name,
+                    showlegend=column == 0, marker={"color": colour, "size": 7},
+                    error_x={"type": "data", "symmetric": False, "array": compact(100.0 * (high - centre)),
+                             "arrayminus": compact(100.0 * (centre - low)), "color": colour, "thickness": 1.8,
+                             "width": 3},
+                    text=[f"{names[part][i]}: ± {100.0 * half[part][i]:.3g} %" for i in own],
+                    hovertemplate="%{text}<extra></extra>",
+                ), row=1, col=column + 1,
+            )  # fmt: skip
+        shown = names[part]
+        figure.update_xaxes(
+            axis("per cent of the estimate", range=[-130, 330], zeroline=True, zerolinecolor=LIMIT),
+            row=1, col=column + 1,
+        )  # fmt: skip
+        figure.update_yaxes(
+            axis("", tickvals=list(range(len(shown))), ticktext=shown, range=[rows - 0.5, -0.5]),
+            row=1, col=column + 1,
+        )  # fmt: skip
+    height = 20 * rows + 110
+    margin = {"l": 84, "r": 18, "t": 40, "b": 48}
+    figure.update_layout(layout(height, margin=margin, legend=legend_above(height, 8), hovermode="closest"))
+    return figure

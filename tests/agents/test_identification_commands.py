@@ -1,0 +1,220 @@
+"""`shipgym identify`, `advise` and `reduce`, with every option from the ship file or the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from agents.cli import app
+from agents.identifying import identification_settings, identify_ship, parsed_options
+from identification.methods import METHODS
+from shipgym import InputError, ShipFile, load_model
+from shipgym.identify_table import OPTIONS
+
+#: Every option of [identify], set to something that is not its default, of a method that has it.
+SETTINGS = {
+    "tls-svm": ["rank = 12", 'selection = "gcv"', "explained_variance = 0.99", "C = 1e9"],
+    "ls-svm": ["C = inf", "scale = false", "robust = true"],
+    "ridge": ["alpha = 1e-3"],
+    "svr": ["C = 50.0", "epsilon = 0.01", "seed = 3"],
+    "abc-lssvr": [
+        'optimiser = { name = "de", rounds = 5 }', 'objective = "training"', "bounds = [1.0, 1e6]",
+        "seed = 3", 'folds = "trials"',
+    ],
+    "tmils": [
+        "forgetting = 0.99", "innovations = 3", "inverse_free = true", "start_samples = 50",
+        "start_interval = 2", "start_C = 1e4", "omega = 0.1",
+    ],
+}  # fmt: skip
+GENERAL = [
+    'structure = "linear-steering"', 'samples = "integral"', 'name = "mine"', "window = 9", "smooth = false",
+    'preprocessing = "savgol"', "repair = true", 'uncertainty = "bootstrap"', "guarded = false",
+    'hold_out = ["zigzag_10_10.csv"]', 'prior = "clarke"', "prior_strength = 0.1",
+]  # fmt: skip
+
+
+def shipgym(*arguments):
+    return CliRunner().invoke(app, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def ship(demo, tmp_path):
+    """Writes the demo's ship file with lines of its own in [identify]."""
+
+    def write(*lines):
+        head, tail = demo.read_text().split('[identify]\nstructure = "abkowitz"\nmethod = "tls-svm"\n')
+        head = head.replace("[steering]", "rudder_area = 30.0\n\n[steering]")
+        text = "\n".join([head + "[identify]", *lines, tail])
+        (tmp_path / "ship.toml").write_text(text.replace('file = "', f'file = "{demo.parent}/'))
+        return tmp_path / "ship.toml"
+
+    return write
+
+
+def settings_of(folder):
+    return json.loads((folder / "settings.json").read_text())
+
+
+def identified(path):
+    """A ship file, and what is identified from it."""
+    ship = ShipFile.load(path)
+    return ship, identify_ship(ship, identification_settings(ship, {}))
+
+
+@pytest.mark.parametrize("method", SETTINGS)
+def test_settings_of_a_method_come_from_the_ship_file(ship, method):
+    read, result = identified(
+        ship('structure = "linear-steering"', f'method = "{method}"', *SETTINGS[method])
+    )
+    for name, value in read.identify.items():
+        assert result.settings[name] == (None if value == float("inf") else value)
+
+
+def test_options_of_identify_come_from_the_ship_file(ship, demo):
+    hold = GENERAL[9].replace("zigzag", f"{demo.parent}/zigzag")
+    read, result = identified(ship(*GENERAL[:9], hold, *GENERAL[10:]))
+    for name, value in read.identify.items():
+        assert result.settings[name] == value
+    assert result.model.name == "mine"
+    assert result.metrics["trials"][f"{demo.parent}/zigzag_10_10.csv"]["use"] == "validate"
+
+
+def test_the_options_tested_and_the_rest_are_all_there_are():
+    known = {line.split(" = ")[0] for lines in (GENERAL, *SETTINGS.values()) for line in lines}
+    of_grey_box = {"reference_model", "regression", "free_constant", "constant"}
+    of_refinement = {"segment_lengths", "staggered", "segment_start", "pull", "rudder_offsets"}
+    extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method"}
+    assert known | of_grey_box | of_refinement | extra == OPTIONS.keys()
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("rnak = 3", "unknown key 'rnak'. Did you mean 'rank'?"),
+        ("rank = 3.5", "[identify] rank: 3.5 found, expected a whole number"),
+        ("repair = 1", "[identify] repair: 1 found, expected true or false"),
+        ('C = "1e6"', "[identify] C: '1e6' found, expected a number"),
+        ("bounds = [1.0]", "[identify] bounds: [1.0] found, expected a list of two numbers"),
+        ('hold_out = "a.csv"', "[identify] hold_out: 'a.csv' found, expected a list of texts"),
+        ('hold_out = ["a.csv"]', "hold_out: 'a.csv' found"),
+        ("optimiser = 3", "[identify] optimiser: 3 found, expected a text or a table"),
+        ("epsilon = 0.1", "settings: epsilon found, which method 'tls-svm' does not know"),
+        ('extra_trials = ["turn.csv"]', "trial: 'turn.csv' found"),
+    ],
+)
+def test_a_wrong_option_exits_with_2_and_is_named(ship, line, said, tmp_path):
+    answer = shipgym("identify", ship(line), "--out", tmp_path / "out")
+    assert answer.exit_code == 2
+    assert said in answer.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_command_line_goes_before_the_ship_file(demo):
+    ship = ShipFile.load(demo)
+    given = {
+        "method": "abc-lssvr",
+        "C": None,
+        **parsed_options(["seed=3", "bounds=[1, 1e6]", "objective=k-fold"]),
+    }
+    chosen = identification_settings(ship, given)
+    assert chosen == {
+        "structure": "abkowitz", "method": "abc-lssvr", "seed": 3, "bounds": [1, 1e6], "objective": "k-fold"
+    }  # fmt: skip
+
+
+def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
+    path = ship('structure = "grey-box"', 'reference_model = "own/ship.json"')
+    chosen = identification_settings(ShipFile.load(path), {})
+    assert Path(chosen["reference_model"]) == path.parent / "own" / "ship.json"
+    assert "reference_model" not in identification_settings(ShipFile.load(path), {"structure": "abkowitz"})
+
+
+@pytest.mark.parametrize("text", ["seed", "=3", "sede=3", "seed=three"])
+def test_an_option_written_wrongly_is_named(text):
+    with pytest.raises(InputError, match="--set"):
+        parsed_options([text])
+
+
+def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
+    held = f"{demo.parent}/zigzag_10_10.csv"
+    answer = shipgym(
+        "identify", ship(), "--out", tmp_path / "out", "--structure", "linear-steering", "--method", "ls-svm",
+        "--C", "1e4", "--preprocessing", "savgol", "--repair", "--uncertainty", "bootstrap",
+        "--prior", "kijima", "--prior-strength", "0.5", "--hold-out", held, "--set", "window=9",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.stderr
+    found = settings_of(tmp_path / "out")
+    told = {"method": "ls-svm", "C": 1e4, "preprocessing": "savgol", "repair": True, "window": 9}
+    told |= {"uncertainty": "bootstrap", "prior": "kijima", "prior_strength": 0.5}
+    assert {name: found[name] for name in told} == told
+    assert found["hold_out"] == [held]
+
+
+def test_extra_trials_are_seen_by_the_refinement_alone(ship, demo):
+    turn = f"{demo.parent}/turning_circle_35.csv"
+    _, result = identified(
+        ship(
+            'structure = "linear-steering"', 'method = "output-error"', f'extra_trials = ["{turn}"]',
+            "extra_weight = 0.5", "segment_lengths = 5.0", "staggered = false", 'segment_start = "measured"',
+            "pull = 1e-5", "rudder_offsets = true",
+        )
+    )  # fmt: skip
+    refinement = result.model.provenance["refinement"]
+    assert [trial["name"] for trial in refinement["extra_trials"]] == [turn]
+    assert (refinement["segment_lengths"], refinement["staggered"]) == (5.0, False)
+    assert turn not in result.metrics["trials"]
+
+
+def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
+    answer = shipgym(
+        "identify", demo, "--out", tmp_path / "out", "--compare", "--methods", "ls,tls-svm,rm-svm", "--json"
+    )
+    assert answer.exit_code == 0
+    told = json.loads(answer.stdout)
+    assert {row["method"] for row in told["ranking"]} == {"ls", "tls-svm"}
+    assert "rm-svm was not fitted" in answer.stderr
+    names = {"comparison.html", "comparison.json", "model-ls.json", "model-tls-svm.json"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == names
+    again = shipgym("identify", demo, "--out", tmp_path / "again", "--methods", "ls,tls-svm,rm-svm")
+    rows = [line.split()[0] for line in again.stdout.splitlines() if " stable " in line]
+    assert rows == [row["method"] for row in told["ranking"]]
+    for name in names:
+        assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+
+
+def test_compare_names_a_method_that_does_not_exist(demo, tmp_path):
+    answer = shipgym("identify", demo, "--out", tmp_path / "out", "--methods", "ls,lsq")
+    assert answer.exit_code == 2
+    assert "method: 'lsq' found" in answer.stderr
+    assert "all" not in METHODS
+
+
+def test_advise_tells_information_and_what_to_run_next(demo):
+    answer = shipgym("advise", demo, "--coefficient", "N_vvv", "--number", "1", "--json")
+    assert answer.exit_code == 0
+    told = json.loads(answer.stdout)
+    assert list(told["trials"]) == [
+        "zigzag_10_10.csv", "zigzag_20_20.csv", "zigzag_20_10_port.csv", "zigzag_35_30_port.csv"
+    ]  # fmt: skip
+    (gains,) = told["gains"]
+    assert told["run_next"] == [max(gains, key=gains.get)]
+    errors = told["relative_errors"]
+    shrunk = errors["now"]["N_vvv"] / errors["expected"]["N_vvv"]
+    assert shrunk == pytest.approx(max(gains.values()))
+    information = {name: trial["information"]["N_vvv"] for name, trial in told["trials"].items()}
+    assert information["zigzag_35_30_port.csv"] > information["zigzag_10_10.csv"] > 0.0
+    table = shipgym("advise", demo, "--coefficient", "N_vvv", "--number", "1").stdout
+    assert f"run next: {told['run_next'][0]}" in table
+    assert shipgym("advise", demo, "--coefficient", "N_vv").exit_code == 2
+
+
+def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
+    path = ship('structure = "norrbin"')
+    answer = shipgym("reduce", path, "--out", tmp_path / "out", "--tolerance", "0.5")
+    assert answer.exit_code == 0, answer.stderr
+    told = json.loads((tmp_path / "out" / "reduction.json").read_text())
+    assert f"{told['terms']['reduced']} of {told['terms']['full']} coefficients left" in answer.stdout
+    assert len(load_model(tmp_path / "out" / "model.json").coefficients) == told["terms"]["reduced"]
+    assert (tmp_path / "out" / "report.html").exists()
+    assert shipgym("reduce", path, "--out", tmp_path / "x", "--direction", "sideways").exit_code == 2

@@ -1,0 +1,197 @@
+"""Every kind of bad input of an identification: one clear message, or a result that is marked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+from identification import identify
+from identification.concerns import concerns, why_unstable
+from shipgym import InputError, ShipFile, ShipModel, Trial
+
+DEMO = Path(__file__).parents[2] / "examples" / "mariner"
+
+
+def changed(trial: Trial, name: str, **channels: np.ndarray[Any, Any]) -> Trial:
+    return Trial(trial.t, {**trial.channels, **channels}, name=name, kind=trial.kind)
+
+
+@pytest.fixture
+def refusal(mariner: ShipModel) -> Callable[..., str]:
+    """The message with which the Mariner's identification from a trial is refused."""
+
+    def message(trial: Trial, **arguments: Any) -> str:
+        with pytest.raises(InputError) as error:
+            identify([trial], particulars=mariner.particulars, **arguments)
+        return str(error.value)
+
+    return message
+
+
+def test_a_rudder_that_never_moves_excites_nothing(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+    told = refusal(changed(cao_zigzag, "still", delta=0.0 * cao_zigzag.t))
+    assert "trial 'still': the rudder stays at 0.00 deg throughout" in told
+    assert "such as a zigzag" in told
+
+
+@pytest.mark.parametrize(("channel", "structure"), [("v", "abkowitz"), ("r", "nomoto")])
+def test_a_motion_that_never_changes_is_named(
+    cao_zigzag: Trial, refusal: Callable[..., str], channel: str, structure: str
+) -> None:
+    told = refusal(changed(cao_zigzag, "flat", **{channel: 0.0 * cao_zigzag.t}), structure=structure)
+    assert f"trial 'flat': channel '{channel}' never changes" in told
+    assert "choose a structure without that equation" in told
+
+
+@pytest.mark.parametrize("method", ["ls", "tls-svm"])
+def test_of_exactly_collinear_terms_what_was_left_out_is_told(
+    cao_zigzag: Trial, mariner: ShipModel, method: str
+) -> None:
+    tied = changed(cao_zigzag, "tied", v=-20.0 * cao_zigzag["r"])
+    fit = identify([tied], "linear-steering", method, particulars=mariner.particulars)
+    assert fit.diagnostics["r"].rank == 2
+    assert "left out: b_v, b_r" in " ".join(fit.summary().split())
+
+
+@pytest.mark.parametrize("method", ["ls-svm", "ridge", "abc-lssvr", "svr", "rls", "tmils"])
+def test_a_method_that_leaves_nothing_out_marks_exactly_collinear_terms(
+    cao_zigzag: Trial, mariner: ShipModel, method: str
+) -> None:
+    tied = changed(cao_zigzag, "tied", v=-20.0 * cao_zigzag["r"])
+    fit = identify([tied], "linear-steering", method, particulars=mariner.particulars)
+    marked = "yaw: exactly collinear in the data: c_v and c_r; only combinations are determined"
+    assert marked in " ".join(fit.summary().split())
+    assert any(text.startswith(marked) for text in concerns(fit))
+    assert np.all(np.isfinite(list(fit.coefficients.values())))
+
+
+def test_without_collinear_terms_nothing_is_marked(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    fit = identify([cao_zigzag], "linear-steering", "ls-svm", particulars=mariner.particulars)
+    assert "collinear" not in fit.summary()
+
+
+def test_fewer_samples_than_terms(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+    few = Trial(cao_zigzag.t[:12], {c: v[:12] for c, v in cao_zigzag.channels.items()}, name="short")
+    told = refusal(few)
+    assert "trial 'short': 12 samples found, in all 11 rows for 15 coefficients" in told
+
+
+@pytest.mark.parametrize("rank", [0, -1, 1.5, np.nan])
+def test_a_truncation_that_keeps_nothing(cao_zigzag: Trial, refusal: Callable[..., str], rank: float) -> None:
+    assert refusal(cao_zigzag, rank=rank) == (
+        f"rank: {rank} found, expected a whole number of at least 1, or None"
+    )
+
+
+@pytest.mark.parametrize("weight", [0, -1.0, np.nan, "much", True])
+@pytest.mark.parametrize("method", ["ls-svm", "tls-svm", "svr", "tmils"])
+def test_a_weight_that_is_none(
+    cao_zigzag: Trial, refusal: Callable[..., str], method: str, weight: Any
+) -> None:
+    assert refusal(cao_zigzag, method=method, C=weight).startswith("C: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"window": 1.5}, "window: 1.5 found, expected a whole number of at least 1"),
+        ({"method": "abc-lssvr", "seed": -1}, "seed: -1 found"),
+        ({"method": "abc-lssvr", "optimiser": {"name": "abc", "round": 3}}, "optimiser: round found"),
+        ({"method": "abc-lssvr", "optimiser": {"rounds": 3}}, "optimiser: None found, expected one of 'abc'"),
+        ({"method": "ls", "C": 1.0}, "settings: C found, which method 'ls' does not know"),
+        ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: nan found"),
+        ({"method": "rm-svm"}, "method: 'rm-svm' found with structure 'abkowitz', expected structure 'grey"),
+        ({"structure": "grey-box", "method": "rm-svm"}, "reference_model: None found, expected the name"),
+        (
+            {"structure": "grey-box", "reference_model": "auto", "prior": "clarke"},
+            "prior: 'clarke' found with",
+        ),
+    ],
+)
+def test_settings_that_do_not_fit(
+    cao_zigzag: Trial, refusal: Callable[..., str], arguments: dict[str, Any], message: str
+) -> None:
+    assert refusal(cao_zigzag, **arguments).startswith(message)
+
+
+def test_trials_of_a_model_at_another_scale(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+    """The Mariner at a scale of 1 to 100 in Froude's time."""
+    speed = {c: 0.1 * cao_zigzag[c] for c in ("u", "v")}
+    channels = {**cao_zigzag.channels, **speed, "r": 10.0 * cao_zigzag["r"]}
+    told = refusal(Trial(0.1 * cao_zigzag.t, channels, name="tank"))
+    assert "trial 'tank': yaw rate up to" in told
+    assert "likely the trial of another ship or scale" in told
+
+
+def test_trials_of_a_ship_of_another_speed(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+    fast = changed(cao_zigzag, "frigate", u=3.0 * cao_zigzag["u"])
+    assert "expected 1.544 to 15.44 m/s of a ship with a service speed of 7.7175 m/s" in refusal(fast)
+
+
+def test_values_that_are_none(cao_zigzag: Trial) -> None:
+    sway = cao_zigzag["v"].copy()
+    sway[100] = np.nan
+    with pytest.raises(InputError, match=r"trial 'holes': v: nan found at sample 100, .*repair = \"interp"):
+        changed(cao_zigzag, "holes", v=sway)
+
+
+@pytest.fixture
+def holed(tmp_path: Path) -> Callable[[str], Path]:
+    """Writes the demo with four yaw rates of one trial empty, and a line more in its conventions."""
+
+    def write(convention: str) -> Path:
+        for path in DEMO.iterdir():
+            (tmp_path / path.name).write_text(path.read_text())
+        lines = (DEMO / "zigzag_20_20.csv").read_text().splitlines()
+        column = lines[0].split(",").index("gyro_deg_s")
+        for row in range(200, 204):
+            cells = lines[row].split(",")
+            lines[row] = ",".join([*cells[:column], "", *cells[column + 1 :]])
+        (tmp_path / "zigzag_20_20.csv").write_text("\n".join(lines) + "\n")
+        text = (DEMO / "ship.toml").read_text()
+        (tmp_path / "ship.toml").write_text(text.replace("[conventions]", f"[conventions]\n{convention}"))
+        return tmp_path / "ship.toml"
+
+    return write
+
+
+def test_rows_without_a_value_are_named_where_nothing_is_repaired(holed: Callable[[str], Path]) -> None:
+    with pytest.raises(InputError, match=r"zigzag_20_20\.csv.*line 201.*gyro_deg_s.*interpolate"):
+        ShipFile.load(holed("")).trials()
+
+
+def test_rows_without_a_value_are_filled_where_asked(holed: Callable[[str], Path]) -> None:
+    ship = ShipFile.load(holed('repair = "interpolate"'))
+    repaired = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    whole = ShipFile.load(DEMO / "ship.toml")
+    sound = identify(whole.trials(), particulars=whole.particulars, steering=whole.steering)
+    assert repaired.coefficients["N_r"] == pytest.approx(sound.coefficients["N_r"], rel=0.02)
+    assert repaired.coefficients != sound.coefficients
+
+
+def test_an_unstable_model_is_kept_and_marked_and_no_environment_takes_it(
+    mariner: ShipModel, tmp_path: Path
+) -> None:
+    """A turning circle cannot tell 40 coefficients apart, and least squares has no guard."""
+    ship = ShipFile.load(DEMO / "ship.toml")
+    trials = [t.with_(use="fit" if "turning" in t.name else "validate") for t in ship.trials()]
+    result = identify(trials, method="ls", particulars=ship.particulars, steering=ship.steering)
+    assert not result.stable
+    assert "runs away" in (why_unstable(result) or "")
+    assert "NOT STABLE" in result.summary()
+    result.save(tmp_path / "ship")
+    page = (tmp_path / "ship" / "report.html").read_text(encoding="utf-8")
+    assert "The identified model is unstable" in page
+    kept = ShipModel.load(tmp_path / "ship" / "model.json")
+    assert kept.coefficients == result.coefficients
+    assert (kept.provenance or {})["stable"] is False
+    path = str(tmp_path / "ship" / "model.json")
+    with pytest.raises(InputError, match=r"found unstable when it was identified.*allow_unstable=True"):
+        gymnasium.make("shipgym/CourseKeeping-v0", model=path)
+    with pytest.warns(UserWarning, match="found unstable when it was identified"):
+        gymnasium.make("shipgym/CourseKeeping-v0", model=path, allow_unstable=True)

@@ -1,0 +1,133 @@
+"""What an identification prints, draws and writes."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification import IdentificationResult, identify
+from identification.diagnostics import cross_correlation
+from identification.report.figures import rudder_at_windows
+from identification.result import FILES
+from shipgym import ShipFile, ShipModel, Trial
+
+ROOT = Path(__file__).parents[2]
+SAVE = """
+import sys
+from identification import identify
+from shipgym import ShipFile
+ship = ShipFile.load("examples/mariner/ship.toml")
+identify(
+    ship.trials(), method="abc-lssvr", particulars=ship.particulars, steering=ship.steering,
+    hold_out=["zigzag_10_10.csv"], uncertainty="bootstrap",
+).save(sys.argv[1])
+"""
+
+
+@pytest.fixture(scope="module")
+def searched(noisy_trials: list[Trial], mariner: ShipModel) -> IdentificationResult:
+    return identify(
+        noisy_trials, method="abc-lssvr", particulars=mariner.particulars, steering=mariner.steering
+    )
+
+
+@pytest.fixture(scope="module")
+def truncated(noisy_trials: list[Trial], mariner: ShipModel) -> IdentificationResult:
+    return identify(noisy_trials, particulars=mariner.particulars, steering=mariner.steering)
+
+
+def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) -> None:
+    """Here, and in another process with other hashes of words."""
+    command = [sys.executable, "-c", SAVE, str(tmp_path / "there")]
+    environment = os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)}
+    subprocess.run(command, cwd=ROOT, env=environment, check=True)
+    ship = ShipFile.load(ROOT / "examples" / "mariner" / "ship.toml")
+    settings = {"method": "abc-lssvr", "hold_out": ["zigzag_10_10.csv"], "uncertainty": "bootstrap"}
+    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings)
+    result.save(tmp_path / "here")
+    for name in FILES:
+        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+
+
+def test_settings_hold_the_whole_call(truncated: IdentificationResult, tmp_path: Path) -> None:
+    truncated.save(tmp_path)
+    settings = json.loads((tmp_path / "settings.json").read_text())
+    assert (settings["structure"], settings["method"], settings["samples"]) == (
+        "abkowitz", "tls-svm", "spline"
+    )  # fmt: skip
+    assert settings["steering"]["rudder_rate_deg_s"] == 5.0
+    assert [trial["use"] for trial in settings["trials"]] == ["fit", "fit", "fit", "validate"]
+
+
+def test_figures_by_name(truncated: IdentificationResult, searched: IdentificationResult) -> None:
+    held = f"prediction: {truncated.trials[-1].name}"
+    common = {"fit", "residuals", "coefficients", "trials", held}
+    assert truncated.plots().keys() == common | {"l-curve"}
+    assert searched.plots().keys() == common | {"search"}
+
+
+def test_the_fit_is_drawn_from_the_regression(truncated: IdentificationResult) -> None:
+    traces = truncated.plots()["fit"].data
+    seen = np.asarray(traces[0].y, dtype=float)
+    seen = seen[np.isfinite(seen)]
+    samples = truncated.samples
+    np.testing.assert_allclose(seen, samples.targets["u"] / samples.duration, atol=1e-7, rtol=1e-4)
+
+
+def test_residuals_come_with_bounds_of_white_noise(truncated: IdentificationResult) -> None:
+    traces = truncated.plots()["residuals"].data
+    bars, bound = traces[0], max(traces[2].y)
+    autocorrelation = truncated.diagnostics["u"].residual_autocorrelation
+    np.testing.assert_allclose(bars.y[: len(autocorrelation)], autocorrelation, atol=1e-6)
+    step = int(np.ceil(truncated.samples.window / max(truncated.samples.window // 2, 1)))
+    rows = -(-len(truncated.samples) // step)
+    assert bound == pytest.approx(1.96 / np.sqrt(rows), rel=1e-6)
+
+
+def test_the_rank_chosen_is_marked_on_the_l_curve(truncated: IdentificationResult) -> None:
+    figure = truncated.plots()["l-curve"]
+    curve = truncated.machines["u"].l_curve_  # type: ignore[attr-defined]
+    marked = next(trace for trace in figure.data if trace.name == "chosen")
+    rank = truncated.diagnostics["u"].rank
+    assert marked.x[0] == pytest.approx(curve.residual_norm[rank - 1], rel=1e-6)
+    assert marked.y[0] == pytest.approx(curve.solution_norm[rank - 1], rel=1e-6)
+
+
+def test_the_search_is_drawn_to_the_c_that_it_found(searched: IdentificationResult) -> None:
+    traces = searched.plots()["search"].data
+    assert traces[0].y[-1] == pytest.approx(1.0)
+    assert np.all(np.diff(traces[0].y) <= 0.0)
+    assert traces[1].y[-1] == pytest.approx(searched.machines["u"].C_, rel=1e-5)  # type: ignore[attr-defined]
+
+
+def test_intervals_of_coefficients_are_theirs(truncated: IdentificationResult) -> None:
+    """In per cent of the estimate, 1.96 standard errors to either side."""
+    trace = truncated.plots()["coefficients"].data[0]
+    drawn = dict(zip((text.split(":")[0] for text in trace.text), trace.error_x.array, strict=True))
+    value, error = truncated.coefficients["X_u"], truncated.standard_errors["X_u"]
+    assert drawn["X_u"] == pytest.approx(100.0 * 1.96 * error / abs(value), rel=1e-5)
+
+
+def test_the_rudder_is_that_of_the_middle_of_each_window(truncated: IdentificationResult) -> None:
+    samples, angles = truncated.samples, rudder_at_windows(truncated)
+    assert angles is not None
+    row, trial = 40, truncated.trials[0]
+    assert samples.trial[row] == 0
+    middle = samples.start[row] + 0.5 * samples.duration[row]
+    assert angles[row] == pytest.approx(np.interp(middle, trial.t, trial["delta"]))
+
+
+def test_cross_correlation_finds_the_delay() -> None:
+    noise = np.random.default_rng(0).standard_normal(4000)
+    lags = np.arange(-9, 10)
+    found = cross_correlation(np.roll(noise, 3), noise, lags)
+    assert lags[int(np.argmax(found))] == 3
+    assert found.max() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(np.delete(found, 12)).max() < 4.0 / np.sqrt(4000)
+    assert not cross_correlation(noise, np.ones(4000), lags).any()
