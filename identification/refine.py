@@ -224,7 +224,7 @@ class _Problem:
         free, offsets = settings.segment_start == "free", settings.rudder_offsets
         self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
         values = np.concatenate([start.machines[q].coef_ for q in blank.table.equations])
-        self.first = np.concatenate([values / self.sizes, np.zeros(count if offsets else 0)])
+        self.first = np.concatenate([values / self.sizes, np.zeros(len(trials) if offsets else 0)])
 
     def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
         return self.shooter.shoot(parameters, segments, scales, len(self.trials))

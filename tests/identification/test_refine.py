@@ -195,7 +195,7 @@ def test_an_anchor_keeps_the_steady_turn_of_the_reference_ship(mariner: ShipMode
     for weight in (1e-6, 1.0):
         found = identify(
             runs, method="output-error", anchor="tanker", anchor_weight=weight,
-            segment_start="measured", staggered=False, **settings,  # type: ignore[arg-type]
+            segment_start="measured", staggered=False, rudder_offsets=True, **settings,  # type: ignore[arg-type]
         )  # fmt: skip
         refinement = found.model.provenance["refinement"]  # type: ignore[index]
         assert (refinement["decision"], refinement["anchor"]) == ("refined", "tanker")
