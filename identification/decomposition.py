@@ -81,7 +81,7 @@ class Decomposition:
         array of shape (..., n_directions)
         """
         s = self.singular_values
-        with np.errstate(divide="ignore", over="ignore"):
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
             filters = np.where(s > 0.0, s / (s**2 + 1.0 / np.asarray(C, dtype=float)), 0.0)
         filters[..., min(rank, self.numerical_rank) :] = 0.0
         return filters

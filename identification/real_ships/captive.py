@@ -84,7 +84,7 @@ def read(folder: Path) -> Captive:
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
         raise InputError(f"{path}: column {missing[0]!r} is missing, expected {', '.join(COLUMNS)}")
-    rows = list({tuple(row[name] for name in COLUMNS[:-1]): row for row in rows}.values())
+    rows = list({tuple(float(row[name]) for name in COLUMNS[:-1]): row for row in rows}.values())
     dealt = [row for fold in range(FOLDS) for row in rows[fold::FOLDS]]
     column = {name: np.array([float(row[name]) for row in dealt]) for name in COLUMNS[:-1]}
     return Captive(
@@ -211,8 +211,8 @@ def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
 
 
 TEXT = """
-{count} different steady conditions (some of the 81 are listed twice) at a constant shaft speed: rudder
-at six speeds, drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n =
+{count} different steady conditions (some of the 81 listed stand there twice) at a constant shaft speed:
+rudder at six speeds, drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n =
 U0/U; forces by rho L^2 U0^2/2 with one U0 for all, as the balance feels them. Terms are dropped one by
 one (uncertain or collinear) while what is held out, five folds with tests of every kind, is explained as
 well.
