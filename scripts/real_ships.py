@@ -1,6 +1,6 @@
 """Predict measured ships and write `docs/real_ships.md`: `python scripts/real_ships.py [a] [b] [c] [d] [e]`.
 
-Takes about half an hour in all, most of it for case a. The measurements lie beside the checkout.
+Takes about ten minutes in all, most of it for case a. The measurements lie beside the checkout.
 """
 
 from __future__ import annotations

@@ -1,12 +1,13 @@
-"""What is fitted to the KVLCC2: refinement by simulation, a reference ship's turns inside its cost.
+"""What is fitted to the KVLCC2: a reduced Abkowitz table pulled toward a reference ship's zigzags and turns.
 
-The structure, the length of the segments and the pull toward the start were found on HSVA zigzags (see the
-document); the weight of the turns is chosen anew for each fit, among its own runs.
+The table was found on the HSVA zigzags: without the cubes of the rudder, it predicts larger rudders than it
+has seen. How strong the pull is, each fit finds among its own runs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,56 +16,103 @@ from identification.pipeline import identify
 from identification.real_ships.data import MeasuredShip
 from identification.real_ships.measures import zigzag_errors
 from identification.result import IdentificationResult
+from shipgym.models import register_structure
+from shipgym.models.structures import prime_terms
 
 REFERENCE = "kvlcc2-l7"
-#: Of the squared residuals of the reference ship's turns.
-WEIGHTS = (1e-3, 1e-2)
-START_STRENGTH = 0.03
-SETTINGS: dict[str, Any] = {
-    "segment_lengths": 8.0,
-    "segment_start": "measured",
-    "rudder_offsets": True,
-    "pull": 1e-2,
-}
+STRENGTHS = (0.0, 0.01, 0.03, 0.1, 0.2)
+#: Share by which the error held out may exceed the least: the pull is for turns, which are in no zigzag.
+TOLERANCE = 0.25
+
+ROOT = "Abkowitz, Mariner form, without products of rudder and drift and with less of surge"
+SURGE, SWAY_AND_YAW = "u uu vv rr dd vr vd", "0 0u 0uu v r d vvv vvr ud uv ur uud"
 
 
-def refined(ship: MeasuredShip, names: Sequence[str], weight: float) -> IdentificationResult:
-    """Fit some runs, the reference ship's turns weighing `weight`."""
+def _table(name: str, sway_and_yaw: str, source: str) -> str:
+    terms = prime_terms(sway_and_yaw)
+    table = {"u": prime_terms(SURGE), "v": terms, "r": terms}
+    return register_structure(name, table, source, normalisation="prime", quantity="force").name
+
+
+STRUCTURE = _table("abkowitz12", SWAY_AND_YAW, f"{ROOT}; without the cube of the rudder")
+#: Among which a table may be chosen.
+TABLES = ("abkowitz", _table("abkowitz13", SWAY_AND_YAW + " ddd", ROOT), STRUCTURE)
+
+#: Refinement from there, the reference ship's turns inside its cost.
+REFINEMENT: dict[str, Any] = {
+    "segment_lengths": 8.0, "segment_start": "measured", "rudder_offsets": True, "pull": 1e-2,
+    "anchor": REFERENCE, "anchor_weight": 1e-2,
+}  # fmt: skip
+
+
+@cache
+def pulled(
+    ship: MeasuredShip, names: tuple[str, ...], strength: float, structure: str = STRUCTURE
+) -> IdentificationResult:
+    """Least squares on some runs, pulled toward the reference ship."""
     return identify(
         [ship.runs[name] for name in names],
-        "abkowitz",
+        structure,
+        "ls",
+        particulars=ship.particulars,
+        steering=ship.steering,
+        prior=REFERENCE,
+        prior_strength=strength,
+    )
+
+
+def held_out_error(
+    ship: MeasuredShip, names: Sequence[str], strength: float, structure: str = STRUCTURE
+) -> float:
+    """Root mean square error of r, deg/s, over runs predicted one by one from the others.
+
+    Infinite where a model runs away, or would in a hard turn.
+    """
+    squares = []
+    for held in names:
+        fit = pulled(ship, tuple(name for name in names if name != held), strength, structure)
+        error = float(zigzag_errors(fit.model, ship.runs[held])[0])
+        squares.append(error**2 if fit.stable and np.isfinite(error) else np.inf)
+    return float(np.sqrt(np.mean(squares)))
+
+
+def chosen_strength(ship: MeasuredShip, names: Sequence[str]) -> tuple[float, dict[float, float]]:
+    """The strongest pull whose error held out is within a quarter of the least.
+
+    Returns
+    -------
+    strength : float
+    errors : dict of float to float
+        Held out, deg/s, by strength.
+    """
+    errors = {strength: held_out_error(ship, names, strength) for strength in STRENGTHS}
+    most = (1.0 + TOLERANCE) * min(errors.values())
+    return max(strength for strength, error in errors.items() if error <= most), errors
+
+
+def fitted(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
+    """The fit of some runs with the pull that they choose."""
+    strength, _ = chosen_strength(ship, names)
+    return pulled(ship, tuple(names), strength)
+
+
+def fitted_with_table(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
+    """The fit whose table and pull predict each of the runs best from the others."""
+    options = [(held_out_error(ship, names, s, table), s, table) for table in TABLES for s in STRENGTHS]
+    _, strength, table = min(options)
+    return pulled(ship, tuple(names), strength, table)
+
+
+def refined(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
+    """Refinement by simulation from the same start, the reference ship's turns inside its cost."""
+    strength, _ = chosen_strength(ship, names)
+    return identify(
+        [ship.runs[name] for name in names],
+        STRUCTURE,
         "output-error",
         particulars=ship.particulars,
         steering=ship.steering,
         prior=REFERENCE,
-        prior_strength=START_STRENGTH,
-        anchor=REFERENCE,
-        anchor_weight=weight,
-        **SETTINGS,
+        prior_strength=strength,
+        **REFINEMENT,
     )
-
-
-def chosen_weight(
-    ship: MeasuredShip, names: Sequence[str], weights: Sequence[float] = WEIGHTS
-) -> tuple[float, dict[float, float]]:
-    """The weight that predicts the run of the largest rudder best from the others.
-
-    Returns
-    -------
-    weight : float
-    errors : dict of float to float
-        RMSE of r on that run, deg/s.
-    """
-    hardest = max(names, key=lambda name: (float(np.abs(ship.runs[name]["delta"]).max()), name))
-    rest = [name for name in names if name != hardest]
-    errors = {
-        weight: float(zigzag_errors(refined(ship, rest, weight).model, ship.runs[hardest])[0])
-        for weight in weights
-    }
-    return min(errors, key=lambda w: (np.nan_to_num(errors[w], nan=np.inf), w)), errors
-
-
-def fitted(ship: MeasuredShip, names: Sequence[str]) -> tuple[IdentificationResult, float]:
-    """The fit of some runs with the weight that they choose."""
-    weight, _ = chosen_weight(ship, names)
-    return refined(ship, names, weight), weight

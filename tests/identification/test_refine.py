@@ -13,7 +13,6 @@ from identification.refine import Refinement, refine
 from identification.segments import Shooter, compared_channels, cut
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.models import converted_model
 
 
 def parameters(model: ShipModel) -> np.ndarray:
@@ -148,6 +147,21 @@ def test_turns_given_to_the_refinement_alone_hold_the_turn(
     assert [trial["name"] for trial in report["extra_trials"]] == ["turn35.0", "turn-35.0"]
 
 
+def test_an_anchor_holds_the_turn_of_the_reference_ship(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
+    fit = identify(
+        zigzags, method="output-error", particulars=mariner.particulars, steering=mariner.steering,
+        anchor=mariner, anchor_weight=1.0, rudder_offsets=True, staggered=False,
+    )  # fmt: skip
+    turn = turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths
+    assert turn == pytest.approx(
+        turning_indices(turning_circle(mariner, 35)).tactical_diameter_lengths, rel=0.02
+    )
+    assert (fit.model.provenance or {})["refinement"]["anchor"] == mariner.name
+
+
 def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag: Trial) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
     start = replace(guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag]), stable=False)
@@ -163,6 +177,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
         ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
         ({"pull": -1.0}, "pull: -1"),
         ({"extra_weight": float("nan")}, "extra_weight: nan"),
+        ({"anchor_weight": 0.0}, "anchor_weight: 0"),
     ],
 )
 def test_wrong_settings_are_refused(settings: dict[str, object], message: str) -> None:
@@ -174,30 +189,3 @@ def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao
     lacking = Trial(cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking")
     with pytest.raises(InputError, match="extra trial 'lacking': channel 'v' is missing"):
         identify([cao_zigzag], method="output-error", particulars=mariner.particulars, extra_trials=[lacking])
-
-
-def test_an_anchor_keeps_the_steady_turn_of_the_reference_ship(mariner: ShipModel) -> None:
-    """Mild zigzags say nothing of hard turns; the heavier the anchor, the nearer to its turns."""
-    runs = [
-        zigzag(mariner, angle, angle, duration=300, dt=0.5).with_(name=f"zigzag {angle:g}")
-        for angle in (5.0, 10.0)
-    ]
-    settings: dict[str, object] = {"particulars": mariner.particulars, "steering": mariner.steering}
-    reference = converted_model("tanker", mariner.particulars, mariner.steering, 0.0)
-    length = mariner.particulars["length"]
-
-    def diameter(model: ShipModel) -> float:
-        found = turning_indices(turning_circle(model, 35.0), length).tactical_diameter_lengths
-        assert found is not None
-        return found
-
-    wanted, errors = diameter(reference), []
-    for weight in (1e-6, 1.0):
-        found = identify(
-            runs, method="output-error", anchor="tanker", anchor_weight=weight,
-            segment_start="measured", staggered=False, rudder_offsets=True, **settings,  # type: ignore[arg-type]
-        )  # fmt: skip
-        refinement = found.model.provenance["refinement"]  # type: ignore[index]
-        assert (refinement["decision"], refinement["anchor"]) == ("refined", "tanker")
-        errors.append(abs(diameter(found.model) / wanted - 1.0))
-    assert errors[1] < 0.1 < errors[0]
