@@ -42,8 +42,8 @@ def models(hsva: MeasuredShip, marin: MeasuredShip) -> tuple[dict[str, ShipModel
         fit = identify(runs, structure, "ls", particulars=hsva.particulars, steering=hsva.steering)
         found[f"least squares, {structure}"] = fit.model
     strength, errors = chosen_strength(hsva, HSVA_RUNS)
-    found["the same, refined by simulation"] = refined(hsva, HSVA_RUNS).model
-    found[OURS] = pulled(hsva, HSVA_RUNS, strength).model
+    found["abkowitz12, refined by simulation"] = refined(hsva, HSVA_RUNS).model
+    found[OURS] = pulled(hsva, HSVA_RUNS, strength)
     at_full_scale = {name: full_scale(model, marin) for name, model in found.items()}
     return {f"{REFERENCE}, nothing fitted": bare(marin)} | at_full_scale, strength, errors
 
@@ -93,7 +93,7 @@ def run(data: Data) -> Section:
 
 
 def _at(hsva: MeasuredShip, strength: float) -> ShipModel:
-    return pulled(hsva, HSVA_RUNS, strength).model
+    return pulled(hsva, HSVA_RUNS, strength)
 
 
 MEASURED_ROW = ["measured (Mei 2019)", *(number(value, 2) for value in MEASURED), "-", "-"]
@@ -111,7 +111,7 @@ def judged(model: ShipModel) -> str:
         )
     )
     return (
-        f"To starboard the last fit's advance is {advance:+.1f} % and its tactical diameter "
+        f"To starboard its advance is {advance:+.1f} % and its tactical diameter "
         f"{diameter:+.1f} % off the measured ones (aims 1 and 4 %)."
     )
 
@@ -166,6 +166,9 @@ By run, `abkowitz12` with the pull:
 Turning circles with 35 degrees of rudder from straight ahead at service speed, ship lengths:
 
 {turns}
+
+The refinement fits what the model simulates in segments of 8 ship lengths; the reference ship's turns stay
+inside its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
 
 {judged} The measured values printed for -35 repeat those of +35 and are not used; measured circles are not
 among the data here.

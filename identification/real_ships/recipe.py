@@ -12,12 +12,18 @@ from typing import Any
 
 import numpy as np
 
+from identification.guard import reasons_unstable
+from identification.guarded_fit import with_coefficients
+from identification.methods import FitTask, get_method
 from identification.pipeline import identify
+from identification.prior import Prior, fit_toward, reference_prior
 from identification.real_ships.data import MeasuredShip
 from identification.real_ships.measures import zigzag_errors
 from identification.result import IdentificationResult
-from shipgym.models import register_structure
+from identification.samples import build_samples
+from shipgym.models import ShipModel, get_structure, register_structure
 from shipgym.models.structures import prime_terms
+from shipgym.steering import SteeringGear
 
 REFERENCE = "kvlcc2-l7"
 STRENGTHS = (0.0, 0.01, 0.03, 0.1, 0.2)
@@ -46,19 +52,27 @@ REFINEMENT: dict[str, Any] = {
 
 
 @cache
+def _blank(ship: MeasuredShip, structure: str) -> tuple[ShipModel, Prior]:
+    """The ship but for its coefficients, and what they are pulled to."""
+    names = get_structure(structure).coefficient_names
+    particulars = ship.particulars.completed()
+    blank = ShipModel(
+        particulars.name, structure, particulars, ship.steering or SteeringGear(), dict.fromkeys(names, 0.0)
+    )
+    return blank, reference_prior(REFERENCE, blank)
+
+
+@cache
 def pulled(
     ship: MeasuredShip, names: tuple[str, ...], strength: float, structure: str = STRUCTURE
-) -> IdentificationResult:
+) -> ShipModel:
     """Least squares on some runs, pulled toward the reference ship."""
-    return identify(
-        [ship.runs[name] for name in names],
-        structure,
-        "ls",
-        particulars=ship.particulars,
-        steering=ship.steering,
-        prior=REFERENCE,
-        prior_strength=strength,
-    )
+    blank, prior = _blank(ship, structure)
+    runs = [ship.runs[name] for name in names]
+    samples = build_samples(runs, blank.table, blank.particulars, gear=blank.steering)
+    method = get_method("ls")
+    machines = fit_toward(method.machine, method, prior, strength, FitTask(samples, blank, runs))
+    return with_coefficients(blank, machines)
 
 
 def held_out_error(
@@ -66,13 +80,13 @@ def held_out_error(
 ) -> float:
     """Root mean square error of r, deg/s, over runs predicted one by one from the others.
 
-    Infinite where a model runs away, or would in a hard turn.
+    Infinite where a model runs away.
     """
     squares = []
     for held in names:
-        fit = pulled(ship, tuple(name for name in names if name != held), strength, structure)
-        error = float(zigzag_errors(fit.model, ship.runs[held])[0])
-        squares.append(error**2 if fit.stable and np.isfinite(error) else np.inf)
+        model = pulled(ship, tuple(name for name in names if name != held), strength, structure)
+        error = float(zigzag_errors(model, ship.runs[held])[0])
+        squares.append(error**2 if np.isfinite(error) else np.inf)
     return float(np.sqrt(np.mean(squares)))
 
 
@@ -90,17 +104,27 @@ def chosen_strength(ship: MeasuredShip, names: Sequence[str]) -> tuple[float, di
     return max(strength for strength, error in errors.items() if error <= most), errors
 
 
-def fitted(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
+def fitted(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
     """The fit of some runs with the pull that they choose."""
     strength, _ = chosen_strength(ship, names)
-    return pulled(ship, tuple(names), strength)
+    return steady(ship, names, strength, STRUCTURE)
 
 
-def fitted_with_table(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
+def fitted_with_table(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
     """The fit whose table and pull predict each of the runs best from the others."""
     options = [(held_out_error(ship, names, s, table), s, table) for table in TABLES for s in STRENGTHS]
     _, strength, table = min(options)
-    return pulled(ship, tuple(names), strength, table)
+    return steady(ship, names, strength, table)
+
+
+def steady(ship: MeasuredShip, names: Sequence[str], least: float, structure: str) -> ShipModel:
+    """The least pull, from a given one on, with which the model does not run away; that one if none."""
+    runs = [ship.runs[name] for name in names]
+    for strength in STRENGTHS[STRENGTHS.index(least) :]:
+        model = pulled(ship, tuple(names), strength, structure)
+        if not reasons_unstable(model, runs):
+            return model
+    return pulled(ship, tuple(names), least, structure)
 
 
 def refined(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
