@@ -21,7 +21,14 @@ from identification.real_ships.measures import (
     turns,
     zigzag_errors,
 )
-from identification.real_ships.recipe import REFERENCE, STRUCTURE, fitted, fitted_with_table, with_fixed_pull
+from identification.real_ships.recipe import (
+    REFERENCE,
+    STRUCTURE,
+    fitted,
+    fitted_with_table,
+    known,
+    with_fixed_pull,
+)
 from identification.real_ships.section import Section, table
 from shipgym.manoeuvres import TurningIndices
 from shipgym.models import ShipModel
@@ -41,7 +48,7 @@ Fit = Callable[[MeasuredShip, Sequence[str]], tuple[ShipModel, bool]]
 def plain(ship: MeasuredShip, names: Sequence[str], structure: str, method: str) -> tuple[ShipModel, bool]:
     """A fit with nothing chosen, and whether the guard let it pass."""
     runs = [ship.runs[name] for name in names]
-    result = identify(runs, structure, method, particulars=ship.particulars, steering=ship.steering)
+    result = identify(runs, known(structure), method, particulars=ship.particulars, steering=ship.steering)
     return result.model, result.stable
 
 
@@ -179,11 +186,11 @@ and three terms of surge. Its coefficients are pulled toward the KVLCC2 of the l
 of that ship, which is what holds the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
 whose error of r, each run predicted from the two others, is within a quarter of the least. The last row has
 the pull of 0.1 that all six runs choose by that rule, see (b): one recipe for zigzags and turns.
-**The table itself was found while looking at all six runs** (some fifty were tried), so that its
-figures are favourable to it. 'Table and pull chosen within the triple' chooses between `abkowitz`,
-`abkowitz12` and `abkowitz12` with the cube of the rudder, and the pull of least error, within each triple: of it only
-the list of three tables has seen the runs that it predicts. Where a model runs away in the guard the next
-stronger pull is taken.
+**The table itself was found while looking at all six runs** (some fifty were tried), so that its figures
+are favourable to it. 'Table and pull chosen within the triple' chooses between `abkowitz`, `abkowitz12`
+and `abkowitz12` with the cube of the rudder, and the pull of least error, within each triple: of it only
+the list of three tables has seen the runs that it predicts. Where a model runs away in the guard the
+next stronger pull is taken.
 
 What the same fits sail with the rudder at 35 degrees, from straight ahead, means and standard deviations
 over the fits (measured at MARIN, see (b): 3.25 and 3.34 to starboard):

@@ -22,7 +22,15 @@ from identification.real_ships.measures import (
     turns,
     zigzag_errors,
 )
-from identification.real_ships.recipe import REFERENCE, STRENGTHS, STRUCTURE, chosen_strength, pulled, refined
+from identification.real_ships.recipe import (
+    REFERENCE,
+    STRENGTHS,
+    STRUCTURE,
+    chosen_strength,
+    known,
+    pulled,
+    refined,
+)
 from identification.real_ships.section import Section, number, table
 from shipgym.models import ShipModel
 from shipgym.models.scaling import scale_model
@@ -39,7 +47,7 @@ def models(hsva: MeasuredShip, marin: MeasuredShip) -> tuple[dict[str, ShipModel
     runs = [hsva.runs[name] for name in HSVA_RUNS]
     found = {}
     for structure in ("abkowitz", "cubic", STRUCTURE):
-        fit = identify(runs, structure, "ls", particulars=hsva.particulars, steering=hsva.steering)
+        fit = identify(runs, known(structure), "ls", particulars=hsva.particulars, steering=hsva.steering)
         found[f"least squares, {structure}"] = fit.model
     strength, errors = chosen_strength(hsva, HSVA_RUNS)
     found["abkowitz12, refined by simulation"] = refined(hsva, HSVA_RUNS).model

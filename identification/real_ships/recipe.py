@@ -36,15 +36,25 @@ ROOT = "Abkowitz, Mariner form, without products of rudder and drift and with le
 SURGE, SWAY_AND_YAW = "u uu vv rr dd vr vd", "0 0u 0uu v r d vvv vvr ud uv ur uud"
 
 
-def _table(name: str, sway_and_yaw: str, source: str) -> str:
-    terms = prime_terms(sway_and_yaw)
-    table = {"u": prime_terms(SURGE), "v": terms, "r": terms}
-    return register_structure(name, table, source, normalisation="prime", quantity="force").name
-
-
-STRUCTURE = _table("abkowitz12", SWAY_AND_YAW, f"{ROOT}; without the cube of the rudder")
+STRUCTURE = "abkowitz12"
+#: Terms of sway and yaw and source of the tables of this study.
+OWN = {
+    STRUCTURE: (SWAY_AND_YAW, f"{ROOT}; without the cube of the rudder"),
+    "abkowitz13": (SWAY_AND_YAW + " ddd", ROOT),
+}
 #: Among which a table may be chosen.
-TABLES = ("abkowitz", _table("abkowitz13", SWAY_AND_YAW + " ddd", ROOT), STRUCTURE)
+TABLES = ("abkowitz", "abkowitz13", STRUCTURE)
+
+
+def known(structure: str) -> str:
+    """The name of a structure, made known where it is one of this study's."""
+    if structure in OWN:
+        sway_and_yaw, source = OWN[structure]
+        terms = prime_terms(sway_and_yaw)
+        table = {"u": prime_terms(SURGE), "v": terms, "r": terms}
+        register_structure(structure, table, source, normalisation="prime", quantity="force")
+    return structure
+
 
 #: Refinement from there, the reference ship's turns inside its cost.
 REFINEMENT: dict[str, Any] = {
@@ -56,7 +66,7 @@ REFINEMENT: dict[str, Any] = {
 @cache
 def _blank(ship: MeasuredShip, structure: str) -> tuple[ShipModel, Prior]:
     """The ship but for its coefficients, and what they are pulled to."""
-    names = get_structure(structure).coefficient_names
+    names = get_structure(known(structure)).coefficient_names
     particulars = ship.particulars.completed()
     blank = ShipModel(
         particulars.name, structure, particulars, ship.steering or SteeringGear(), dict.fromkeys(names, 0.0)
@@ -139,7 +149,7 @@ def refined(ship: MeasuredShip, names: Sequence[str]) -> IdentificationResult:
     strength, _ = chosen_strength(ship, names)
     return identify(
         [ship.runs[name] for name in names],
-        STRUCTURE,
+        known(STRUCTURE),
         "output-error",
         particulars=ship.particulars,
         steering=ship.steering,

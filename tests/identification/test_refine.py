@@ -153,7 +153,7 @@ def test_an_anchor_holds_the_turn_of_the_reference_ship(
     zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
     fit = identify(
         zigzags, method="output-error", particulars=mariner.particulars, steering=mariner.steering,
-        anchor=mariner, anchor_weight=1.0, rudder_offsets=True, staggered=False,
+        anchor=mariner, anchor_weight=1.0, rudder_offsets=True,
     )  # fmt: skip
     turn = turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths
     assert turn == pytest.approx(
