@@ -59,6 +59,9 @@ def trials_command(
         int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
+    depth: Annotated[
+        float | None, typer.Option(metavar="M", help="Depth of the water, m; default: deep water.")
+    ] = None,
     as_json: Json = False,
 ) -> None:
     """Put a model through the standard manoeuvres and judge it by the IMO criteria.
@@ -72,19 +75,24 @@ def trials_command(
     from shipgym.models import load_model
 
     ship = load_model(model)
+    water_depth = float("inf") if depth is None else depth
+    ship.check_depth(water_depth)
     if out is not None:
         check_page(out)
     with progress_bars(not as_json) as progress:
         tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
-        found = standard_trials(ship, draws, seed, tell)
+        found = standard_trials(ship, draws, seed, tell, water_depth)
     if out is not None:
         write_page(ship, found, out)
     if as_json:
         print_json({"model": ship.name, "seed": seed, **found.to_dict()})
         return
-    console.print(manoeuvre_table(found.indices))
+    console.print(manoeuvre_table(found.indices, found.water))
     console.print()
-    console.print(criteria_table(found.criteria))
+    if found.criteria:
+        console.print(criteria_table(found.criteria))
+    else:
+        console.print("The IMO criteria are made for deep water: leave --depth out to judge by them.")
     for name, criterion in found.criteria.items():
         if criterion.note:
             console.print(f"{name}: {criterion.note}", soft_wrap=True)
@@ -148,11 +156,30 @@ def autopilot_command(
         console.print(f"report: {report}", soft_wrap=True)
 
 
+@app.command("replay")
+@answered
+def replay_command(
+    episodes: Annotated[
+        list[Path], typer.Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
+) -> None:
+    """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
+    from agents.replay import write_replay
+    from agents.terminal import out as console
+
+    write_replay(episodes, out)
+    console.print(f"written: {out}", soft_wrap=True)
+
+
 @app.command("reproduce")
 @answered
 def reproduce_command(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020 or all.")
+        str,
+        typer.Argument(
+            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
+        ),
     ],
     markdown: Annotated[
         Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")

@@ -32,13 +32,13 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
-        from shipgym.errors import InputError, UnstableModelError
+        from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
             command(*args, **kwargs)
         except InputError as error:
             fail(str(error), WRONG_INPUT)
-        except UnstableModelError as error:
+        except (ManoeuvreError, UnstableModelError) as error:
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)

@@ -12,20 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controller import Controller, Policy
 from shipgym.checks import check_number
 from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import (
-    INTEGRAL_ZONE,
-    OBSERVATION_NAMES,
-    REWARD_PARTS,
-    CourseKeepingTask,
-    observation_scales,
-)
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, CourseKeepingTask, observation_scales
+from shipgym.envs.task import INTEGRAL_ZONE
 from shipgym.errors import InputError
-from shipgym.kernels import course_keeping_rows as rows
 from shipgym.kernels import layout
 from shipgym.models import ShipModel
 
 Floats = NDArray[np.float64]
 
+PARTS = ("reward_heading", "reward_rudder", "reward_rudder_rate", "reward_end")
 STEP_LENGTHS = 16.0  # duration of a step response, in times to travel one ship length
 LARGEST_STEP_DEG = 60.0  # so that an overshoot is not yet loss of control
 
@@ -150,7 +145,7 @@ class _Sums:
     def none(cls, n: int) -> _Sums:
         """Sums before the first step."""
         squared_error, travel, extrapolating, steps = np.zeros((4, n))
-        parts, terminated = np.zeros((n, len(REWARD_PARTS))), np.zeros(n, dtype=np.bool_)
+        parts, terminated = np.zeros((n, len(PARTS))), np.zeros(n, dtype=np.bool_)
         return cls(parts, squared_error, travel, extrapolating, steps, terminated)
 
 
@@ -170,10 +165,10 @@ def _sums(controller: Policy, engine: CourseKeepingEngine, seeds: NDArray[np.int
         command[~sailing] = 0.0  # of no effect any more
         observations, _, terminated, truncated = engine.step(command)
         before, rudder = rudder, engine.outcome(layout.DELTA)
-        sums.parts += engine.reward_parts  # nothing after the end
-        sums.squared_error += sailing * engine.outcome(rows.HEADING_ERROR) ** 2
+        sums.parts += np.stack([engine.info(name) for name in PARTS], axis=-1)  # nothing after the end
+        sums.squared_error += sailing * engine.info("heading_error") ** 2
         sums.travel += sailing * np.abs(rudder - before)
-        sums.extrapolating += sailing * engine.outcome(rows.EXTRAPOLATING)
+        sums.extrapolating += sailing * engine.info("extrapolating")
         sums.steps += sailing
         sums.terminated |= sailing & terminated
         sailing &= ~(terminated | truncated)
@@ -185,7 +180,7 @@ def _sums(controller: Policy, engine: CourseKeepingEngine, seeds: NDArray[np.int
 def _flights(sums: _Sums, dt: float, seeds: NDArray[np.int64]) -> Flights:
     """Figures of the episodes from their sums."""
     shape = seeds.shape
-    heading, rudder, rate, end = (-sums.parts.T).reshape(4, *shape)
+    heading, rudder, rate, end = (-sums.parts.T).reshape(len(PARTS), *shape)
     duration = sums.steps * dt
     return Flights(
         cost=heading + rudder + rate + end,

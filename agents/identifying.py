@@ -16,6 +16,7 @@ from shipgym.models.greybox import GREY_BOX
 from shipgym.ship_file import ShipFile
 from shipgym.trial import Trial
 
+RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
 MODELS = ("reference_model", "prior")  # options that may name a model's file
 
 
@@ -43,6 +44,8 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
         if str(own.get(option, "")).endswith(".json"):
             own[option] = str(ship.path.parent / own[option])
     chosen = own | check_options({k: v for k, v in given.items() if v is not None}, "options")
+    if chosen.get("method") == RM_SVM and "reference_model" in chosen:
+        chosen.setdefault("structure", GREY_BOX)
     if chosen.get("structure") == GREY_BOX:
         chosen.setdefault("reference_model", "auto")
     elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:

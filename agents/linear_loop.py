@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.envs.course_keeping_task import RATE_WEIGHT
+from shipgym.envs.task import RATE_WEIGHT
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.models.linear import StraightRunning, linearise, nomoto_of, straight_running

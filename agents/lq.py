@@ -25,7 +25,7 @@ from agents.linear_loop import (
     sample_ship,
 )
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping_task import RUDDER_WEIGHT, control_interval
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.models import ShipModel
 
 Floats = NDArray[np.float64]

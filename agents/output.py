@@ -48,6 +48,28 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
         raise InputError(f"{folder}: {ancestor} cannot be written to; choose another folder")
 
 
+def check_page(path: Path) -> None:
+    """Refuse a file for a page that cannot be written.
+
+    Parameters
+    ----------
+    path : Path
+        Where the page shall go.
+
+    Raises
+    ------
+    InputError
+        If the ending is not .html, it is a folder, or its folder cannot be written.
+    """
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, expected a file to write the page to")
+    folder = path.absolute().parent
+    if not folder.is_dir() or not os.access(folder, os.W_OK):
+        raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")
+
+
 @contextmanager
 def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
     """A temporary folder beside `folder` that takes its place when the block ends without an error.

@@ -15,7 +15,7 @@ import numpy as np
 from agents.controller import Controller
 from agents.linear_loop import length_time, rate_weight, sample_ship
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping_task import RUDDER_WEIGHT, control_interval
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.models import ShipModel
 from shipgym.models.linear import Nomoto, linearise, nomoto_of
 

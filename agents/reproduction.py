@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import TYPE_CHECKING
 
-from identification.papers import PAPERS, get_paper
+from identification.papers import CASES, get_paper
 from shipgym.checks import check_choice
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from identification.papers import Row
+    from identification.papers import Requirement, Row
 
 ALL = "all"
 HEADINGS = ("case", "quantity", "printed", "as the paper", "at best", "aim", "met")
@@ -20,20 +20,20 @@ INTRODUCTION = """# The papers' tables, run again
 
 Written by `shipgym reproduce all --markdown docs/reproduction.md`. *Printed* is the paper's number, *as the
 paper* ours by its method on the same case, *at best* ours by the best method that there is here, on the same
-data. A cell is empty where the paper shows only a picture or does not publish what it used; the note then
-says what stands in for it.
+data. A cell is empty where the paper shows only a picture or does not publish what it used; the note, whose
+number stands in the last column, then says what stands in for it.
 """
 
 
 def papers_of(name: str) -> tuple[str, ...]:
-    """Short names of the papers asked for: one, or all.
+    """Short names of the papers asked for: one, or all, with the requirements after them.
 
     Raises
     ------
     InputError
         If there is none of that name.
     """
-    return PAPERS if check_choice(name, (*PAPERS, ALL), "paper") == ALL else (name,)
+    return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
 
 
 def reproduce(names: Iterable[str], tell: Callable[[str], None] | None = None) -> dict[str, list[Row]]:
@@ -97,13 +97,37 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         "",
         f"{paper.citation}. {paper.what}",
         "",
+        *_requirements(paper.requirements),
         f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}. `shipgym reproduce {name}`",
         "",
+        *_table(rows),
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    """The rows, and below them each note once."""
+    lines = [
         "| " + " | ".join((*HEADINGS, "note")) + " |",
         "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
     ]
-    lines += ["| " + " | ".join((*map(_escaped, _cells(row)), _escaped(row.note))) + " |" for row in rows]
-    return "\n".join([*lines, ""])
+    notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
+    for row in rows:
+        number = str(notes[row.note]) if row.note else ""
+        lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
+    return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
+
+
+def _requirements(requirements: Sequence[Requirement]) -> list[str]:
+    """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
+    if not requirements:
+        return []
+    lines = ["| | requirement | why it holds | tests | tables |", "| --- | --- | --- | --- | --- |"]
+    for one in requirements:
+        tests = "<br>".join(f"`{test}`" for test in one.tests)
+        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
+        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
+    return [*lines, ""]
 
 
 def _cells(row: Row) -> tuple[str, ...]:

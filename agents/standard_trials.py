@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from agents import output
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
 from shipgym.manoeuvres.imo import judge_imo
@@ -60,11 +62,13 @@ class StandardTrials:
     indices : dict of str to dict of str to IndexInterval
         By manoeuvre and index, units in the names.
     criteria : dict of str to Criterion
-        The criteria of IMO resolution MSC.137(76).
+        The criteria of IMO resolution MSC.137(76); none in shallow water, which they are not made for.
     refused : dict of str to str
         Why a manoeuvre could not be sailed.
     draws : int
         Models drawn.
+    water_depth : float
+        m.
     """
 
     sailed: dict[str, Trial | Spiral]
@@ -72,11 +76,18 @@ class StandardTrials:
     criteria: dict[str, Criterion]
     refused: dict[str, str]
     draws: int
+    water_depth: float = np.inf
+
+    @property
+    def water(self) -> str:
+        """Where they were sailed, in words."""
+        return water_in_words(self.water_depth)
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` prints it."""
         return {
             "draws": self.draws,
+            "water_depth": None if np.isinf(self.water_depth) else self.water_depth,
             "manoeuvres": {
                 name: {index: found.to_dict() for index, found in indices.items()}
                 for name, indices in self.indices.items()
@@ -87,7 +98,11 @@ class StandardTrials:
 
 
 def standard_trials(
-    model: ShipModel, draws: int = 0, seed: int = 0, progress: Callable[[int], None] | None = None
+    model: ShipModel,
+    draws: int = 0,
+    seed: int = 0,
+    progress: Callable[[int], None] | None = None,
+    water_depth: float = np.inf,
 ) -> StandardTrials:
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
@@ -101,13 +116,17 @@ def standard_trials(
         Of the draws.
     progress : callable, optional
         Told the number of draws done.
+    water_depth : float
+        m, for ships that know shallow water.
 
     Raises
     ------
+    InputError
+        For water that is too shallow, or shallow water in a ship that knows none.
     UnstableModelError
         If the ship itself runs away.
     """
-    manoeuvres = standard_manoeuvres(model)
+    manoeuvres = standard_manoeuvres(model, water_depth)
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
@@ -121,7 +140,13 @@ def standard_trials(
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
     judged = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
     found = intervals_of(own, drawn, judged, progress)
-    return StandardTrials(sailed, found, judge_imo(model, found), refused, len(drawn))
+    criteria = judge_imo(model, found) if np.isinf(water_depth) else {}
+    return StandardTrials(sailed, found, criteria, refused, len(drawn), water_depth)
+
+
+def water_in_words(water_depth: float) -> str:
+    """Say that the water is deep, or how deep it is."""
+    return "deep water" if np.isinf(water_depth) else f"water of {water_depth:g} m"
 
 
 def check_page(path: Path) -> None:
@@ -133,12 +158,7 @@ def check_page(path: Path) -> None:
         If plotly is missing, the ending is not .html, or the folder cannot be written.
     """
     graph_objects()
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write the figures to")
-    if not path.absolute().parent.is_dir() or not os.access(path.absolute().parent, os.W_OK):
-        raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")
+    output.check_page(path)
 
 
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
@@ -155,13 +175,12 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
     drawn = f" Intervals: 95 % of {found.draws} models drawn from its covariance." if found.draws else ""
     ship = model.particulars
     lead = (
-        f"Simulated from service speed, {ship['speed']:.4g} m/s, in deep water; "
+        f"Simulated from service speed, {ship['speed']:.4g} m/s, in {found.water}; "
         f"ship length {ship['length']:.5g} m.{drawn}"
     )
-    body = {
-        "header": header("Standard manoeuvres", model.name, lead),
-        "imo": section("imo", TITLES["imo"], _criteria(found.criteria)),
-    }
+    body = {"header": header("Standard manoeuvres", model.name, lead)}
+    if found.criteria:
+        body["imo"] = section("imo", TITLES["imo"], _criteria(found.criteria))
     for name, start in SECTIONS.items():
         chosen = [key for key in found.indices if key.startswith(start)]
         if chosen:

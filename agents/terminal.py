@@ -133,10 +133,10 @@ def _indices(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]]) -> Table:
+def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water") -> Table:
     """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
     drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
-    table = plain_table("Manoeuvres from service speed in deep water")
+    table = plain_table(f"Manoeuvres from service speed in {water}")
     table.add_column("manoeuvre")
     table.add_column("index")
     table.add_column("value", justify="right")

@@ -19,7 +19,8 @@ def why_unstable(identification: IdentificationResult) -> str | None:
     """Why an identified model must not be used, in one sentence; None where it is stable."""
     ran_away = [name for name, prediction in identification.predictions.items() if prediction is None]
     if ran_away:
-        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {ran_away[0]} first"
+        first = PurePath(ran_away[0]).name
+        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {first} first"
     if not identification.stable:
         guard = (identification.model.provenance or {}).get("guard", {})
         reasons = guard.get("rejected", ["in a standard manoeuvre"])

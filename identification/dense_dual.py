@@ -35,8 +35,26 @@ def dense_dual_solution(
     n = len(y)
     if not fit_intercept:
         return X.T @ np.linalg.solve(X @ X.T + np.eye(n) / C, y), 0.0
+    multipliers, intercept = dense_dual_multipliers(X, y, C)
+    return X.T @ multipliers, intercept
+
+
+def dense_dual_multipliers(X: ArrayLike, y: ArrayLike, C: float) -> tuple[Floats, float]:
+    """Lagrange multipliers of the dual system as printed; by it the errors are multipliers / C.
+
+    Parameters
+    ----------
+    X, y, C
+        As in `dense_dual_solution`.
+
+    Returns
+    -------
+    multipliers : array of shape (n_samples,)
+    intercept : float
+    """
+    X, y = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
     solution = np.linalg.solve(_dual_matrix(X, C), np.concatenate([[0.0], y]))
-    return X.T @ solution[1:], float(solution[0])
+    return solution[1:], float(solution[0])
 
 
 def dense_truncated_solution(X: ArrayLike, y: ArrayLike, C: float, rank: int) -> tuple[Floats, float]:
@@ -72,5 +90,6 @@ def _dual_matrix(X: Floats, C: float) -> Floats:
     n = len(X)
     matrix = np.ones((n + 1, n + 1))
     matrix[0, 0] = 0.0
-    matrix[1:, 1:] = X @ X.T + np.eye(n) / C
+    np.matmul(X, X.T, out=matrix[1:, 1:])
+    matrix[np.arange(1, n + 1), np.arange(1, n + 1)] += 1.0 / C
     return matrix

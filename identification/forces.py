@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from identification.machine import Machine
 from identification.threads import on_one_thread
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -181,6 +182,57 @@ def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
     return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
 
 
+def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, Floats]:
+    """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
+
+    Parameters
+    ----------
+    regression : ForceRegression
+        Of captive tests.
+    machine : Machine
+        Without intercept; it is fitted.
+
+    Returns
+    -------
+    coefficients : array of shape (n_coefficients,)
+    covariance : array of shape (n_coefficients, n_coefficients)
+        For white errors, whose size is that of each force's own residuals.
+    """
+    scales = regression.scales()
+    features, targets = regression.features / scales[:, None], regression.targets / scales
+    machine.fit(features, targets)
+    half = features @ machine.inverse_moment_
+    variances = force_variances(
+        regression.equation, targets - machine.predict(features), np.sum(half * features, axis=1)
+    )
+    covariance = (half.T * variances[regression.equation]) @ half
+    return machine.coef_, 0.5 * (covariance + covariance.T)
+
+
+def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
+    """Variances of the errors of X, Y and N, each by its residuals.
+
+    Parameters
+    ----------
+    equation : array of shape (n_rows,)
+        0, 1, 2 for X, Y, N.
+    residuals : array of shape (n_rows, ...)
+        Of the fit.
+    leverages : array of shape (n_rows,)
+        Diagonal of the matrix that maps targets to fitted values.
+
+    Returns
+    -------
+    array of shape (3, ...)
+    """
+    found = []
+    for i in range(len(FORCES)):
+        rows = equation == i
+        freedom = max(float(np.sum(1.0 - leverages[rows])), 1.0)
+        found.append(np.sum(residuals[rows] ** 2, axis=0) / freedom)
+    return np.array(found)
+
+
 @on_one_thread
 def identify_forces(
     trials: Sequence[Trial],
@@ -236,26 +288,20 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, table, particulars, model_inertia)
-    scales = regression.scales()
-    features, targets = regression.features / scales[:, None], regression.targets / scales
-    settings = {} if rank is None else {"rank": rank}
-    machine = get_method(method).machine(**settings).fit(features, targets)
-    residuals = targets - machine.predict(features)
-    freedom = max(len(targets) - len(table.coefficient_names), 1)
-    half = features @ machine.inverse_moment_
-    covariance = float(residuals @ residuals) / freedom * (half.T @ half)
+    machine = get_method(method).machine(**({} if rank is None else {"rank": rank}))
+    coefficients, covariance = fit_forces(regression, machine)
     return ShipModel(
         name=particulars.name if name is None else name,
         structure=structure,
         particulars=particulars.completed(),
         steering=steering or SteeringGear(),
-        coefficients=dict(zip(regression.names, machine.coef_.tolist(), strict=True)),
-        covariance=0.5 * (covariance + covariance.T),
+        coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
+        covariance=covariance,
         provenance={
             "structure": structure,
             "method": method,
-            "rank": int(getattr(machine, "rank_", len(machine.coef_))),
-            "r_squared": regression.r_squared(machine.coef_),
+            "rank": int(getattr(machine, "rank_", len(coefficients))),
+            "r_squared": regression.r_squared(coefficients),
             "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
         },
     )

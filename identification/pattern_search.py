@@ -7,34 +7,13 @@ Source: Torczon 1997, On the convergence of pattern search algorithms, SIAM J. O
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from identification.tuning.search import SearchResult
+
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class PatternSearch:
-    """The course of a search.
-
-    Attributes
-    ----------
-    x : array of shape (n,)
-        The best point.
-    value : float
-        Of the objective there.
-    evaluations : int
-        Points looked at.
-    history : tuple of float
-        Best value after each round of polls.
-    """
-
-    x: Floats
-    value: float
-    evaluations: int
-    history: tuple[float, ...]
 
 
 def pattern_search(
@@ -45,7 +24,7 @@ def pattern_search(
     mesh: float = 0.25,
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
-) -> PatternSearch:
+) -> SearchResult:
     """Minimise a function of few variables without derivatives.
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it is better; else the
@@ -66,7 +45,8 @@ def pattern_search(
 
     Returns
     -------
-    PatternSearch
+    SearchResult
+        A round is one of polls.
     """
     lowest, highest = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     known: dict[tuple[float, ...], float] = {}
@@ -79,7 +59,7 @@ def pattern_search(
 
     x = np.clip(np.asarray(start, dtype=float), lowest, highest)
     value = value_at(x)
-    history = [value]
+    history, course = [value], [x]
     while mesh >= finest and len(known) < most_evaluations:
         steps = mesh * (highest - lowest) * np.vstack([np.eye(len(x)), -np.eye(len(x))])
         neighbours = np.clip(x + steps, lowest, highest)
@@ -90,4 +70,5 @@ def pattern_search(
         else:
             mesh *= 0.5
         history.append(value)
-    return PatternSearch(x, value, len(known), tuple(history))
+        course.append(x)
+    return SearchResult(x, value, np.array(history), np.array(course), len(known))

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import shipgym
 from identification.bootstrap import bootstrap_covariance, influence_covariance
 from identification.diagnostics import diagnose
+from identification.folds import TRIALS
 from identification.grey_box import bare_metrics
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
@@ -57,6 +58,7 @@ def identify(
     reference_model: str | ShipModel | None = None,
     prior: str | ShipModel | None = None,
     prior_strength: float | None = None,
+    prior_folds: str = TRIALS,
     **settings: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
@@ -113,6 +115,8 @@ def identify(
         name or file), or the regression formulas "clarke" or "kijima". See `prior`.
     prior_strength : float, optional
         0 for none, infinite for the prior itself; by default chosen by cross-validation.
+    prior_folds : {"trials", "largest-rudder"}
+        What that holds out: each trial in turn, or those of the largest rudder.
     **settings
         Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
         `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
@@ -137,8 +141,10 @@ def identify(
     blank, regression, used = problem.blank, problem.samples, problem.used
     if prior is None and prior_strength is not None:
         raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
+    if prior is None and prior_folds != TRIALS:
+        raise InputError(f"prior_folds: {prior_folds!r} found without a prior; name one, or leave it out")
     if prior is not None:
-        chosen = with_prior(chosen, prior, prior_strength, blank)
+        chosen = with_prior(chosen, prior, prior_strength, blank, prior_folds)
     refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
     fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
     refined = refine(fit, regression, used, refinement, _memory(blank.particulars)) if refinement else None
@@ -159,7 +165,8 @@ def identify(
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     call = {
         "structure": structure, "method": method, "samples": samples, **sampling, "guarded": guarded,
-        "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength, **settings,
+        "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
+        "prior_folds": prior_folds, **settings,
         "particulars": particulars, "steering": steering,
     }  # fmt: skip
     return _judged(model, fit, problem, call)
@@ -250,7 +257,7 @@ def _judged(
         samples=problem.samples,
         machines=fit.machines,
         settings=_call(call, problem.trials),
-        searches={q: m.search_ for q, m in fit.machines.items() if hasattr(m, "search_")},
+        searches={q: search for q, m in fit.machines.items() if (search := getattr(m, "search_", None))},
     )
 
 

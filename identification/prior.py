@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.formulas import FORMULAS, formula_coefficients
 from identification.guard import hard_turn_features, reasons_unstable
 from identification.guarded_fit import with_coefficients
@@ -27,7 +28,7 @@ from identification.machine import Machine
 from identification.methods import FitTask, Machines, Method
 from identification.samples import Samples, build_samples
 from identification.similarity import AUTO, select_reference
-from shipgym.checks import check_number
+from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.models import GreyBox, ShipModel, converted_model
@@ -154,7 +155,9 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
     return trials
 
 
-def with_prior(method: Method, prior: str | ShipModel, strength: float | None, blank: ShipModel) -> Method:
+def with_prior(
+    method: Method, prior: str | ShipModel, strength: float | None, blank: ShipModel, folds: str = TRIALS
+) -> Method:
     """The method, with its coefficients pulled toward a prior.
 
     The method fits what the prior leaves: where it drops a direction, the prior's coefficients stay.
@@ -169,6 +172,8 @@ def with_prior(method: Method, prior: str | ShipModel, strength: float | None, b
         0 leaves the method as it is, infinity gives the prior; None chooses by cross-validation.
     blank : ShipModel
         The target but for its coefficients.
+    folds : {"trials", "largest-rudder"}
+        What the strength is chosen by (`choose_strength`).
 
     Returns
     -------
@@ -193,15 +198,22 @@ def with_prior(method: Method, prior: str | ShipModel, strength: float | None, b
         if isinstance(prior, str) and prior in FORMULAS
         else reference_prior(prior, blank)
     )
-    return replace(method, fit=partial(_fit, method, given, strength))
+    return replace(
+        method, fit=partial(_fit, method, given, strength, check_choice(folds, FOLDS, "prior_folds"))
+    )
 
 
 def _fit(
-    method: Method, prior: Prior, strength: float | None, make: Callable[[], Machine], task: FitTask
+    method: Method,
+    prior: Prior,
+    strength: float | None,
+    folds: str,
+    make: Callable[[], Machine],
+    task: FitTask,
 ) -> Machines:
     report: dict[str, Any] = {"prior_source": prior.name}
     if strength is None:
-        strength, scores = choose_strength(make, method, prior, task)
+        strength, scores = choose_strength(make, method, prior, task, folds)
         report["prior_scores"] = scores
         best, strength = strength, _steady_strength(make, method, prior, strength, task)
         if strength > best:
@@ -278,17 +290,20 @@ def _held(machine: Machine, X: Floats, rest: Floats, centre: Floats, known: NDAr
 
 
 def choose_strength(
-    make: Callable[[], Machine], method: Method, prior: Prior, task: FitTask
+    make: Callable[[], Machine], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
 ) -> tuple[float, dict[str, float]]:
     """The strongest pull that is as good as the best on samples held out.
 
-    Held out are the trials one by one, or blocks of time of a single trial. As good: within one standard
-    error of the best (Breiman et al. 1984), because what the prior is for, hard turns, is in none of them.
+    Held out are the trials one by one, or blocks of time of a single trial, or each of those with the largest
+    rudder by a fit to all that have less. As good: within one standard error of the best (Breiman et al.
+    1984), because what the prior is for, hard turns, is in none of them.
 
     Parameters
     ----------
     make, method, prior, task
         As in `fit_toward`.
+    folds : {"trials", "largest-rudder"}
+        What is held out.
 
     Returns
     -------
@@ -296,23 +311,29 @@ def choose_strength(
     scores : dict of str to float
         Mean square error held out, by that of no change at all, for each strength.
     """
-    folds = list(_folds(task.samples))
+    splits = list(_folds(task, folds))
     errors = np.array([
-        [_error(fit_toward(make, method, prior, s, replace(task, samples=fit)), held) for fit, held in folds]
+        [_error(fit_toward(make, method, prior, s, replace(task, samples=fit)), held) for fit, held in splits]
         for s in STRENGTHS
     ])  # fmt: skip
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     excess = errors - errors[best]
-    spread = excess.std(axis=1) / np.sqrt(max(len(folds) - 1, 1))
+    spread = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
     as_good = np.flatnonzero(excess.mean(axis=1) <= spread)
     return float(STRENGTHS[int(as_good[-1])]), {
         f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)
     }
 
 
-def _folds(samples: Samples) -> Iterator[tuple[Samples, Samples]]:
+def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:
     """Samples to fit and samples held out."""
+    samples = task.samples
+    if folds == LARGEST_RUDDER:
+        largest = of_largest_rudder(task.trials, "prior_folds")
+        fit = _rows(samples, ~largest[samples.trial])
+        yield from ((fit, _rows(samples, samples.trial == held)) for held in np.flatnonzero(largest))
+        return
     if samples.trial.max() > samples.trial.min():
         groups = samples.trial
     else:

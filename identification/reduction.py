@@ -101,7 +101,12 @@ class Reduction:
 
 
 def backward_elimination(
-    X: ArrayLike, y: ArrayLike, names: Sequence[str], tolerance: float = 1e-3, threshold: float = 0.1
+    X: ArrayLike,
+    y: ArrayLike,
+    names: Sequence[str],
+    tolerance: float = 1e-3,
+    threshold: float = 0.1,
+    prefer: Sequence[str] = (),
 ) -> Reduction:
     """Drop terms one by one while nothing that is held out is explained worse.
 
@@ -117,6 +122,8 @@ def backward_elimination(
         By how much the held-out R2 may fall below the best seen.
     threshold : float
         Relative standard error above which a term is a candidate; terms of a collinear group always are.
+    prefer : sequence of str
+        Terms that are dropped only where no other candidate can be: where two say the same, it decides.
 
     Returns
     -------
@@ -136,7 +143,7 @@ def backward_elimination(
     while len(kept) > 1:
         errors = path[-1].relative_errors
         uncertain = {i for i in kept if errors[labels[i]] > threshold} | _collinear(features, kept)
-        for term in sorted(uncertain, key=lambda i: errors[labels[i]], reverse=True):
+        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -errors[labels[i]])):
             fewer = [i for i in kept if i != term]
             step = _step(features, targets, labels, fewer, labels[term], path[-1].r_squared)
             if step.held_out >= best - tolerance:

@@ -52,7 +52,8 @@ class IdentificationResult:
     settings : dict
         The arguments that `identify` was called with, defaults among them, as JSON knows them.
     searches : dict of str to SearchResult
-        How the settings of each equation were found, for methods that search; the variable is log10 C.
+        How the settings of each equation were found, for methods that search: log10 C, or
+        the insensitive band of RM-SVM.
     """
 
     model: ShipModel

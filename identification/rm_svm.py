@@ -7,6 +7,7 @@ the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regress
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -15,14 +16,17 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
-from sklearn.svm import SVR
+from sklearn.svm import SVR, LinearSVR
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.machine import Machine
-from identification.pattern_search import PatternSearch, pattern_search
+from identification.pattern_search import pattern_search
 from identification.prediction import predict
 from identification.samples import Samples
+from identification.tuning.search import BAND, SearchResult
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.models import GreyBox, ShipModel
@@ -37,7 +41,8 @@ BARE = 0.0  # weight of the errors at which nothing is added to the reference sh
 WEIGHTS = (BARE, *np.geomspace(0.01, 100.0, 9).tolist())
 NEARLY = 1.1  # times the least error is as good
 FIRST_BAND = 0.1
-MOST_ROWS = 600  # of the regression: an epsilon-SVR takes the square of it
+MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
+MOST_SWEEPS = 20_000  # of coordinate descent through the samples
 PIECES = 3  # into which a single trial is cut to choose the weight of the errors
 
 
@@ -63,6 +68,9 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     free_constant : bool
         Whether `identify` leaves the constant unpenalised, as the paper does. By default it is penalised like
         the other terms, so that the weight leads from the bare reference ship to the free fit in small steps.
+    folds : {"trials", "largest-rudder"}
+        What `identify` chooses the weight by: each trial held out in turn (of a single one, pieces), or the
+        trials of the largest rudder together, for models that are to turn harder than any trial.
     constant : int or None
         Column that is a free constant, or its integral, by which rows are divided; `identify` finds it.
 
@@ -84,6 +92,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         regression: str = "svr",
         free_constant: bool = False,
         constant: int | None = None,
+        folds: str = TRIALS,
     ) -> None:
         self.C = C
         self.epsilon = epsilon
@@ -91,6 +100,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         self.regression = regression
         self.free_constant = free_constant
         self.constant = constant
+        self.folds = folds
 
     def check(self) -> None:
         """Refuse settings that cannot be.
@@ -101,6 +111,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_choice(self.regression, REGRESSIONS, "regression")
+        check_choice(self.folds, FOLDS, "folds")
         if self.C is not None:
             check_number(self.C, "C", at_least=0.0)
         if self.epsilon is not None:
@@ -162,11 +173,10 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         if self.regression == "ls-svm":
             ridge = Ridge(alpha=len(e) / weight, fit_intercept=has_offset).fit(Z, e)
             return np.asarray(ridge.coef_, dtype=float), float(ridge.intercept_)
-        if not has_offset:  # the mirror image of the samples makes the offset zero
-            Z, e = np.vstack([Z, -Z]), np.concatenate([e, -e])
+        if not has_offset:
+            return _through_zero(Z, e, weight / len(e), band), 0.0
         machine = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
-        slope = np.asarray(machine.coef_, dtype=float).ravel()
-        return slope, float(machine.intercept_[0]) if has_offset else 0.0
+        return np.asarray(machine.coef_, dtype=float).ravel(), float(machine.intercept_[0])
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets of samples.
@@ -184,6 +194,24 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
         prediction: Floats = features @ self.coef_
         return prediction
+
+
+def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
+    """Slopes of an epsilon-SVR without offset.
+
+    By coordinate descent, whose time goes with the number of samples; where it does not converge, by
+    sequential minimal optimisation of the samples and their mirror image, which makes the offset zero.
+    """
+    quick = LinearSVR(
+        C=C, epsilon=band, fit_intercept=False, dual=True, tol=1e-6, max_iter=MOST_SWEEPS, random_state=0
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConvergenceWarning)
+        try:
+            return np.asarray(quick.fit(Z, e).coef_, dtype=float)
+        except ConvergenceWarning:
+            both = SVR(kernel="linear", C=0.5 * C, epsilon=band).fit(np.vstack([Z, -Z]), np.append(e, -e))
+            return np.asarray(both.coef_, dtype=float).ravel()
 
 
 def fit_rm_svm(
@@ -217,16 +245,18 @@ def fit_rm_svm(
     if not isinstance(blank.table, GreyBox):
         raise InputError(
             f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
-            "which has a reference ship; or choose another method, such as 'tls-svm'"
+            "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
+            "file; or choose another method, such as 'tls-svm'"
         )
     tuner = _Tuner(asked, samples, blank, trials)
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
     machines: Machines = {}
-    for q, band in zip(samples.features, bands.tolist(), strict=True):
+    for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
         machine = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
         machine.chosen_ = {"C": weight, "epsilon": band}
-        machine.search_ = search
+        if search is not None:
+            machine.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
         machines[q] = machine
     return machines
 
@@ -286,6 +316,11 @@ class _Tuner:
 
     def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
         """Rows to fit, and the trial or the piece of the only trial that is held out."""
+        if self.asked.folds == LARGEST_RUDDER:
+            largest = of_largest_rudder(self.trials, "folds")
+            rows = ~largest[self.samples.trial]
+            yield from ((rows, trial) for trial, held in zip(self.trials, largest, strict=True) if held)
+            return
         if len(self.trials) > 1:
             for index, trial in enumerate(self.trials):
                 yield self.samples.trial != index, trial
@@ -299,7 +334,7 @@ class _Tuner:
             piece = Trial(trial.t[held], channels, name=trial.name)
             yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
 
-    def bands(self, weight: float) -> tuple[Floats, PatternSearch | None]:
+    def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
         count = len(self.samples.features)
         if self.asked.epsilon is not None or weight == BARE or self.asked.regression == "ls-svm":

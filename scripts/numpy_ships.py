@@ -24,7 +24,8 @@ Batch = tuple[Floats, ...]
 MATHEMATICS = {
     "sqrt": np.sqrt, "fabs": np.abs, "floor": np.floor, "copysign": np.copysign, "pi": np.pi,
     "minimum": np.minimum, "maximum": np.maximum, "where": np.where,
-    "sin_cos": lambda x: (np.sin(x), np.cos(x)), "exponential": np.exp, "arctan": np.arctan,
+    "sin_cos": lambda x: (np.sin(x), np.cos(x)), "small_sin_cos": lambda x: (np.sin(x), np.cos(x)),
+    "small_cosine": np.cos, "exponential": np.exp, "arctan": np.arctan,
     "arctan2": np.arctan2, "inlined": lambda function: function, "Any": Any,
 }  # fmt: skip
 

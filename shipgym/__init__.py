@@ -12,6 +12,9 @@ from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
     from shipgym import manoeuvres, plots, towing_tank, weather
+    from shipgym.envs.checker import check_vector_env
+    from shipgym.envs.recording import RecordEpisode
+    from shipgym.episode import Episode
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
     from shipgym.models.checker import ModelCheck, check_ship_model
@@ -27,10 +30,12 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Current": "shipgym.weather.conditions",
+    "Episode": "shipgym.episode",
     "InputError": "shipgym.errors",
     "ManoeuvreError": "shipgym.errors",
     "ModelCheck": "shipgym.models.checker",
     "Particulars": "shipgym.particulars",
+    "RecordEpisode": "shipgym.envs.recording",
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
     "SteeringGear": "shipgym.steering",
@@ -41,6 +46,7 @@ _HOME = {
     "Weather": "shipgym.weather.conditions",
     "Wind": "shipgym.weather.conditions",
     "check_ship_model": "shipgym.models.checker",
+    "check_vector_env": "shipgym.envs.checker",
     "list_models": "shipgym.models",
     "list_structures": "shipgym.models",
     "load_model": "shipgym.models",
@@ -54,10 +60,12 @@ _SUBPACKAGES = ("manoeuvres", "plots", "towing_tank", "weather")
 
 __all__ = [
     "Current",
+    "Episode",
     "InputError",
     "ManoeuvreError",
     "ModelCheck",
     "Particulars",
+    "RecordEpisode",
     "ShipFile",
     "ShipModel",
     "SteeringGear",
@@ -68,6 +76,7 @@ __all__ = [
     "Weather",
     "Wind",
     "check_ship_model",
+    "check_vector_env",
     "list_models",
     "list_structures",
     "load_model",

@@ -55,9 +55,13 @@ def _kind(result: IdentificationResult) -> str:
     if not in_prime_forces(result):
         kind = f"Coefficients of {structure.quantity}s, normalisation \N{LEFT DOUBLE QUOTATION MARK}"
         kind += f"{structure.normalisation}\N{RIGHT DOUBLE QUOTATION MARK}"
+    provenance = result.model.provenance or {}
+    source = "the residuals of the fit, correlated in time and between the equations"
+    if provenance.get("uncertainty") == "bootstrap":
+        source = "refits to blocks of time drawn with replacement"
     return (
-        f"{kind}, rudder positive to starboard. The standard error comes from the residuals of the fit, "
-        "correlated in time and between the equations; t is value by standard error. "
+        f"{kind}, rudder positive to starboard. The standard error comes from {source}; t is value by "
+        "standard error. "
     )
 
 
@@ -98,7 +102,9 @@ def _table(title: str, values: Mapping[str, float], errors: Mapping[str, float],
 
 
 def _t(value: float, error: float) -> float:
-    return abs(value / error) if error > 0.0 else np.inf
+    if error > 0.0:
+        return abs(value / error)
+    return np.inf if value else 0.0
 
 
 def estimated_note(result: IdentificationResult) -> Html:

@@ -6,6 +6,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.report.predictions import legend_above
 from shipgym.pages import (
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
     from identification.comparison import Comparison, Standing
+
+Floats = NDArray[np.float64]
 
 TITLES = {
     "verdict": "Verdict",
@@ -141,8 +144,8 @@ def errors_figure(comparison: Comparison) -> Figure:
 
 def _predictions(comparison: Comparison) -> Html:
     caption = (
-        "What the best methods predict of the heading, less what was measured, from the measured rudder and "
-        "the initial state alone; degrees, seconds."
+        "What the best methods predict of the heading from the measured rudder and the initial state alone, "
+        "less what was measured, as running means over a hundredth of the trial; degrees, seconds."
     )
     return section(
         "prediction", TITLES["prediction"], figure(headings_figure(comparison), "headings", caption)
@@ -162,11 +165,18 @@ def headings_figure(comparison: Comparison) -> Figure:
         for method, colour in zip(best, PALETTE, strict=False):
             prediction = comparison.results[method].predictions[trial.name]
             if prediction is not None:
-                error = np.degrees(prediction["psi"] - trial["psi"])
-                figure.add_trace(line(trial.t, error, method, colour, 1.4, showlegend=k == 0), **place)
+                error = _calmed(np.degrees(prediction["psi"] - trial["psi"]))
+                time = _calmed(trial.t)
+                figure.add_trace(line(time, error, method, colour, 1.5, showlegend=k == 0), **place)
         figure.update_xaxes(axis("time, s" if place["row"] == rows else ""), **place)
         figure.update_yaxes(axis("deg" if place["col"] == 1 else "", zeroline=True), **place)
     height = 230 * rows + 80
     margin = {"l": 62, "r": 18, "t": 60, "b": 44}
     figure.update_layout(layout(height, margin=margin, legend=legend_above(height)))
     return figure
+
+
+def _calmed(values: Floats) -> Floats:
+    """Running means over a hundredth of the samples: the noise of the compass would hide the rest."""
+    width = max(len(values) // 100, 1)
+    return np.convolve(values, np.full(width, 1.0 / width), "valid")

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.diagnostics import autocorrelation, cross_correlation, without_overlap
+from identification.lssvm import TruncatedLSSVM
 from identification.report.predictions import legend_above, overview_figure, prediction_figure
+from identification.tuning.search import BAND, LOG_C
 from identification.uncertainty import residuals
 from shipgym.plots import (
     LIMIT,
@@ -44,7 +46,7 @@ def all_figures(result: IdentificationResult) -> dict[str, Figure]:
     """Every figure of a result by its name; see `IdentificationResult.plots`."""
     fitted = [trial for trial in result.trials if trial.use == "fit"]
     found = {"fit": fit_figure(result), "residuals": residual_figure(result)}
-    if any(hasattr(machine, "l_curve_") for machine in result.machines.values()):
+    if truncated(result):
         found["l-curve"] = l_curve_figure(result)
     if result.searches:
         found["search"] = search_figure(result)
@@ -157,17 +159,23 @@ def rudder_at_windows(result: IdentificationResult) -> Floats | None:
     return angles
 
 
+def truncated(result: IdentificationResult) -> dict[str, TruncatedLSSVM]:
+    """The machines, by equation, that chose or were given a rank."""
+    return {
+        q: machine
+        for q, machine in result.machines.items()
+        if isinstance(machine, TruncatedLSSVM) and (machine.selection != "full" or machine.rank is not None)
+    }
+
+
 def l_curve_figure(result: IdentificationResult) -> Figure:
     """Size of residuals and of solution for every rank, one panel for each equation."""
-    curves = {q: m for q, m in result.machines.items() if hasattr(m, "l_curve_")}
-    titles = [
-        f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}"  # type: ignore[attr-defined]
-        for q, m in curves.items()
-    ]
+    curves = truncated(result)
+    titles = [f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}" for q, m in curves.items()]
     figure = subplots(1, len(curves), titles=titles, horizontal_spacing=0.09)
     go = graph_objects()
     for column, machine in enumerate(curves.values(), start=1):
-        curve, rank = machine.l_curve_, machine.rank_  # type: ignore[attr-defined]
+        curve, rank = machine.l_curve_, machine.rank_
         ranks = [str(k) for k in range(1, len(curve.residual_norm) + 1)]
         place = {"row": 1, "col": column}
         x, y = compact(curve.residual_norm), compact(curve.solution_norm)
@@ -199,20 +207,24 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
 
 
 def search_figure(result: IdentificationResult) -> Figure:
-    """What a search had found after each of its rounds: objective, and weight C of the errors."""
-    figure = subplots(1, 2, titles=["best objective, by its last", "best C"], horizontal_spacing=0.1)
-    for (q, search), colour in zip(result.searches.items(), PALETTE, strict=False):
+    """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
+    searches = {EQUATIONS.get(q, q): search for q, search in result.searches.items()}
+    logarithmic = all(search.variable == LOG_C for search in searches.values())
+    titles = ["best objective, by its last", "best C" if logarithmic else f"best {BAND}"]
+    figure = subplots(1, 2, titles=titles, horizontal_spacing=0.1)
+    common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
+    for k, ((name, search), colour) in enumerate(zip(searches.items(), PALETTE, strict=False)):
         rounds = np.arange(len(search.history))
-        scale = search.value if search.value > 0.0 else 1.0
-        name = EQUATIONS.get(q, q)
-        figure.add_trace(line(rounds, search.history / scale, name, colour), row=1, col=1)
-        figure.add_trace(
-            line(rounds, 10.0 ** search.course[:, 0], name, colour, showlegend=False), row=1, col=2
-        )
+        objective = search.history / (search.value if search.value > 0.0 else 1.0)
+        best = 10.0 ** search.course[:, 0] if logarithmic else search.course[:, 0]
+        if k == 0 or not common:
+            figure.add_trace(line(rounds, objective, name, colour, showlegend=False), row=1, col=1)
+        figure.add_trace(line(rounds, best, name, colour), row=1, col=2)
     for column in (1, 2):
         figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
     figure.update_yaxes(axis(""), row=1, col=1)
-    figure.update_yaxes(axis("", type="log", exponentformat="power"), row=1, col=2)
+    decades = {"type": "log", "tickformat": ".0e"} if logarithmic else {"range": [0.0, 1.0]}
+    figure.update_yaxes(axis("", **decades), row=1, col=2)
     margin = {"l": 62, "r": 18, "t": 76, "b": 48}
     figure.update_layout(layout(340, margin=margin, legend=legend_above(340), hovermode="closest"))
     return figure
@@ -232,7 +244,7 @@ def coefficients_figure(result: IdentificationResult) -> Figure:
     for column in range(columns):
         part = slice(column * rows, (column + 1) * rows)
         for sure, name, colour in ((True, "told from 0", MODEL), (False, "not told from 0", "#b3bcc7")):
-            own = np.flatnonzero((half[part] < 1.0) == sure)
+            own = np.flatnonzero(((half < 1.0) & (values != 0.0))[part] == sure)
             centre = np.sign(values[part][own]) ** 2
             low, high = (np.clip(centre + side * half[part][own], *SHOWN) for side in (-1.0, 1.0))
             figure.add_trace(

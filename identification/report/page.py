@@ -13,6 +13,7 @@ from identification.report.figures import (
     l_curve_figure,
     residual_figure,
     search_figure,
+    truncated,
 )
 from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
 from identification.summary import undetermined
@@ -54,11 +55,11 @@ CAPTIONS = {
         "a term is missing. Residuals that follow the rudder (lags above 0) show a term that is missing."
     ),
     "l-curve": (
-        "Truncation: each point is a fit with one more direction of the features. The corner, where more "
-        "directions make the solution larger and the residuals hardly smaller, is chosen, unless its "
-        "residuals exceed those of full rank by more than chance."
+        "Truncation: each point is a fit with one more direction of the features, the red one the model's. "
+        "Unless asked otherwise it is the corner, where more directions make the solution larger and the "
+        "residuals hardly smaller, if its residuals exceed those of full rank by no more than chance."
     ),
-    "search": "The search for the weight C of the errors, round by round.",
+    "search": "The search for the settings of the method, round by round.",
     "coefficients": (
         "95 % intervals in per cent of the estimate; those beyond the frame are cut. Grey intervals reach 0."
     ),
@@ -127,7 +128,7 @@ def _fit_card(result: IdentificationResult) -> Html:
 
 def _fit_section(result: IdentificationResult) -> Html:
     drawn = {"fit": fit_figure(result), "residuals": residual_figure(result)}
-    if any(hasattr(machine, "l_curve_") for machine in result.machines.values()):
+    if truncated(result):
         drawn["l-curve"] = l_curve_figure(result)
     if result.searches:
         drawn["search"] = search_figure(result)

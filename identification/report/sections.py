@@ -37,8 +37,8 @@ PRIME = 1e-5
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw"}
 INDICES = {
-    "overshoot_1_deg": ("first overshoot", "deg"),
-    "overshoot_2_deg": ("second overshoot", "deg"),
+    "overshoot_1_deg": ("1st overshoot", "deg"),
+    "overshoot_2_deg": ("2nd overshoot", "deg"),
     "advance_lengths": ("advance", "L"),
     "transfer_lengths": ("transfer", "L"),
     "tactical_diameter_lengths": ("tactical diameter", "L"),
@@ -183,14 +183,10 @@ def ship_tables(result: IdentificationResult) -> Html:
         ["rudder rate", source, Html(f"{number(gear.rudder_rate_deg_s, 3)} deg/s")],
         ["rudder lag", source, Html(f"{number(gear.time_constant, 2)} s")],
     ]
+    masses = [table(["added mass", "", "value, 10⁻⁵"], added, text_columns=2)] if added else []
     return columns(
         table(["particular", "", "value"], dimensions, text_columns=2),
-        join(
-            [
-                table(["added mass", "", "value, 10⁻⁵"], added, text_columns=2),
-                table(["steering gear", "", "value"], steering, text_columns=2),
-            ]
-        ),
+        join([*masses, table(["steering gear", "", "value"], steering, text_columns=2)]),
     )
 
 
@@ -203,6 +199,8 @@ def prediction_section(result: IdentificationResult) -> Html:
     """Open-loop predictions of the trials that had no part in the fit."""
     validated = [trial for trial in result.trials if trial.use == "validate"]
     parts = [errors_table(result)]
+    if "reference" in result.metrics:
+        parts.append(reference_table(result))
     if not validated:
         parts.append(
             note(
@@ -234,38 +232,46 @@ def _caption(trial: Trial) -> str:
 
 def errors_table(result: IdentificationResult) -> Html:
     """RMSE and indices of each trial, measured and predicted."""
-    rows = []
     short = short_names(result.trials)
+    rows = []
     for name, metrics in result.metrics["trials"].items():
         rmse = metrics["rmse"]
-        rows.append(
-            [
-                short[name],
-                badge(metrics["use"], "plain" if metrics["use"] == "fit" else "good"),
-                badge("ran away", "bad") if metrics["diverged"] else indices_text(metrics),
-                fixed(_degrees(rmse["psi"]), 2),
-                fixed(_degrees(rmse["r"]), 3),
-                fixed(rmse["u"], 3),
-                fixed(rmse["v"], 3),
-            ]
-        )
-    return table(
-        [
-            "trial",
-            "use",
-            "index: measured → predicted",
-            "heading, deg",
-            "yaw rate, deg/s",
-            "surge, m/s",
-            "sway, m/s",
-        ],
-        rows,
-        text_columns=3,
-        caption=(
-            "Root mean square error of the open-loop simulation over the whole trial, sensor noise "
-            "included, and the manoeuvre's indices (L: ship lengths)."
-        ),
+        row = [
+            short[name],
+            badge(metrics["use"], "plain" if metrics["use"] == "fit" else "good"),
+            badge("ran away", "bad") if metrics["diverged"] else indices_text(metrics),
+            fixed(_degrees(rmse["psi"]), 2),
+            fixed(_degrees(rmse["r"]), 3),
+            fixed(rmse["u"], 3),
+            fixed(rmse["v"], 3),
+        ]
+        rows.append(row)
+    head = [
+        "trial", "use", "index: measured → predicted", "heading, deg", "yaw rate, deg/s", "surge, m/s",
+        "sway, m/s",
+    ]  # fmt: skip
+    caption = (
+        "Root mean square error of the open-loop simulation over the whole trial, sensor noise included, and "
+        "the manoeuvre's indices (L: ship lengths)."
     )
+    return table(head, rows, text_columns=3, caption=caption)
+
+
+def reference_table(result: IdentificationResult) -> Html:
+    """Errors of the heading of a grey box beside those of its bare reference ship."""
+    reference, short = result.metrics["reference"], short_names(result.trials)
+    rows = [
+        [
+            short[name],
+            fixed(_degrees(metrics["rmse"]["psi"]), 2),
+            fixed(_degrees(reference["trials"][name]["rmse"]["psi"]), 2),
+        ]
+        for name, metrics in result.metrics["trials"].items()
+    ]
+    caption = (
+        f"What the correction is worth: heading beside that of the bare reference ship {reference['name']}."
+    )
+    return table(["trial", "model, deg", "bare reference, deg"], rows, text_columns=1, caption=caption)
 
 
 def indices_text(metrics: Mapping[str, Any]) -> Html:
@@ -275,7 +281,7 @@ def indices_text(metrics: Mapping[str, Any]) -> Html:
         for name, (text, unit) in INDICES.items()
         if metrics.get(name) is not None
     ]
-    return Html(f'<span class="sub">{"<br>".join(lines) or NONE}</span>')
+    return Html(f'<span class="sub" style="white-space:nowrap">{"<br>".join(lines) or NONE}</span>')
 
 
 def _degrees(value: float | None) -> float | None:

@@ -13,6 +13,8 @@ from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
 
+LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
+
 #: Values of candidates, an array of shape (n_candidates, n_dimensions) -> (n_candidates,).
 Objective = Callable[[Floats], Floats]
 
@@ -33,6 +35,8 @@ class SearchResult:
         Best candidate after each round.
     evaluations : int
         Candidates evaluated.
+    variable : str
+        What a candidate holds: the logarithm of the weight C, or an insensitive band.
     """
 
     x: Floats
@@ -40,6 +44,7 @@ class SearchResult:
     history: Floats
     course: Floats
     evaluations: int
+    variable: str = LOG_C
 
 
 class Optimiser(Protocol):

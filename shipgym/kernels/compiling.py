@@ -20,6 +20,16 @@ def inlined(function: _Function) -> _Function:
     return compiled
 
 
+def exact(function: _Function) -> _Function:
+    """Compile a scalar function into each loop that calls it, without contraction.
+
+    What is also stored as it is summed could be contracted in one form of a loop and not in another; so costs
+    and observations, which are, would depend on the batch size.
+    """
+    compiled: _Function = njit(forceinline=True, error_model="numpy")(function)
+    return compiled
+
+
 def rare(function: _Function) -> _Function:
     """Compile a function for one lane that is seldom called, and leave it out of the loops."""
     compiled: _Function = njit(**_SEMANTICS)(function)

@@ -11,7 +11,7 @@ from math import copysign, fabs, pi, sqrt
 from typing import Any
 
 from .compiling import inlined
-from .trigonometry import sin_cos
+from .trigonometry import small_sin_cos
 
 ROLL = True
 SHAFT = True
@@ -88,13 +88,13 @@ def accelerations(
 
     inflow = v_ + xp * r_
     u_P = u_ * ((1.0 - wp) + tau * (inflow * inflow + c_pv * v_ + c_pr * r_))
-    J = u_P * U / (n * DIAMETER)
-    K_T = 0.527 - 0.455 * J
-    thrust = (2.0 * DIAMETER**4 / (L * L)) * K_T * n * fabs(n) * per_U * per_U
+    n_ = n * DIAMETER * per_U  # over the advance ratio: u_P / n_
+    K_T_nn = n_ * (0.527 * n_ - 0.455 * u_P)  # thrust coefficient times n_^2: a shaft at rest is no exception
+    thrust = (2.0 * DIAMETER**2 / (L * L)) * copysign(1.0, n) * K_T_nn
 
     v_R = gamma * v_ + c_Rr * r_ + c_Rrrr * r_ * r_ * r_ + c_Rrrv * r_ * r_ * v_
-    u_R = u_P * epsilon * sqrt(1.0 + (8.0 * kappa / pi) * K_T / (J * J))
-    sine, cosine = sin_cos(delta)
+    u_R = copysign(epsilon, u_P) * sqrt(u_P * u_P + (8.0 * kappa / pi) * K_T_nn)
+    sine, cosine = small_sin_cos(delta)
     # (u_R^2 + v_R^2) sin(delta + atan(v_R / u_R)), without the arc
     normal = sqrt(u_R * u_R + v_R * v_R) * (sine * fabs(u_R) + cosine * v_R * copysign(1.0, u_R))
     F_N = (-6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25) * (RUDDER_AREA / (L * L))) * normal
@@ -133,4 +133,4 @@ def accelerations(
 def shaft_acceleration(n: float, command: float, ship: Any, lane: int) -> float:
     """Lag of the shaft, faster at higher speed."""
     order = min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT)
-    return (order - n) / (5.65 / n if n > SLOW_SHAFT else 18.83)
+    return (order - n) * (n * (1.0 / 5.65) if n > SLOW_SHAFT else 1.0 / 18.83)

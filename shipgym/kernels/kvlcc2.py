@@ -8,11 +8,11 @@ drift at another point and has another law for the wake.
 
 from __future__ import annotations
 
-from math import fabs, pi, sqrt
+from math import copysign, fabs, pi, sqrt
 from typing import Any
 
 from .compiling import inlined
-from .trigonometry import arctan2, exponential, sin_cos
+from .trigonometry import arctan2, exponential, small_sin_cos
 
 ROLL = False
 SHAFT = False
@@ -82,16 +82,16 @@ def accelerations(
     v_, r_ = v * per_U, r * L * per_U
 
     w_P = wake(drift, r_)
-    J = u * (1.0 - w_P) / (n * D_P)
-    K_T = k_0 + k_1 * J + k_2 * J * J
-    thrust = n * n * D_P**4 * K_T
+    inflow, tip = u * (1.0 - w_P), n * D_P  # advance ratio: inflow / tip
+    K_T_nn = k_0 * tip * tip + k_1 * tip * inflow + k_2 * inflow * inflow  # thrust coefficient times tip^2
+    thrust = D_P**2 * K_T_nn
 
     beta_R = drift - l_R * r_
     v_R = U * (gamma_minus if beta_R < 0.0 else gamma_plus) * beta_R
     eta = D_P / H_R
-    race = 1.0 + kappa * (sqrt(1.0 + (8.0 / pi) * K_T / (J * J)) - 1.0)
-    u_R = epsilon * u * (1.0 - w_P) * sqrt(eta * race * race + 1.0 - eta)
-    sine, cosine = sin_cos(delta)
+    race = fabs(inflow) * (1.0 - kappa) + kappa * sqrt(inflow * inflow + (8.0 / pi) * K_T_nn)
+    u_R = copysign(epsilon, inflow) * sqrt(eta * race * race + (1.0 - eta) * inflow * inflow)
+    sine, cosine = small_sin_cos(delta)
     # (u_R^2 + v_R^2) sin(delta - atan2(v_R, u_R)), without the arc
     F_N = 0.5 * A_R * f_alpha * sqrt(u_R * u_R + v_R * v_R) * (sine * u_R - cosine * v_R)
 

@@ -35,13 +35,15 @@ LENGTH, SERVICE_SPEED = offsets(0, 2)  # m; m/s
 RUDDER_LIMIT, RUDDER_RATE = offsets(2 * LANES, 2)  # rad; rad/s
 GEAR_FREQUENCY = 4 * LANES  # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
 SERVICE_SHAFT, WATER_DEPTH = offsets(5 * LANES, 2)  # 1/s, shaft speed at service speed; m
-ENVELOPE_LOW = 7 * LANES  # 4 rows: least u, v, r, delta of the training data
-ENVELOPE_HIGH = 11 * LANES  # 4 rows: largest
-ENVELOPE_CENTRE = 15 * LANES  # 4 rows: centre of the ellipsoid around the training data
-ENVELOPE_SHAPE = 19 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
-WEATHER = 29 * LANES  # 83 rows, not used in calm water (`weather_rows`)
-COEFFICIENTS = 112 * LANES
+SCALE_SPEED = 7 * LANES  # m/s, by which observations and costs are scaled: as a rule the service speed
+ENVELOPE_LOW = 8 * LANES  # 4 rows: least u, v, r, delta of the training data
+ENVELOPE_HIGH = 12 * LANES  # 4 rows: largest
+ENVELOPE_CENTRE = 16 * LANES  # 4 rows: centre of the ellipsoid around the training data
+ENVELOPE_SHAPE = 20 * LANES  # 10 rows: upper triangle W, row by row; inside is |W (z - centre)| <= 1
+WEATHER = 30 * LANES  # 83 rows, not used in calm water (`weather_rows`)
+COEFFICIENTS = 113 * LANES
 
 # a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
 RUNAWAY_SPEED = 3.0
 RUNAWAY_YAW_RATE = 6.0
+CAPSIZED = 1.5707963267948966  # rad; nor does it heel beyond a right angle

@@ -11,6 +11,7 @@ from typing import Any
 from .accelerations import ROLL, SHAFT, accelerations, shaft_acceleration
 from .compiling import inlined
 from .layout import (
+    CAPSIZED,
     GEAR_FREQUENCY,
     LENGTH,
     RUDDER_LIMIT,
@@ -20,7 +21,7 @@ from .layout import (
     SERVICE_SPEED,
     WATER_DEPTH,
 )
-from .trigonometry import sin_cos
+from .trigonometry import sin_cos, small_cosine, small_sin_cos
 from .weather import WEATHER
 
 #: Accelerations by the weather in surge, sway, yaw and roll, and the current north and east.
@@ -67,13 +68,27 @@ def rudder_velocity(delta: float, order: float, ship: Any, lane: int) -> float:
 
 
 @inlined
+def level(v: float, r: float, phi: float) -> tuple[float, float]:
+    """Sway velocity, m/s, and yaw rate, rad/s, of a heeling ship in the level plane."""
+    if ROLL:
+        upright = small_cosine(phi)
+        return v * upright, r * upright
+    return v, r
+
+
+@inlined
+def turned(angle: float, ahead: float, aside: float) -> tuple[float, float]:
+    """A velocity ahead and to starboard, seen in the frame from which the ship has turned by an angle."""
+    sine, cosine = small_sin_cos(angle)
+    return ahead * cosine - aside * sine, ahead * sine + aside * cosine
+
+
+@inlined
 def kinematics(psi: float, phi: float, u: float, v: float, r: float) -> tuple[float, float, float]:
     """Velocity over ground, north and east, m/s, and rate of turn of the heading, rad/s."""
     sine, cosine = sin_cos(psi)
-    if ROLL:
-        _, upright = sin_cos(phi)
-        return u * cosine - v * sine * upright, u * sine + v * cosine * upright, r * upright
-    return u * cosine - v * sine, u * sine + v * cosine, r
+    aside, turn = level(v, r, phi)
+    return u * cosine - aside * sine, u * sine + aside * cosine, turn
 
 
 @inlined
@@ -102,6 +117,9 @@ def runge_kutta(
 ) -> State:
     """State after one classical Runge-Kutta step of h seconds with the commands held.
 
+    The way made is summed in the frame of the heading at the start and turned once: the stages are but a
+    small angle away from it, whose sine and cosine cost little.
+
     Parameters
     ----------
     state : tuple of 10 float
@@ -127,34 +145,40 @@ def runge_kutta(
     g1 = rudder_rate(delta, order, ship, lane)
     s1 = shaft_rate(n1, n_command, ship, lane)
     a1, b1, c1, d1 = driven(u, v, r, p, phi, delta, n1, depth, push, ship, lane)
-    x1, y1, e1 = kinematics(psi, phi, u, v, r)
+    w1, e1 = level(v, r, phi)
 
     u2, v2, r2, p2 = u + half * a1, v + half * b1, r + half * c1, p + half * d1
-    psi2, phi2, n2 = psi + half * e1, phi + half * p, n1 + half * s1
+    phi2, n2 = phi + half * p, n1 + half * s1
     delta2 = rudder_after(delta, g1, order, half, ship, lane)
     g2 = rudder_rate(delta2, order, ship, lane)
     s2 = shaft_rate(n2, n_command, ship, lane)
     a2, b2, c2, d2 = driven(u2, v2, r2, p2, phi2, delta2, n2, depth, push, ship, lane)
-    x2, y2, e2 = kinematics(psi2, phi2, u2, v2, r2)
+    w2, e2 = level(v2, r2, phi2)
+    f2, w2 = turned(half * e1, u2, w2)
 
     u3, v3, r3, p3 = u + half * a2, v + half * b2, r + half * c2, p + half * d2
-    psi3, phi3, n3 = psi + half * e2, phi + half * p2, n1 + half * s2
+    phi3, n3 = phi + half * p2, n1 + half * s2
     delta3 = rudder_after(delta, g2, order, half, ship, lane)
     g3 = rudder_rate(delta3, order, ship, lane)
     s3 = shaft_rate(n3, n_command, ship, lane)
     a3, b3, c3, d3 = driven(u3, v3, r3, p3, phi3, delta3, n3, depth, push, ship, lane)
-    x3, y3, e3 = kinematics(psi3, phi3, u3, v3, r3)
+    w3, e3 = level(v3, r3, phi3)
+    f3, w3 = turned(half * e2, u3, w3)
 
     u4, v4, r4, p4 = u + h * a3, v + h * b3, r + h * c3, p + h * d3
-    psi4, phi4, n4 = psi + h * e3, phi + h * p3, n1 + h * s3
+    phi4, n4 = phi + h * p3, n1 + h * s3
     delta4 = rudder_after(delta, g3, order, h, ship, lane)
     g4 = rudder_rate(delta4, order, ship, lane)
     s4 = shaft_rate(n4, n_command, ship, lane)
     a4, b4, c4, d4 = driven(u4, v4, r4, p4, phi4, delta4, n4, depth, push, ship, lane)
-    x4, y4, e4 = kinematics(psi4, phi4, u4, v4, r4)
+    w4, e4 = level(v4, r4, phi4)
+    f4, w4 = turned(h * e3, u4, w4)
 
-    x_new = x + sixth * (x1 + 2.0 * (x2 + x3) + x4)
-    y_new = y + sixth * (y1 + 2.0 * (y2 + y3) + y4)
+    ahead = sixth * (u + 2.0 * (f2 + f3) + f4)
+    aside = sixth * (w1 + 2.0 * (w2 + w3) + w4)
+    sine, cosine = sin_cos(psi)
+    x_new = x + (ahead * cosine - aside * sine)
+    y_new = y + (ahead * sine + aside * cosine)
     if WEATHER:
         x_new += h * push[4]
         y_new += h * push[5]
@@ -179,3 +203,11 @@ def runs_away(u: float, v: float, r: float, ship: Any, lane: int) -> bool:
     slow = sqrt(u * u + v * v) < RUNAWAY_SPEED * speed
     steady = fabs(r) * ship[LENGTH + lane] < RUNAWAY_YAW_RATE * speed
     return not (slow and steady)
+
+
+@inlined
+def capsizes(phi: float) -> bool:
+    """Whether a ship that rolls heels beyond a right angle, or its heel is not a number."""
+    if ROLL:
+        return not fabs(phi) < CAPSIZED
+    return False

@@ -157,6 +157,14 @@ def encounter(bow: float, beam: float, u: float, v: float, ship: Any, lane: int)
 
 
 @inlined
+def meeting(psi: float, u: float, v: float, sky: Any, ship: Any, lane: int) -> float:
+    """Frequency at which a ship meets the waves (see `weather.py`)."""
+    sine, cosine = sin_cos(psi)
+    bow, beam = from_bow(sine, cosine, sky, lane)
+    return encounter(bow, beam, u, v, ship, lane)
+
+
+@inlined
 def decay(x: float) -> float:
     """exp(-x) for x >= 0, to 1e-7 up to 1."""
     y = 0.25 * min(x, 8.0)

@@ -7,11 +7,11 @@ The source's rudder is positive to port; here it is turned.
 
 from __future__ import annotations
 
-from math import fabs
+from math import copysign, fabs
 from typing import Any
 
 from .compiling import inlined
-from .trigonometry import arctan
+from .trigonometry import arctan2
 
 ROLL = False
 SHAFT = True
@@ -58,7 +58,7 @@ def accelerations(
     L = LENGTH
     d = -delta
     z = DRAUGHT / (depth - DRAUGHT)
-    beta = arctan(v / u)
+    beta = arctan2(copysign(1.0, u) * v, fabs(u))
     gT = (T_uu / L) * u * u + T_un * u * n + L * T_nn * fabs(n) * n
     cc = max(c_un * u * n + c_nn * n * n, 0.0)
     drift = cc * fabs(beta) * beta * fabs(d)
@@ -80,7 +80,13 @@ def accelerations(
         + (N_vr * fabs(v) * r + d33 * u * r + N_urz * u * r * z + N_vrz * fabs(v) * r * z + N_T * gT)
         * (1.0 / L)
     )  # fmt: skip
-    return X / (m11 - X_udotz * z), Y / (m22 - Y_vdotz * z), N / (m33 - N_rdotz * z), 0.0
+    # as products, because the masses are the same in all stages of a step
+    return (
+        X * (1.0 / (m11 - X_udotz * z)),
+        Y * (1.0 / (m22 - Y_vdotz * z)),
+        N * (1.0 / (m33 - N_rdotz * z)),
+        0.0,
+    )
 
 
 @inlined

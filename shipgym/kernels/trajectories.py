@@ -17,6 +17,7 @@ from .motion import (
     CALM,
     Push,
     State,
+    capsizes,
     kinematics,
     rudder_order,
     rudder_velocity,
@@ -99,8 +100,8 @@ def follow(states: Any, row: int, state: State, h: float, sky: Any, words: Any, 
 
 @inlined
 def lost(state: State, ship: Any) -> bool:
-    """Whether the ship has run away."""
-    return runs_away(state[3], state[4], state[5], ship, 0)
+    """Whether the ship has run away or capsized."""
+    return runs_away(state[3], state[4], state[5], ship, 0) or capsizes(state[7])
 
 
 @kernel("void(float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])")

@@ -40,3 +40,9 @@ def evolve(
 @rare
 def begin_weather(psi: float, u: float, v: float, sky: Any, words: Any, ship: Any, lane: int) -> None:
     """Start the weather as if it had always been there."""
+
+
+@inlined
+def meeting(psi: float, u: float, v: float, sky: Any, ship: Any, lane: int) -> float:
+    """Frequency at which a ship meets the waves, rad/s (for the arguments see `feel`)."""
+    return 0.0

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
 
+import numpy as np
+
 from shipgym.errors import InputError
 from shipgym.manoeuvres.pull_outs import PullOutIndices, pull_out, pull_out_indices
 from shipgym.manoeuvres.spirals import (
@@ -68,13 +70,15 @@ class Manoeuvre:
         return self.indices(self.sail(model))
 
 
-def standard_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
-    """The standard manoeuvres that suit a ship, from service speed in deep water.
+def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """The standard manoeuvres that suit a ship, from service speed, in deep water unless told otherwise.
 
     Parameters
     ----------
     model : ShipModel
         Her length and speed give durations and steps, her rudder's limit the angles.
+    water_depth : float
+        m, for ships that know shallow water.
 
     Returns
     -------
@@ -82,8 +86,15 @@ def standard_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
         Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to both sides; a direct
         spiral, and a reverse spiral where the ship is unstable on a straight course; with a shaft an inertia
         stop and an acceleration, and a crash stop where her equations hold for a shaft astern.
+
+    Raises
+    ------
+    InputError
+        For water that is too shallow, or shallow water in a ship that knows none.
     """
-    return zigzags(model) | turning_circles(model) | spirals(model) | pull_outs(model) | speed_changes(model)
+    model.check_depth(water_depth)
+    families = (zigzags, turning_circles, spirals, pull_outs, speed_changes)
+    return {name: one for family in families for name, one in family(model, water_depth).items()}
 
 
 def _steps(model: ShipModel) -> tuple[float, float]:
@@ -92,12 +103,14 @@ def _steps(model: ShipModel) -> tuple[float, float]:
     return LENGTHS * travel, travel / STEPS_PER_LENGTH
 
 
-def zigzags(model: ShipModel) -> dict[str, Manoeuvre]:
+def zigzags(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = _steps(model)
 
     def sailed(angle: float, port_first: bool) -> Callable[[ShipModel], Trial]:
-        return lambda ship: zigzag(ship, angle, angle, port_first, duration, dt, must_reverse=False)
+        return lambda ship: zigzag(
+            ship, angle, angle, port_first, duration, dt, water_depth=water_depth, must_reverse=False
+        )
 
     return {
         f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
@@ -108,13 +121,13 @@ def zigzags(model: ShipModel) -> dict[str, Manoeuvre]:
     }
 
 
-def turning_circles(model: ShipModel) -> dict[str, Manoeuvre]:
+def turning_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Turning circles with full rudder to both sides."""
     duration, dt = _steps(model)
     full = min(TURN_DEG, model.steering.rudder_limit_deg)
 
     def sailed(angle: float) -> Callable[[ShipModel], Trial]:
-        return lambda ship: turning_circle(ship, angle, duration, dt)
+        return lambda ship: turning_circle(ship, angle, duration, dt, water_depth)
 
     return {
         f"turning circle {full:.0f} deg to {side}": Manoeuvre(
@@ -124,23 +137,27 @@ def turning_circles(model: ShipModel) -> dict[str, Manoeuvre]:
     }
 
 
-def spirals(model: ShipModel) -> dict[str, Manoeuvre]:
+def spirals(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
     angles = [a for a in DIRECT_RUDDER_DEG if abs(a) <= model.steering.rudder_limit_deg]
     found = {
-        "direct spiral": Manoeuvre(lambda ship: direct_spiral(ship, angles), spiral_indices, SpiralIndices)
+        "direct spiral": Manoeuvre(
+            lambda ship: direct_spiral(ship, angles, water_depth=water_depth), spiral_indices, SpiralIndices
+        )
     }
     if not _holds_course(model):
-        found["reverse spiral"] = Manoeuvre(reverse_spiral, spiral_indices, SpiralIndices)
+        found["reverse spiral"] = Manoeuvre(
+            lambda ship: reverse_spiral(ship, water_depth=water_depth), spiral_indices, SpiralIndices
+        )
     return found
 
 
-def pull_outs(model: ShipModel) -> dict[str, Manoeuvre]:
+def pull_outs(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Pull-outs from turns to both sides."""
     angle = min(PULL_OUT_DEG, model.steering.rudder_limit_deg)
 
     def sailed(rudder_deg: float) -> Callable[[ShipModel], Trial]:
-        return lambda ship: pull_out(ship, rudder_deg)
+        return lambda ship: pull_out(ship, rudder_deg, water_depth=water_depth)
 
     return {
         f"pull-out from {side}": Manoeuvre(sailed(sign * angle), pull_out_indices, PullOutIndices)
@@ -148,14 +165,26 @@ def pull_outs(model: ShipModel) -> dict[str, Manoeuvre]:
     }
 
 
-def speed_changes(model: ShipModel) -> dict[str, Manoeuvre]:
+def speed_changes(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
     if "n" not in model.command_names:
         return {}
-    found = {"inertia stop": Manoeuvre(stopping, stopping_indices, StoppingIndices)}
+    found = {
+        "inertia stop": Manoeuvre(
+            lambda ship: stopping(ship, water_depth=water_depth), stopping_indices, StoppingIndices
+        )
+    }
     if goes_astern(model):
-        found["crash stop"] = Manoeuvre(crash_stop, stopping_indices, StoppingIndices)
-    return found | {"acceleration": Manoeuvre(acceleration, acceleration_indices, AccelerationIndices)}
+        found["crash stop"] = Manoeuvre(
+            lambda ship: crash_stop(ship, water_depth), stopping_indices, StoppingIndices
+        )
+    return found | {
+        "acceleration": Manoeuvre(
+            lambda ship: acceleration(ship, water_depth=water_depth),
+            acceleration_indices,
+            AccelerationIndices,
+        )
+    }
 
 
 def _holds_course(model: ShipModel) -> bool:

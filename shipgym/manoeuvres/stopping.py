@@ -17,7 +17,6 @@ from shipgym.simulation.conditions import Conditions
 from shipgym.trial import Trial
 from shipgym.weather.conditions import Weather
 
-CREEP = 1e-3  # of the service shaft speed: a stopped shaft where the equations divide by its speed
 LONGEST = 300.0  # of a stopping trial, L / U0
 ACCELERATION = 40.0  # duration of an acceleration, L / U0
 
@@ -146,7 +145,7 @@ def _stopping_order(model: ShipModel, shaft_speed: float) -> float:
             f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r} holds for a "
             "shaft turning ahead only; expected a number >= 0, or a ship like 'tanker'"
         )
-    return order if "n" in model.state_names or order != 0.0 else CREEP * service
+    return order
 
 
 def goes_astern(model: ShipModel) -> bool:
@@ -154,15 +153,22 @@ def goes_astern(model: ShipModel) -> bool:
     return isinstance(model.dynamics, Equations) and model.dynamics.astern
 
 
-def crash_stop(model: ShipModel) -> Trial:
+def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    water_depth : float
+        m, for ships that know shallow water.
 
     Raises
     ------
     InputError
         For a ship whose equations do not hold astern.
     """
-    return stopping(model, -shaft_of(model), speed_ratio=0.0)
+    return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
 
 def stopping_indices(

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 from shipgym.models.ship_model import ShipModel
+from shipgym.models.structures import WITH_REFERENCE
 from shipgym.models.term_table import Structure
 from shipgym.models.terms import CHANNEL, Term, read_terms
 from shipgym.particulars import Particulars
@@ -24,7 +25,7 @@ from shipgym.steering import SteeringGear
 
 Floats = NDArray[np.float64]
 
-GREY_BOX = "grey-box"
+GREY_BOX = WITH_REFERENCE
 SOURCE = (
     "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with "
     "minor rudder"
@@ -119,6 +120,11 @@ class GreyBox(Structure):
 
     def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
         """Source of the compiled accelerations; the coefficients of the terms are read at run time."""
+        return self._source
+
+    @cached_property
+    def _source(self) -> str:
+        """Written once, however many models share the grey box."""
         from shipgym.simulation.grey_box_source import grey_box_source
 
         return grey_box_source(self)

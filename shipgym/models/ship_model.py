@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.models.envelope import Envelope
@@ -159,14 +160,20 @@ class ShipModel:
         Raises
         ------
         InputError
-            For another number of states or commands, or shallow water.
+            For another number of states or commands, for those that are not finite or in other units
+            (degrees, revolutions per minute), or for water that is too shallow.
         """
         depth = np.asarray(water_depth, dtype=float)
         self.check_depth(float(depth.min()))
         states = np.asarray(state, dtype=float)
+        from shipgym.simulation.orders import check_units
+
         _expect_last_axis("state", states, self.state_names)
         commands = np.asarray(command, dtype=float)
         _expect_last_axis("command", commands, self.command_names)
+        if not np.all(np.isfinite(states)):
+            raise InputError(f"state: {states[~np.isfinite(states)][0]} found, expected finite numbers")
+        check_units(self, commands.reshape(-1, len(self.command_names)), "command")
         shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1], depth.shape)
         flat = np.array(np.broadcast_to(states, (*shape, states.shape[-1]))).reshape(-1, states.shape[-1])
         flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1])).reshape(len(flat), -1)
@@ -187,8 +194,9 @@ class ShipModel:
         ------
         InputError
         """
-        if np.isposinf(water_depth):
+        if water_depth == np.inf:
             return
+        check_number(water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water")
         if not self.dynamics.shallow_water:
             raise InputError(
                 f"water_depth: {water_depth:g} m found, but {self.name!r} is a deep-water model; leave it out"
@@ -323,11 +331,11 @@ class ShipModel:
         """Source of the accelerations that are compiled into the kernels."""
         return self.dynamics.accelerations_source(self.coefficients)
 
-    def kernel(self, name: str, weather: bool = False) -> ModuleType:
-        """One file of kernels, compiled together with this ship, for calm water or for weather."""
+    def kernel(self, name: str, weather: bool = False, task: str | None = None) -> ModuleType:
+        """One file of kernels, compiled with this ship, for calm water or weather, with a task or none."""
         from shipgym.simulation.compiled import kernel
 
-        return kernel(self.accelerations_source, name, weather)
+        return kernel(self.accelerations_source, name, weather, task)
 
     def ship_column(self, water_depth: float = np.inf, weather: Floats | None = None) -> Floats:
         """Constants and coefficients in the order of the kernels' rows, shape (n_rows,).
@@ -344,6 +352,7 @@ class ShipModel:
         column[layout.row(layout.GEAR_FREQUENCY)] = 1.0 / gear.time_constant if gear.time_constant else 0.0
         column[layout.row(layout.SERVICE_SHAFT)] = self.service_shaft_speed
         column[layout.row(layout.WATER_DEPTH)] = water_depth
+        column[layout.row(layout.SCALE_SPEED)] = p["speed"]
         low, high, centre, shape, weather_at, end = map(layout.row, (
             layout.ENVELOPE_LOW, layout.ENVELOPE_HIGH, layout.ENVELOPE_CENTRE, layout.ENVELOPE_SHAPE,
             layout.WEATHER, layout.COEFFICIENTS,

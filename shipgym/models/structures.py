@@ -131,11 +131,12 @@ STRUCTURES: dict[str, Structure] = {
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)
+WITH_REFERENCE = "grey-box"  # a table that stands on a reference ship, which only a user can name
 
 
 def list_structures() -> list[str]:
-    """Names of the structures that can be identified, registered ones included."""
-    return list(STRUCTURES)
+    """Names of the structures that can be identified, registered ones and the grey box included."""
+    return [*STRUCTURES, WITH_REFERENCE]
 
 
 def get_structure(name: str) -> Structure:
@@ -146,12 +147,12 @@ def get_structure(name: str) -> Structure:
     InputError
         If there is none of that name, or it is the grey box, which takes a reference ship.
     """
-    if name == "grey-box":
+    if name == WITH_REFERENCE:
         raise InputError(
             "structure: 'grey-box' found, which is a reference ship and a table of terms; give the reference "
             "ship: identify(..., structure='grey-box', reference_model='tanker'), or shipgym.models.grey_box"
         )
-    return STRUCTURES[check_choice(name, STRUCTURES, "structure")]
+    return STRUCTURES[check_choice(name, list_structures(), "structure")]
 
 
 def register_structure(
@@ -193,7 +194,7 @@ def register_structure(
     table = check_table(equations, "register_structure: equations")
     terms = {q: _terms(given, f"register_structure: equations.{q}") for q, given in table.items()}
     structure = Structure(name, source, terms, normalisation, quantity)
-    if name in EQUATIONS or STRUCTURES.get(name, structure) != structure:
+    if name in EQUATIONS or name == WITH_REFERENCE or STRUCTURES.get(name, structure) != structure:
         raise InputError(
             f"register_structure: name {name!r} found, which is another structure's; expected a new name"
         )

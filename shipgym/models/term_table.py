@@ -187,6 +187,11 @@ class Structure:
 
     def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
         """Source of the compiled accelerations; the coefficients are read at run time."""
+        return self._source
+
+    @cached_property
+    def _source(self) -> str:
+        """Written once, however many models share the table."""
         from shipgym.simulation.generator import accelerations_source
 
         return accelerations_source(self)

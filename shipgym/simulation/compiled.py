@@ -2,8 +2,9 @@
 
 The folder `shipgym/kernels` is copied into the user's cache under a name that hashes its contents,
 the ship's `accelerations.py`, the versions of Python and Numba and the processor; Numba's own on-disk
-cache lies beside the copied files. Where there is weather, `open_sea.py` is its `weather.py`. The folder is
-written beside its target and renamed, so any number of processes may compile at once.
+cache lies beside the copied files. Where there is weather, `open_sea.py` is its `weather.py`, and an
+environment's task, `course_keeping.py` say, is its `task.py`. The folder is written beside its target and
+renamed, so any number of processes may compile at once.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ CACHE_VARIABLE = "SHIPGYM_CACHE"
 
 
 @cache
-def kernel(accelerations: str, name: str, weather: bool = False) -> ModuleType:
+def kernel(accelerations: str, name: str, weather: bool = False, task: str | None = None) -> ModuleType:
     """One file of kernels, compiled together with a ship.
 
     Parameters
@@ -40,22 +41,26 @@ def kernel(accelerations: str, name: str, weather: bool = False) -> ModuleType:
         File of `shipgym/kernels`, without its ending.
     weather : bool
         Whether there is current, wind or waves.
+    task : str, optional
+        File of `shipgym/kernels` with an environment's task, without its ending.
 
     Returns
     -------
     module
         With the compiled functions of that file.
     """
-    return importlib.import_module(f"{_package(accelerations, weather)}.{name}")
+    return importlib.import_module(f"{_package(accelerations, weather, task)}.{name}")
 
 
 @cache
-def _package(accelerations: str, weather: bool) -> str:
+def _package(accelerations: str, weather: bool, task: str | None) -> str:
     """Name of the imported package that holds the kernels of one ship."""
     files = {path.name: path.read_bytes() for path in sorted(KERNELS.glob("*.py"))}
     files["accelerations.py"] = accelerations.encode()
     if weather:
         files["weather.py"] = files["open_sea.py"]
+    if task is not None:
+        files["task.py"] = files[f"{task}.py"]
     name = f"shipgym_kernels_{_fingerprint(files)}"
     folder = _write_once(name, files)
     spec = importlib.util.spec_from_file_location(

@@ -32,33 +32,44 @@ def checked_orders(model: ShipModel, commands: ArrayLike) -> Floats:
             f"commands: shape {orders.shape} found, expected (n_steps, {len(names)}) for {', '.join(names)}, "
             "with at least 2 steps"
         )
-    if not np.all(np.isfinite(orders)):
-        raise InputError(f"commands: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite")
-    if "delta" in names:
-        rudder = orders[:, names.index("delta")]
-        _within(rudder, -np.pi / 2, np.pi / 2, "rudder", "rad (not degrees) between -pi/2 and pi/2")
-    if "n" in names:
-        low, high, expected = _shaft_range(model)
-        _within(orders[:, names.index("n")], low, high, "shaft speed", expected)
+    check_units(model, orders)
+    if "n" in names and not _astern(model):
+        expected = f"a number >= 0: the equations of {model.name!r} hold for a shaft turning ahead only"
+        _within(orders[:, names.index("n")], 0.0, np.inf, "shaft speed", expected, "commands")
     return orders
 
 
-def _shaft_range(model: ShipModel) -> tuple[float, float, str]:
-    """Least and largest order of the shaft, 1/s, and how to say so."""
-    most = FASTEST_SHAFT * model.service_shaft_speed
-    limits = f"{model.service_shaft_speed:.4g} at service speed"
+def check_units(model: ShipModel, orders: Floats, where: str = "commands") -> None:
+    """Refuse orders of shape (n, n_command) that are no numbers, or in other units than rad and 1/s.
+
+    Raises
+    ------
+    InputError
+        Naming the first row out of range.
+    """
+    names = model.command_names
+    if not np.all(np.isfinite(orders)):
+        raise InputError(f"{where}: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite")
+    if "delta" in names:
+        rudder = orders[:, names.index("delta")]
+        _within(rudder, -np.pi / 2, np.pi / 2, "rudder", "rad (not degrees) between -pi/2 and pi/2", where)
+    if "n" in names:
+        most = FASTEST_SHAFT * model.service_shaft_speed
+        expected = (
+            f"1/s (not rpm) between {-most if _astern(model) else 0.0:.4g} and {most:.4g}; "
+            f"{model.service_shaft_speed:.4g} at service speed"
+        )
+        _within(orders[:, names.index("n")], -most, most, "shaft speed", expected, where)
+
+
+def _astern(model: ShipModel) -> bool:
+    """Whether the shaft may turn astern: a table of terms is taken at its word."""
     dynamics = model.dynamics
-    if not isinstance(dynamics, Equations) or dynamics.astern:
-        return -most, most, f"1/s (not rpm) between {-most:.4g} and {most:.4g}; {limits}"
-    if "n" in model.state_names:
-        return 0.0, most, f"1/s (not rpm) between 0 and {most:.4g}, the shaft turning ahead; {limits}"
-    # its advance ratio divides by the shaft speed
-    least = float(np.nextafter(0.0, 1.0))
-    return least, most, f"1/s (not rpm) above 0, the shaft turning ahead, up to {most:.4g}; {limits}"
+    return not isinstance(dynamics, Equations) or dynamics.astern
 
 
-def _within(values: Floats, low: float, high: float, what: str, expected: str) -> None:
+def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:
     wrong = np.flatnonzero((values < low) | (values > high))
     if len(wrong):
         row = int(wrong[0])
-        raise InputError(f"commands: row {row}: {what} {values[row]:g} found, expected {expected}")
+        raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")

@@ -140,9 +140,11 @@ def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
 def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
     """The error for a ship that ran away after a given time and physical state."""
     last = dict(zip(model.state_names, model.own_states(state[None])[0].tolist(), strict=True))
+    heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
+    long = "" if time_s > 0.0 else ", or the step is far too long for it"
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
-        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s): it is unstable there",
+        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",
         time_s,
         last,
     )

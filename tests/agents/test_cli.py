@@ -215,3 +215,16 @@ def test_a_wrong_file_gives_no_traceback_from_the_shell(tmp_path):
     assert answer.returncode == 2
     assert "Traceback" not in answer.stderr
     assert answer.stderr.count("\n") == 1
+
+
+def test_trials_in_shallow_water():
+    answer = shipgym("trials", "tanker", "--depth", 25, "--json")
+    found = json.loads(answer.stdout)
+    assert found["water_depth"] == 25.0
+    assert found["imo"] == {}  # the criteria are made for deep water
+    turn = found["manoeuvres"]["turning circle 35 deg to starboard"]
+    assert turn["tactical_diameter_lengths"]["value"] > 3.5
+    for name, depth, said in (("tanker", 18, "draught of 18.46 m"), ("mariner", 30, "deep-water model")):
+        answer = shipgym("trials", name, "--depth", depth)
+        assert answer.exit_code == 2
+        assert said in answer.stderr

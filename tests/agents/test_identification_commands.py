@@ -31,6 +31,7 @@ GENERAL = [
     'structure = "linear-steering"', 'samples = "integral"', 'name = "mine"', "window = 9", "smooth = false",
     'preprocessing = "savgol"', "repair = true", 'uncertainty = "bootstrap"', "guarded = false",
     'hold_out = ["zigzag_10_10.csv"]', 'prior = "clarke"', "prior_strength = 0.1",
+    'prior_folds = "largest-rudder"',
 ]  # fmt: skip
 
 
@@ -218,3 +219,8 @@ def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
     assert len(load_model(tmp_path / "out" / "model.json").coefficients) == told["terms"]["reduced"]
     assert (tmp_path / "out" / "report.html").exists()
     assert shipgym("reduce", path, "--out", tmp_path / "x", "--direction", "sideways").exit_code == 2
+
+
+def test_every_option_and_method_is_documented():
+    page = (Path(__file__).parents[2] / "docs" / "identification.md").read_text(encoding="utf-8")
+    assert [name for name in (*OPTIONS, *METHODS) if f"`{name}`" not in page] == []

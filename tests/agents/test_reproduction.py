@@ -4,8 +4,9 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.reproduction import missed, page
-from identification.papers import PAPERS, Row
+from agents.reproduction import missed, page, papers_of
+from identification.papers import CASES, PAPERS, Row
+from identification.papers.requirements import REQUIREMENTS
 
 
 def test_a_paper_that_is_not_known_gets_one_message():
@@ -31,3 +32,28 @@ def test_only_aims_that_are_missed_fail(met, listed):
     row = Row("Table 1", "K, 1/s", 0.15, 0.16, 0.15, "within 1 %", met)
     assert len(missed({PAPERS[0]: [row]})) == listed
     assert f"{[0, 1][met is True]} of {[0, 1][met is not None]}." in page({PAPERS[0]: [row]})
+
+
+def test_all_are_the_papers_and_the_requirements():
+    assert papers_of("all") == CASES == (*PAPERS, "requirements")
+    assert papers_of("xu2020") == ("xu2020",)
+
+
+def test_the_page_tells_of_each_requirement_why_it_holds_and_what_shows_it():
+    text = page({"requirements": [Row("R7", "gap", None, None, 0.0, "below 1e-9", True)]})
+    table = [line for line in text.splitlines() if line.startswith("| R")]
+    assert [line.split()[1] for line in table] == [one.name for one in REQUIREMENTS] + ["R7"]
+    unescaped = [line.replace("\\|", "") for line in table]
+    assert [line.count("|") for line in unescaped[:8]] == [6] * 8
+    for line, one in zip(table, REQUIREMENTS, strict=False):
+        assert all(f"`{test}`" in line for test in one.tests)
+
+
+def test_a_note_stands_once_below_the_table_and_is_pointed_at():
+    rows = [
+        Row("Table 1", q, 1.0, 1.0, 1.0, note=note) for q, note in zip("abc", ("x|y", "", "x|y"), strict=True)
+    ]
+    lines = page({PAPERS[0]: rows}).splitlines()
+    cells = [line.split("|")[-2].strip() for line in lines if line.startswith("| Table 1")]
+    assert cells == ["1", "", "1"]
+    assert lines.count("1. x|y") == 1

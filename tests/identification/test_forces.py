@@ -82,6 +82,23 @@ def test_noise_is_told_by_the_standard_errors() -> None:
     assert np.abs(t).max() < 5.0
 
 
+def test_each_force_has_the_noise_of_its_own_residuals() -> None:
+    """A bad gauge of X leaves the coefficients of N as certain as they are."""
+    rng = np.random.default_rng(0)
+    runs = []
+    for run in tank_tests(noise=0.05):
+        spoilt = run["X"] + 3.0 * np.std(run["X"]) * rng.standard_normal(len(run))
+        channels = {name: run[name] for name in run.channels} | {"X": spoilt}
+        runs.append(Trial(run.t, channels, name=run.name, kind="captive", length=run.length))
+    model = identify_forces(runs, "pmm18", PARTICULARS, method="ls")
+    assert model.covariance is not None
+    errors = np.array(list(model.coefficients.values())) - list(SHIP.coefficients.values())
+    t = errors / np.sqrt(np.diag(model.covariance))
+    for force in "XN":
+        own = [name[0] == force for name in model.coefficients]
+        assert 0.3 < np.sqrt(np.mean(t[own] ** 2)) < 2.5, force
+
+
 def test_the_full_model_explains_the_tests_but_not_all_its_coefficients() -> None:
     """With u' = 1 in pure yaw, ur and uur are one: rank below 38, as Tables 3, 6 and 8 of the paper show."""
     model = identify_forces(tank_tests(), "pmm38", PARTICULARS)

@@ -10,12 +10,15 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
+from identification.folds import of_largest_rudder
 from identification.pattern_search import pattern_search
-from identification.rm_svm import RMSVM
+from identification.report.figures import search_figure
+from identification.rm_svm import NEARLY, RMSVM
 from identification.similarity import correlations, select_reference, similarity_vector
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
+from shipgym.particulars import Particulars
 
 #: Mei 2019, Table 4: block coefficient, L/B, B/T, L/V0 in s, rudder area by L T.
 TABLE_4 = {
@@ -101,7 +104,7 @@ def test_a_reference_ship_that_rolls_is_chosen_only_where_roll_is_recorded() -> 
 
 def test_too_little_known_to_choose() -> None:
     with pytest.raises(InputError, match=r"give beam, draught.*or name the reference_model"):
-        select_reference(shipgym.models.ship_model.Particulars(length=7.0, speed=1.0))
+        select_reference(Particulars(length=7.0, speed=1.0))
 
 
 def test_pattern_search_finds_the_corner_and_the_inside() -> None:
@@ -126,6 +129,20 @@ def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 
 
+@pytest.mark.parametrize(("weight", "band"), [(0.1, 0.1), (1.0, 0.5), (30.0, 0.0)])
+def test_coordinate_descent_and_minimal_optimisation_agree(
+    weight: float, band: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((150, 3)) @ [[1.0, 0.5, 0.0], [0.0, 1.0, 0.3], [0.0, 0.0, 1.0]]
+    y = X @ [1.0, -2.0, 0.5] + rng.standard_normal(150)
+    quick = RMSVM(C=weight, epsilon=band).fit(X, y)
+    monkeypatch.setattr("identification.rm_svm.MOST_SWEEPS", 1)
+    exact = RMSVM(C=weight, epsilon=band).fit(X, y)
+    assert quick.coef_ == pytest.approx(exact.coef_, abs=5e-3)
+    assert not np.array_equal(quick.coef_, exact.coef_)
+
+
 def test_a_weight_of_zero_is_the_bare_reference_ship(target: ShipModel, trials: list[Trial]) -> None:
     result = fit(target, trials, method="rm-svm", reference_model="kvlcc2", C=0.0)
     assert set(result.coefficients.values()) == {0.0}
@@ -148,12 +165,46 @@ def test_the_tanker_as_reference_for_kvlcc2(target: ShipModel, trials: list[Tria
     assert ours < 0.7 * bare
 
 
+def test_the_weight_may_be_judged_by_the_largest_rudder(
+    target: ShipModel, trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The least weight with which a fit of the 10/10s predicts the 20/20 nearly as well as with any."""
+    weights = (0.0, 0.03, 3.0)
+    monkeypatch.setattr("identification.rm_svm.WEIGHTS", weights)
+    settings = {"method": "rm-svm", "reference_model": "tanker", "regression": "ls-svm"}
+    provenance = fit(target, trials, **settings, folds="largest-rudder").model.provenance or {}
+    errors = []
+    for weight in weights:
+        learnt = fit(target, trials, **settings, C=weight, hold_out=["starboard-20"])
+        errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
+    least = next(w for w, e in zip(weights, errors, strict=True) if e <= NEARLY * min(errors))
+    assert provenance["search"]["r"]["C"] == least
+
+
+def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
+    assert of_largest_rudder(trials, "folds").tolist() == [False, False, True, True]
+    with pytest.raises(
+        InputError, match=r"folds: 'largest-rudder' found, but all trials to fit \(2\) reach 20"
+    ):
+        of_largest_rudder(trials[2:], "folds")
+
+
 def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
     provenance = rm_svm.model.provenance or {}
     assert provenance["reference"] == {"name": "kvlcc2", "similarity": {}, "shaft": True}
     assert set(provenance["search"]) == {"u", "v", "r"}
     assert all(0.0 <= chosen["epsilon"] <= 1.0 for chosen in provenance["search"].values())
     assert "bare reference ship 'kvlcc2'" in rm_svm.summary()
+
+
+def test_the_search_for_the_bands_is_drawn(rm_svm: IdentificationResult) -> None:
+    chosen = (rm_svm.model.provenance or {})["search"]
+    for q, search in rm_svm.searches.items():
+        assert search.x.tolist() == search.course[-1].tolist() == [chosen[q]["epsilon"]]
+        assert list(search.history) == sorted(search.history, reverse=True)
+    figure = search_figure(rm_svm)
+    assert [note.text for note in figure.layout.annotations][1] == "best insensitive band"
+    assert figure.data[-1].y[-1] == pytest.approx(chosen["r"]["epsilon"], abs=1e-6)
 
 
 @pytest.fixture(scope="module")
@@ -193,6 +244,10 @@ def test_the_exact_reference_leaves_nothing_to_learn(target: ShipModel, silent: 
         (
             {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "objective": "luck"},
             r"objective: 'luck' found",
+        ),
+        (
+            {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "folds": "luck"},
+            r"folds: 'luck' found",
         ),
     ],
 )

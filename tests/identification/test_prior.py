@@ -11,6 +11,8 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.formulas import clarke_derivatives, formula_coefficients, kijima_derivatives
+from identification.prior import reference_prior
+from identification.samples import build_samples
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
@@ -151,6 +153,26 @@ def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> N
     assert errors[1] < 0.05 < 1.0 < errors[0]
 
 
+def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> None:
+    """The score of the prior by itself is its error on the 20/20 alone, whatever the 10/10 shows."""
+    small, large = (
+        recorded(zigzag(target, angle, angle, duration=50, dt=0.05), target, 1.0, angle, f"zigzag-{angle}")
+        for angle in (10, 20)
+    )
+    result = fit(target, [small, large], prior="tanker", prior_folds="largest-rudder")
+    provenance = result.model.provenance or {}
+    prior = reference_prior("tanker", result.model)
+    held = build_samples(
+        [large], result.model.table, target.particulars, window=provenance["steps_per_window"],
+        gear=target.steering,
+    )  # fmt: skip
+    errors = [
+        np.mean((y - held.features[q] @ prior.centre[q]) ** 2) / np.mean(y**2)
+        for q, y in held.targets.items()
+    ]
+    assert provenance["prior_scores"]["inf"] == pytest.approx(np.mean(errors), rel=1e-3)
+
+
 def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Trial]) -> None:
     result = fit(target, short_trials, prior="auto", prior_strength=1.0)
     provenance = result.model.provenance or {}
@@ -166,6 +188,9 @@ def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Tr
         ({"prior": "titanic"}, r"titanic"),
         ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
         ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
+        ({"prior_folds": "largest-rudder"}, r"prior_folds: 'largest-rudder' found without a prior"),
+        ({"prior": "tanker", "prior_folds": "luck"}, r"prior_folds: 'luck' found"),
+        ({"prior": "tanker", "prior_folds": "largest-rudder"}, r"all trials to fit \(2\) reach 20"),
     ],
 )
 def test_what_does_not_fit_is_refused(

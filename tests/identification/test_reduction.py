@@ -64,6 +64,14 @@ def test_of_collinear_terms_one_is_dropped() -> None:
     assert found.path[-1].held_out > 0.999
 
 
+@pytest.mark.parametrize("preferred", ["a", "copy"])
+def test_of_terms_that_say_the_same_the_preferred_one_stays(preferred: str) -> None:
+    X, y = orthogonal()
+    doubled = np.column_stack([X[:, [0, 2, 5]], X[:, 0]])
+    found = backward_elimination(doubled, y, ("a", "c", "f", "copy"), prefer=[preferred])
+    assert set(found.terms) == {preferred, "c", "f"}
+
+
 def test_a_term_that_matters_is_not_dropped_however_uncertain() -> None:
     X, y = orthogonal(noise=1.0)
     found = backward_elimination(X, y, NAMES, tolerance=1e-3, threshold=0.0)

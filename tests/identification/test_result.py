@@ -106,6 +106,28 @@ def test_the_search_is_drawn_to_the_c_that_it_found(searched: IdentificationResu
     assert traces[1].y[-1] == pytest.approx(searched.machines["u"].C_, rel=1e-5)  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize(("epsilon", "figures"), [(None, {"search"}), (0.1, set())])
+def test_a_grey_box_tells_of_its_search_where_it_searched(
+    noisy_trials: list[Trial], mariner: ShipModel, tmp_path: Path, epsilon: float | None, figures: set[str]
+) -> None:
+    options = {"particulars": mariner.particulars, "structure": "grey-box", "reference_model": "tanker"}
+    result = identify(noisy_trials, method="rm-svm", epsilon=epsilon, **options)
+    assert result.plots().keys() & {"search", "l-curve"} == figures
+    if epsilon is None:
+        panels = [trace.xaxis for trace in result.plots()["search"].data]
+        assert sorted(panels) == ["x", "x2", "x2", "x2"]  # one search, a band for each equation
+    result.save(tmp_path)
+    assert "Mariner" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "beside the bare reference ship 'tanker" in " ".join(result.summary().split())
+
+
+def test_a_channel_that_never_moves_is_no_trouble(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    """A term of constant shaft speed is 0 throughout; least squares leaves it out without a word."""
+    steady = cao_zigzag.with_channels({**cao_zigzag.channels, "n": np.full_like(cao_zigzag.t, 1.2)})
+    result = identify([steady], "surge-perturbed", particulars=mariner.particulars)
+    assert np.all(np.isfinite(list(result.coefficients.values())))
+
+
 def test_intervals_of_coefficients_are_theirs(truncated: IdentificationResult) -> None:
     """In per cent of the estimate, 1.96 standard errors to either side."""
     trace = truncated.plots()["coefficients"].data[0]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym.kernels.trigonometry import sin_cos, wrap
+from shipgym.kernels.trigonometry import sin_cos, small_cosine, small_sin_cos, wrap
 from shipgym.simulation import compiled
 from shipgym.simulation.generator import accelerations_source
 
@@ -102,3 +102,17 @@ def test_no_warnings_when_kernels_are_loaded():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert shipgym.load_model("mariner").kernel("trajectories").simulate is not None
+
+
+def test_small_angles_have_the_sine_and_cosine_of_the_library():
+    x = np.linspace(-np.pi / 2, np.pi / 2, 2001)
+    found = np.array([small_sin_cos(angle) for angle in x])
+    np.testing.assert_allclose(found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=4e-16)
+    np.testing.assert_allclose([small_cosine(angle) for angle in x], np.cos(x), rtol=0.0, atol=4e-16)
+    assert small_sin_cos(np.pi) == pytest.approx((0.0, -1.0), abs=3e-9)
+
+
+def test_a_table_is_written_once_for_all_models_that_share_it():
+    model = shipgym.load_model("mariner-tls-svm")
+    sources = {id(draw.accelerations_source) for draw in model.sample(5, 0)}
+    assert sources == {id(model.accelerations_source)}

@@ -17,9 +17,9 @@ from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import (
     OBSERVATION_NAMES,
     CourseKeepingTask,
-    control_interval,
     observation_scales,
 )
+from shipgym.envs.task import control_interval
 from shipgym.models import Envelope
 
 ID = "shipgym/CourseKeeping-v0"

@@ -245,12 +245,22 @@ def test_kvlcc2_and_its_model_scale_by_froude():
 def test_without_thrust_and_rudder_a_ship_slows_down(name):
     model = shipgym.load_model(name)
     start = model.service_state.copy()
-    command = model.service_command.copy()
-    command[1] = 1e-3  # the shaft hardly turns
     if "n" in model.state_names:
-        start[model.state_names.index("n")] = 1e-3
-    trial = model.simulate(np.repeat(command[None], 300, axis=0), 0.1, start)
+        start[model.state_names.index("n")] = 0.0
+    trial = model.simulate(np.zeros((300, 2)), 0.1, start)
     assert np.all(np.diff(trial["u"]) < 0.0)
+
+
+@pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2"])
+def test_a_shaft_at_rest_is_the_limit_of_one_that_hardly_turns(name):
+    model = shipgym.load_model(name)
+
+    def rates(shaft):
+        state = dict(zip(model.state_names, model.service_state, strict=True))
+        state |= {"v": -0.5, "r": 0.004, "delta": 0.2} | ({"n": shaft} if "n" in state else {})
+        return model.derivatives(list(state.values()), [0.2, shaft])[3:6]
+
+    np.testing.assert_allclose(rates(0.0), rates(1e-9), rtol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["container", "tanker", "kvlcc2", "kvlcc2-l7"])

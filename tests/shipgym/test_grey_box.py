@@ -18,7 +18,7 @@ from shipgym.models import converted_model, grey_box
 from shipgym.models.checker import check_ship_model
 from shipgym.models.linear import nomoto
 from shipgym.models.scaling import scale_model
-from shipgym.models.structures import get_structure
+from shipgym.models.structures import get_structure, register_structure
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +99,12 @@ def test_accelerations_are_the_converted_ones_and_the_terms(bare: ShipModel, tan
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
 
+def test_the_grey_box_is_listed_among_the_structures() -> None:
+    assert "grey-box" in shipgym.list_structures()
+    with pytest.raises(InputError, match="Did you mean 'grey-box'"):
+        get_structure("gray-box")
+
+
 def test_a_grey_box_is_a_sound_ship_that_can_be_steered(bare: ShipModel, tanker: ShipModel) -> None:
     assert check_ship_model(bare).problems == ()
     ours, theirs = nomoto(bare), nomoto(tanker)
@@ -153,5 +159,7 @@ def test_what_cannot_be_a_reference_is_refused(bare: ShipModel, tanker: ShipMode
         grey_box("mariner", shaft=True)
     with pytest.raises(InputError, match="give the reference"):
         get_structure("grey-box")
+    with pytest.raises(InputError, match="'grey-box' found, which is another structure's"):
+        register_structure("grey-box", {"r": "r, delta"})
     with pytest.raises(InputError, match="expected 'acceleration'"):
         replace(grey_box(tanker), quantity="force")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, ManoeuvreError, Trial, manoeuvres
+from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
 from shipgym.manoeuvres.imo import overshoot_limits_deg
 
 
@@ -165,3 +165,17 @@ def test_a_little_helm_on_the_approach_is_no_order(mariner):
     trial = mariner.simulate(np.vstack([approach, turn]), 0.1).with_(kind="turning-circle")
     indices = manoeuvres.turning_indices(trial)
     assert indices.advance_lengths == pytest.approx(3.54, abs=0.03)
+
+
+def test_the_standard_manoeuvres_in_shallow_water():
+    """The tanker turns wider and later where there is little water under her keel."""
+    tanker = load_model("tanker")
+    name = "turning circle 35 deg to starboard"
+    deep, shallow = (manoeuvres.standard_manoeuvres(tanker, h)[name].judge(tanker) for h in (np.inf, 25.0))
+    assert shallow.tactical_diameter_lengths > 1.2 * deep.tactical_diameter_lengths
+    by_hand = manoeuvres.turning_circle(tanker, 35.0, 1500.0, 0.5, water_depth=25.0)
+    assert shallow.advance_lengths == pytest.approx(
+        manoeuvres.turning_indices(by_hand).advance_lengths, rel=1e-3
+    )
+    with pytest.raises(InputError, match="'mariner' is a deep-water model"):
+        manoeuvres.standard_manoeuvres(load_model("mariner"), 25.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
 from shipgym.simulation import open_loop
 
@@ -14,8 +15,8 @@ from shipgym.simulation import open_loop
     [
         ("tanker", 20.0, 1.0, r"row 0: rudder 20 found, expected rad \(not degrees\)"),
         ("tanker", 0.1, 80.0, r"row 0: shaft speed 80 found, expected 1/s \(not rpm\)"),
-        ("container", 0.1, -0.5, "shaft speed -0.5 found, .* between 0 and .* turning ahead"),
-        ("kvlcc2", 0.1, 0.0, "shaft speed 0 found, .* above 0, the shaft turning ahead"),
+        ("container", 0.1, -0.5, "shaft speed -0.5 found, .* >= 0: .* a shaft turning ahead only"),
+        ("kvlcc2", 0.1, 700.0, r"shaft speed 700 found, expected 1/s \(not rpm\) between 0 and 8\.893"),
     ],
 )
 def test_orders_out_of_range_are_told_with_their_row(name, rudder, shaft, said):
@@ -26,6 +27,50 @@ def test_orders_out_of_range_are_told_with_their_row(name, rudder, shaft, said):
 def test_a_rudder_ordered_beyond_its_limit_stays_at_the_limit():
     trial = load_model("mariner").simulate(np.full((400, 1), 1.0), 0.1)
     assert trial["delta"].max() == pytest.approx(np.radians(load_model("mariner").steering.rudder_limit_deg))
+
+
+@pytest.mark.parametrize(
+    ("state", "command", "said"),
+    [
+        ([0.0, 0.0, 0.0, np.nan, 0.0, 0.0, 0.0], [0.0], "state: nan found, expected finite numbers"),
+        ([0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0], [20.0], r"command: row 0: rudder 20 found, expected rad"),
+        ([0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0], [np.inf], "command: row 0 is not finite"),
+    ],
+)
+def test_derivatives_refuse_what_would_make_no_numbers(state, command, said):
+    with pytest.raises(InputError, match=said):
+        load_model("mariner").derivatives(state, command)
+
+
+@pytest.mark.parametrize(
+    ("depth", "said"),
+    [
+        (18.0, r"18 m found, expected more than the draught of 18\.46 m"),
+        (-3.0, "-3 found, expected a number > 0"),
+        (float("nan"), "nan found, expected a number > 0"),
+        ("20", "without quotes"),
+    ],
+)
+def test_a_depth_that_no_ship_floats_in_is_told(depth, said):
+    for sail in (manoeuvres.zigzag, manoeuvres.turning_circle, manoeuvres.direct_spiral):
+        with pytest.raises(InputError, match=f"water_depth: .*{said}"):
+            sail(load_model("tanker"), water_depth=depth)
+
+
+def test_a_ship_that_capsizes_is_an_error_even_if_nothing_else_feels_her_roll():
+    shipgym.register_structure("tender", {"v": "v", "r": "r, delta", "p": "p, phi, delta"})
+    ship = shipgym.ShipModel(
+        "tender", "tender", shipgym.Particulars(length=100.0, speed=5.0), shipgym.SteeringGear(),
+        {"b_v": -0.1, "c_r": -0.1, "c_d": 0.01, "d_p": -0.1, "d_f": 0.05, "d_d": 0.1},
+    )  # fmt: skip
+    with pytest.raises(UnstableModelError, match="phi = ") as error:
+        manoeuvres.turning_circle(ship, 20.0)
+    assert abs(error.value.state["phi"]) < np.pi / 2
+
+
+def test_a_step_that_is_far_too_long_is_suspected():
+    with pytest.raises(UnstableModelError, match="or the step is far too long"):
+        manoeuvres.zigzag(load_model("mariner"), dt=100.0)
 
 
 @pytest.mark.parametrize(

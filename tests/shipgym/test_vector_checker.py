@@ -3,9 +3,7 @@ import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-import shipgym  # noqa: F401 - registers the environments
-from shipgym import InputError
-from shipgym.envs.checker import check_vector_env
+from shipgym import InputError, check_vector_env
 
 
 def single():

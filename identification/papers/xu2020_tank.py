@@ -1,0 +1,218 @@
+"""The captive tests of Xu et al. 2020 in a virtual tank, and their reduction of 38 terms step by step.
+
+The ship is Table 11's; her mass, the amplitudes and periods of the tests and the noise are not printed. The
+steps are those of section 5: by type of test the terms to start from, printed with their standard errors.
+A coefficient that an equation shares with another (Y_vdot in X and N, X_udot in Y and N, ...) is known
+from the step before, so sway and yaw alone come before the second step of surge.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.forces import FORCES, ForceRegression, force_regression
+from identification.reduction import Reduction, backward_elimination
+from shipgym.models.pmm import PMM38, TABLE_11, xu_ship
+from shipgym.particulars import Particulars
+from shipgym.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
+from shipgym.trial import Trial
+
+Floats = NDArray[np.float64]
+
+#: A small research ship; the paper prints no particulars.
+PARTICULARS = Particulars(
+    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+)
+TANK = Tank(cycles=2, samples=500)
+NOISE = 0.015  # standard deviation of each force, in parts of its root mean square over all tests
+SEED = 2020
+
+# amplitude and period, s: surge in parts of the speed, drift in degrees, yaw rate as r'
+SURGE = ((0.1, 20.0), (0.2, 20.0), (0.2, 40.0))
+SWAY = ((10.0, 15.0), (20.0, 30.0), (30.0, 30.0), (20.0, 15.0))
+YAW = ((0.3, 15.0), (0.6, 30.0), (0.9, 30.0), (0.6, 10.0))
+MIXED = ((0.4, 5.0), (0.6, -10.0), (0.8, 15.0), (0.8, -20.0), (0.8, 25.0), (0.8, -25.0))  # r', drift
+MIXED_PERIOD = 20.0
+
+TOLERANCE, THRESHOLD = 1e-5, 0.05  # of an elimination: held-out R2, relative standard error
+#: Of terms that say the same the paper keeps the one that its damping matrix (equation 42) multiplies by u.
+CUBIC = ("uuu", "uvv", "uuv", "urr", "uur", "rvu")
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the reduction.
+
+    Attributes
+    ----------
+    table : int
+        Of the paper.
+    force : str
+        X, Y or N.
+    kinds : tuple of str
+        Types of test.
+    printed : dict of str to tuple of (float, float or None)
+        By coefficient its standard error, %, in the old and in the revised model; None where dropped.
+    """
+
+    table: int
+    force: str
+    kinds: tuple[str, ...]
+    printed: Mapping[str, tuple[float, float | None]]
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Of the old model."""
+        return tuple(self.printed)
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Of the revised model."""
+        return tuple(name for name, (_, revised) in self.printed.items() if revised is not None)
+
+
+def _step(table: int, force: str, kinds: str, printed: str) -> Step:
+    """A step from its table: term, old and revised error, separated by spaces, `-` where dropped."""
+    words = printed.split()
+    errors = {
+        f"{force}_{term}": (float(old), None if revised == "-" else float(revised))
+        for term, old, revised in zip(words[::3], words[1::3], words[2::3], strict=True)
+    }
+    return Step(table, force, tuple(kinds.split()), errors)
+
+
+ALL = "surge sway yaw mixed"
+#: Misprints of the tables: Table 8's r|v| is equation 33's r|r|, Table 9's v|r| is equation 35's v|v|.
+STEPS = (
+    _step(3, "X", "surge sway",
+          "udot .64 .65 uu 14.91 - uuu 14.9 7.23 vv 53.69 - uvv 14.15 1.6 u|v| 31.49 -"),
+    _step(5, "Y", "sway", "vdot .13 .14 uv 11.95 - uuv 10.48 .54 vvv 10.15 - v|v| 5.82 1.65"),
+    _step(6, "Y", "yaw", "rdot 3.41 3.56 ur 57.32 - uur 57.9 .14 rrr 2.64 - r|r| 2.09 2.36"),
+    _step(4, "X", ALL,
+          "udot .6 .61 uuu 1.49 1.29 uvv 1.54 1.76 rvu 4.89 .25 rv 29.68 - rr 3.13 - urr 3.07 2.33"),
+    _step(7, "Y", ALL,
+          "vdot .14 .14 uuv .18 .18 v|v| .28 .28 rdot 3.81 3.85 uur .25 .09 r|r| 10.66 - v|r| 5.95 -"
+          " r|v| .91 .91"),
+    _step(8, "N", "yaw", "rdot .11 .11 ur 17.21 - uur 17.15 .15 r|r| .74 .74"),
+    _step(9, "N", "sway", "vdot .55 .56 uv 13.23 - uuv 14.24 .33 v|v| 26.79 -"),
+    _step(10, "N", ALL,
+          "rdot .19 .19 uur .21 .2 r|r| 2.03 2.5 vdot .63 .65 uuv .11 .1 vrr 2.64 - vvr 9.63 - v|r| .79 .4"
+          " r|v| 1.42 .73"),
+)  # fmt: skip
+
+
+@cache
+def captive_tests() -> tuple[tuple[str, Trial], ...]:
+    """Type and trial of each test, without noise."""
+    ship, speed = xu_ship(PARTICULARS), PARTICULARS.require("speed")
+    rate = np.degrees(speed / PARTICULARS.length)
+    runs = [("surge", pure_surge(ship, part * speed, period, TANK)) for part, period in SURGE]
+    runs += [("sway", pure_sway(ship, speed * np.tan(np.radians(a)), period, TANK)) for a, period in SWAY]
+    runs += [("yaw", pure_yaw(ship, prime * rate, period, TANK)) for prime, period in YAW]
+    runs += [("mixed", yaw_with_drift(ship, r * rate, a, MIXED_PERIOD, TANK)) for r, a in MIXED]
+    return tuple(runs)
+
+
+@cache
+def full_regression() -> ForceRegression:
+    """The forces of all tests on the 38 coefficients, without noise."""
+    return force_regression([run for _, run in captive_tests()], PMM38, PARTICULARS)
+
+
+def truth(names: tuple[str, ...]) -> Floats:
+    """Coefficients of Table 11, 0 for those that it lacks."""
+    return np.array([TABLE_11.get(name, 0.0) for name in names])
+
+
+def noise_sizes() -> Floats:
+    """Standard deviation of the noise of X, Y and N, prime system, for `NOISE` 1, shape (3,)."""
+    regression = full_regression()
+    squares = [np.mean(regression.targets[regression.equation == i] ** 2) for i in range(len(FORCES))]
+    sizes: Floats = np.sqrt(np.array(squares))
+    return sizes
+
+
+def measured(sizes: Floats, seed: int = SEED) -> Floats:
+    """The forces with white noise of the given standard deviations of X, Y and N, shape (n_rows,)."""
+    regression = full_regression()
+    noise = np.random.default_rng(seed).standard_normal(len(regression))
+    forces: Floats = regression.targets + sizes[regression.equation] * noise
+    return forces
+
+
+def rows_of(force: str, kinds: tuple[str, ...]) -> NDArray[np.int64]:
+    """Rows of one force in tests of the given types, in the order of time within the tests.
+
+    So that each of the stretches that an elimination holds out has its part of every test.
+    """
+    regression = full_regression()
+    wanted = np.array([kind in kinds for kind, _ in captive_tests()])
+    rows = np.flatnonzero((regression.equation == FORCES.index(force)) & wanted[regression.trial])
+    counts = np.bincount(regression.trial[rows])
+    clock = np.concatenate([np.arange(n) / n for n in counts if n])
+    return rows[np.argsort(clock, kind="stable")]
+
+
+def eliminate(
+    forces: Floats, force: str, kinds: tuple[str, ...], terms: tuple[str, ...], known: Mapping[str, float]
+) -> Reduction:
+    """Leave-one-out of one force, the coefficients of others taken as known.
+
+    Parameters
+    ----------
+    forces : array of shape (n_rows,)
+        From `measured`.
+    force : str
+        X, Y or N.
+    kinds : tuple of str
+        Types of test.
+    terms : tuple of str
+        To start from. What these tests do not excite is left out.
+    known : dict of str to float
+        Coefficients that X, Y and N share.
+
+    Returns
+    -------
+    Reduction
+    """
+    regression, rows = full_regression(), rows_of(force, kinds)
+    column = {name: i for i, name in enumerate(regression.names)}
+    features = regression.features[rows]
+    others = [name for name in regression.names if name[0] != force and name in known]
+    targets = forces[rows] - features[:, [column[name] for name in others]] @ np.array(
+        [known[name] for name in others]
+    )
+    excited = tuple(name for name in terms if features[:, column[name]].any())
+    prefer = [f"{force}_{term}" for term in CUBIC]
+    X = features[:, [column[name] for name in excited]]
+    return backward_elimination(X, targets, excited, TOLERANCE, THRESHOLD, prefer)
+
+
+def step_by_step(forces: Floats) -> Iterator[tuple[Step, Reduction, dict[str, float]]]:
+    """Each step, its elimination and the coefficients known after it."""
+    known: dict[str, float] = {}
+    for step in STEPS:
+        found = eliminate(forces, step.force, step.kinds, step.terms, known)
+        known |= found.coefficients
+        yield step, found, dict(known)
+
+
+def final_terms(reductions: Mapping[int, Reduction]) -> set[str]:
+    """Terms of the model that the steps lead to: those of Tables 4, 7 and 10."""
+    return {name for table in (4, 7, 10) for name in reductions[table].terms}
+
+
+def all_at_once(forces: Floats, known: Mapping[str, float]) -> set[str]:
+    """Terms that are kept of all 38, each force from all tests at once."""
+    names = full_regression().names
+    kinds = tuple(ALL.split())
+    return {
+        name
+        for force in FORCES
+        for name in eliminate(forces, force, kinds, tuple(n for n in names if n[0] == force), known).terms
+    }

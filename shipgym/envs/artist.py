@@ -1,0 +1,100 @@
+"""What an environment's picture shows: the scene of one lane of an engine, and the wake behind its ship."""
+
+from __future__ import annotations
+
+from math import atan2, degrees, hypot, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.envs.engine import Engine
+from shipgym.envs.rendering import Renderer, Scene
+
+Floats = NDArray[np.float64]
+KNOT = 1852.0 / 3600.0  # m/s
+WAKE_POINTS = 400  # kept of the wake
+USUAL_BEAM = 0.15  # of the length, where the beam is not known
+
+
+class Artist:
+    """Draws one lane of an engine.
+
+    Parameters
+    ----------
+    mode : {"human", "rgb_array"}
+        See `Renderer`.
+    lane : int
+        Which lane.
+    """
+
+    def __init__(self, mode: str, lane: int = 0) -> None:
+        self._renderer = Renderer(mode)
+        self._lane = lane
+        self._wake: list[tuple[float, float]] = []
+
+    def begin(self, engine: Engine) -> None:
+        """Begin a new wake."""
+        self._wake = []
+        self.note(engine)
+
+    def note(self, engine: Engine) -> None:
+        """Note where the ship is."""
+        state = engine.physical_state()
+        self._wake.append((float(state["x"][self._lane]), float(state["y"][self._lane])))
+        del self._wake[:-WAKE_POINTS]
+
+    def picture(self, engine: Engine) -> NDArray[np.uint8]:
+        """The picture, uint8 array of shape (600, 600, 3)."""
+        return self._renderer.draw(scene(engine, self._lane, np.array(self._wake).reshape(-1, 2)))
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        self._renderer.close()
+
+
+def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
+    """What a picture of one lane shows."""
+    state = {name: float(values[lane]) for name, values in engine.physical_state().items()}
+    particulars = engine.model.particulars
+    length = particulars["length"]
+    corridor = getattr(engine.task, "corridor", None)
+    return Scene(
+        x=state["x"],
+        y=state["y"],
+        heading=state["psi"],
+        rudder=state["delta"],
+        length=length,
+        beam=particulars.get("beam") or USUAL_BEAM * length,
+        rudder_limit=engine.model.steering.limit,
+        wake=wake,
+        course_order=state["set_point"],
+        waypoints=engine.waypoints(lane),
+        corridor=None if corridor is None else corridor * length,
+        wind=_wind(state),
+        current=_current(state),
+        readouts=_readouts(engine, lane, state),
+    )
+
+
+def _wind(state: dict[str, float]) -> tuple[float, float] | None:
+    speed = state.get("wind_speed", 0.0)
+    return (speed, state["wind_from"]) if speed else None
+
+
+def _current(state: dict[str, float]) -> tuple[float, float] | None:
+    north, east = state.get("current_north", 0.0), state.get("current_east", 0.0)
+    return (hypot(north, east), atan2(east, north)) if north or east else None
+
+
+def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
+    """Speed, errors and the last reward."""
+    speed = hypot(state["u"], state["v"])
+    error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
+    lines = {
+        "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
+        "heading error": f"{degrees(error):+.1f} deg",
+        "rudder": f"{degrees(state['delta']):+.1f} deg",
+    }
+    if "cross_track" in engine.task.info_names:
+        lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
+    return {**lines, "reward": f"{engine.shown.outcomes[0, lane]:+.3f}"}

@@ -1,0 +1,366 @@
+"""Many ships at once under a task, without Gymnasium's clothes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import gymnasium
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.envs.stability import refuse_unstable
+from shipgym.envs.task import Task
+from shipgym.envs.variety import SmallFleet, Variety
+from shipgym.errors import InputError
+from shipgym.kernels import layout, weather_rows
+from shipgym.kernels import voyage_rows as rows
+from shipgym.models import ShipModel
+from shipgym.simulation.weather_column import weather_column
+
+Floats = NDArray[np.float64]
+Observation = NDArray[np.float32]
+STAY, NEXT_STEP, SAME_STEP = range(3)  # as in `shipgym.kernels.episodes`
+STEP_OUTCOME = 3  # reward, terminated, truncated come before what is in `info`
+
+
+class Shown(NamedTuple):
+    """What a step of all lanes shows.
+
+    Attributes
+    ----------
+    observations : float32 array of shape (num_envs, n_observations)
+    outcomes : float64 array of shape (n_outcomes, num_envs)
+        Reward, terminated, truncated, then what is in `info`.
+    """
+
+    observations: Observation
+    outcomes: Floats
+
+
+class Engine:
+    """A task for many ships at once.
+
+    Parameters
+    ----------
+    models : ShipModel or sequence of ShipModel
+        One ship for all, or one for each lane; all of one structure.
+    num_envs : int
+        Number of lanes.
+    task : Task
+        What is asked.
+    variety : Variety, optional
+        What differs from episode to episode; only with one ship for all.
+    allow_unstable : bool
+        Whether a model that was found unstable when it was identified may be used.
+    threads : int
+        Number of threads that share the lanes; the results do not depend on it.
+
+    Raises
+    ------
+    InputError
+        If `num_envs` is not positive, the number of models or their structures do not fit, a ship's
+        particulars are not enough for the weather, or a model is unstable.
+    """
+
+    def __init__(
+        self,
+        models: ShipModel | Sequence[ShipModel],
+        num_envs: int,
+        task: Task,
+        variety: Variety | None = None,
+        allow_unstable: bool = False,
+        threads: int = 1,
+    ) -> None:
+        _check_count(num_envs, "num_envs")
+        _check_count(threads, "threads")
+        fleet = [models] if isinstance(models, ShipModel) else list(models)
+        if len(fleet) not in (1, num_envs):
+            raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
+        self.model = fleet[0]
+        refuse_unstable(fleet, allow_unstable)
+        if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
+            raise InputError("models: of several structures, expected one structure in one engine")
+        task.check_fits(self.model)
+        self.num_envs = num_envs
+        self.task = task
+        self.dt = task.interval(self.model)
+        self.pool = (variety or Variety()).ships(self.model, task.seas)
+        drawn = len(self.pool) > 1
+        if drawn and len(fleet) > 1:
+            raise InputError("models: several lanes' ships and a variety of ships, expected one of the two")
+        self.windy = any(not sea.calm for _, sea in self.pool)
+        self._kernel = self.model.kernel("episodes", self.windy, task.kernel)
+        self._settings = task.settings(self.model)
+        self._allocate(fleet, drawn)
+        self._team = _Team(len(self._states), threads)
+        self.reset(np.arange(num_envs))
+
+    def _allocate(self, fleet: list[ShipModel], drawn: bool) -> None:
+        """Arrays that the kernels work on."""
+        tiles = -(-self.num_envs // layout.LANES)
+        own = self.pool if drawn else [(model, self.task.seas[0]) for model in fleet]
+        columns = _ship_columns(own, self.windy, self.task, self.model, drawn)
+        self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
+        self._ships = _ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
+        self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
+        self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
+        self._actions = np.zeros((2 if self.task.action == "rudder-shaft" else 1, self.num_envs), np.float32)
+        self._world = (
+            self._states, self._keys, self._settings, self._pool, self._ships, self._actions,
+        )  # fmt: skip
+        self.shown = self._nothing_shown()
+        self._last = self._nothing_shown()
+
+    def _nothing_shown(self) -> Shown:
+        n_shown = int(self._settings[rows.N_SHOWN])
+        n_outcomes = STEP_OUTCOME + len(self.task.info_names)
+        observations = np.empty((self.num_envs, n_shown), dtype=np.float32)
+        return Shown(observations, np.empty((n_outcomes, self.num_envs)))
+
+    def reset(self, seeds: ArrayLike) -> Observation:
+        """Begin in each lane the episode of the single environment's `reset(seed=...)`.
+
+        Parameters
+        ----------
+        seeds : array-like of int, shape (num_envs,)
+            Seed of each lane.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, n_observations)
+        """
+        return self.begin(episode_keys(seeds))
+
+    def begin(self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
+        """Begin an episode in each lane.
+
+        Parameters
+        ----------
+        keys : array-like of uint64, shape (num_envs,)
+            Of the random numbers of each lane (`episode_keys`); an episode is a function of its key and
+            number alone.
+        episodes : array-like of int, shape (num_envs,)
+            Number of the episode under that key.
+        mask : array-like of bool, shape (num_envs,)
+            Lanes to begin anew; the others go on.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, n_observations)
+        """
+        which = np.zeros(self.num_envs, dtype=np.bool_)
+        which[:] = mask
+        for row, words in enumerate((keys, episodes)):
+            lanes = self._keys[:, row].reshape(-1)  # a copy
+            lanes[: self.num_envs][which] = np.broadcast_to(
+                np.asarray(words).astype(np.uint64), (self.num_envs,)
+            )[which]
+            self._keys[:, row] = lanes.reshape(-1, layout.LANES)
+        self._kernel.reset(
+            self._states, self._keys, self._settings, self._pool, self._ships, which, *self.shown
+        )
+        return self.observations
+
+    @property
+    def episodes(self) -> NDArray[np.uint64]:
+        """Number of each lane's episode under its key, shape (num_envs,), a copy."""
+        return self._keys[:, 1].reshape(-1)[: self.num_envs].copy()
+
+    @property
+    def steps(self) -> Floats:
+        """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
+        return self.outcome(rows.STEPS)
+
+    def order(self, actions: ArrayLike) -> None:
+        """Set the commands for the next step.
+
+        Parameters
+        ----------
+        actions : array-like of shape (num_envs, n_commands), or (num_envs,) of int for discrete ones
+            Commanded rudder, and shaft speed, parts of their limits, clipped to [-1, 1].
+
+        Raises
+        ------
+        InputError
+            If an action is not a number or their shape is another.
+        """
+        array = np.asarray(actions, dtype=np.float32)
+        expected = (self.num_envs, len(self._actions))
+        if array.shape != expected:
+            raise InputError(f"actions: shape {array.shape} found, expected {expected}")
+        if not np.isfinite(array).all():
+            lane, which = np.argwhere(~np.isfinite(array))[0]
+            raise InputError(
+                f"actions: {array[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
+            )
+        self._actions[:] = array.T
+
+    def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
+        """One control interval; a lane whose episode is over stays as it is and earns 0.
+
+        Parameters
+        ----------
+        actions : array-like of shape (num_envs, n_commands)
+            See `order`.
+
+        Returns
+        -------
+        observations : float32 array of shape (num_envs, n_observations)
+        rewards : array of shape (num_envs,)
+        terminated, truncated : bool arrays of shape (num_envs,)
+
+        Raises
+        ------
+        InputError
+            If an action is not a number or their shape is another.
+        """
+        self.order(actions)
+        self.advance()
+        rewards, terminated, truncated = self.shown.outcomes[:STEP_OUTCOME]
+        return self.observations, rewards.copy(), terminated > 0.0, truncated > 0.0
+
+    def advance(self, autoreset: int = STAY) -> None:
+        """One control interval with the commands as they stand, shown in the same arrays as the last."""
+        self._team.share(self._kernel.step, (*self._world, *self.shown, *self._last), autoreset)
+
+    def show_anew(self) -> None:
+        """Let what comes next be shown in new arrays, so that the last ones may be kept."""
+        self.shown = self._nothing_shown()
+
+    @property
+    def last_shown(self) -> Shown:
+        """What lanes whose episode ended in the last step showed then, if the next has begun; a view."""
+        return self._last
+
+    @property
+    def command(self) -> Observation:
+        """Commands of the next step, shape (n_commands, num_envs); may be written."""
+        return self._actions
+
+    @property
+    def observations(self) -> Observation:
+        """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
+        return self.shown.observations.copy()
+
+    def outcome(self, row: int) -> Floats:
+        """One row of the kernel's state for each lane, shape (num_envs,), a copy."""
+        return self._states[:, row : row + layout.LANES].reshape(-1)[: self.num_envs].copy()
+
+    def info(self, name: str) -> Floats:
+        """One entry of `info` for each lane, shape (num_envs,), a view of the last step."""
+        row: Floats = self.shown.outcomes[STEP_OUTCOME + self.task.info_names.index(name)]
+        return row
+
+    @property
+    def reward_parts(self) -> Floats:
+        """Parts of the last rewards in the order of the task's, shape (num_envs, n_parts)."""
+        return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
+
+    def physical_state(self) -> dict[str, Floats]:
+        """State, course, commands and, unless it is calm, the weather, SI units, each of shape (num_envs,).
+
+        Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
+        the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
+        """
+        offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
+        state = {
+            name: self.outcome(offsets[row])
+            for name, row in zip(self.model.state_names, self.model.kernel_names, strict=True)
+        }
+        state["set_point"] = self.outcome(rows.COURSE)
+        state["delta_command"] = self.outcome(rows.RUDDER_COMMAND) * self._ship_row(layout.RUDDER_LIMIT)
+        if "n" in self.model.command_names:
+            state["n_command"] = self.outcome(rows.SHAFT_COMMAND) * self._ship_row(layout.SERVICE_SHAFT)
+        return {**state, **self._weather_now()} if self.windy else state
+
+    def _weather_now(self) -> dict[str, Floats]:
+        """What the weather is in each lane, by the names of the channels of trials."""
+        waves = {"psi_wave": weather_rows.PSI_WAVE, "r_wave": weather_rows.R_WAVE}
+        if "phi" in self.model.state_names:
+            waves |= {"phi_wave": weather_rows.PHI_WAVE, "p_wave": weather_rows.P_WAVE}
+        currents = {"current_north": weather_rows.CURRENT_NORTH, "current_east": weather_rows.CURRENT_EAST}
+        now = {name: self.outcome(row) for name, row in (waves | currents).items()}
+        now["wind_speed"] = self._ship_row(weather_rows.WIND_SPEED) + self.outcome(weather_rows.GUST)
+        east, north = self.outcome(weather_rows.WIND_EAST), self.outcome(weather_rows.WIND_NORTH)
+        return {**now, "wind_from": np.arctan2(east, north)}
+
+    def _ship_row(self, row: int) -> Floats:
+        """One row of the ships for each lane, shape (num_envs,)."""
+        lanes = self._ships[:, row : row + layout.LANES]
+        return np.broadcast_to(lanes, (len(self._states), layout.LANES)).reshape(-1)[: self.num_envs]
+
+    def waypoints(self, lane: int = 0) -> Floats | None:
+        """North and east of the path of a lane's episode, m, shape (n, 2); None where there is none."""
+        count = self.task.episode_rows()
+        if count == 0:
+            return None
+        tile, lane = divmod(lane, layout.LANES)
+        return self._states[tile, rows.END :].reshape(count // 2, 2, layout.LANES)[:, :, lane].copy()
+
+
+class _Team:
+    """Threads that share the tiles of an engine; the first share is done by the thread that asks."""
+
+    def __init__(self, tiles: int, threads: int) -> None:
+        count = min(threads, tiles)
+        bounds = np.linspace(0, tiles, count + 1).astype(int).tolist()
+        self._own, *self._others = list(pairwise(bounds))
+        self._pool = ThreadPoolExecutor(len(self._others), "shipgym") if self._others else None
+
+    def share(self, step: Any, arguments: tuple[Any, ...], autoreset: int) -> None:
+        """Run a kernel that releases the interpreter on all tiles."""
+        if self._pool is None:
+            step(*arguments, *self._own, autoreset)
+            return
+        waiting = [self._pool.submit(step, *(*arguments, *bounds, autoreset)) for bounds in self._others]
+        step(*arguments, *self._own, autoreset)
+        for share in waiting:
+            share.result()
+
+
+def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
+    """Keys of the kernels' random numbers for seeds of environments, of the same shape."""
+    array = np.asarray(seeds)
+    keys = [episode_key(gymnasium.utils.seeding.np_random(int(seed))[0]) for seed in array.ravel()]
+    return np.array(keys, dtype=np.uint64).reshape(array.shape)
+
+
+def episode_key(random: np.random.Generator) -> int:
+    """All that an environment's generator is asked for."""
+    return int(random.integers(2**63))
+
+
+def _check_count(count: Any, name: str) -> None:
+    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
+        raise InputError(f"{name}: {count!r} found, expected a whole number of at least 1")
+
+
+def _ship_columns(own: SmallFleet, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:
+    """Ships and their weather as the kernels read them, a row each; the weather worked out once a kind.
+
+    Ships that are drawn for an episode are seen in the scales of the environment's model.
+    """
+    known: dict[tuple[int, int], Floats] = {}
+    columns = []
+    for model, sea in own:
+        kind = (id(model.particulars), id(sea))
+        if windy and kind not in known:
+            known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
+        column = model.ship_column(task.water_depth, known.get(kind))
+        if drawn and model.particulars["length"] == base.particulars["length"]:
+            column[layout.row(layout.SCALE_SPEED)] = base.particulars["speed"]
+        columns.append(column)
+    return np.stack(columns)
+
+
+def _ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
+    """One tile for all lanes, or a column for each."""
+    if len(columns) == 1:
+        tile = np.repeat(columns[0], layout.LANES)[None]
+        return np.tile(tile, (tiles, 1)) if own else tile
+    rest = np.tile(columns[:1], (tiles * layout.LANES - len(columns), 1))
+    lanes = np.concatenate([columns, rest])
+    return np.ascontiguousarray(lanes.reshape(tiles, layout.LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)

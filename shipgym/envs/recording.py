@@ -1,0 +1,274 @@
+"""Episodes of an environment written to files, to be replayed and identified again."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from glob import escape
+from pathlib import Path
+from typing import Any, SupportsFloat, TypeVar
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_text
+from shipgym.episode import Episode
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+Observation = TypeVar("Observation")
+Action = TypeVar("Action")
+
+REWARD = "reward_"  # how the names of the parts of the reward begin in info
+SUCCESS = ("success", "is_success")
+
+
+class RecordEpisode(
+    gymnasium.Wrapper[Observation, Action, Observation, Action], gymnasium.utils.RecordConstructorArgs
+):
+    """Writes what happened in each episode to a file of its own, `episode-00000.json` and so on.
+
+    A file is written whole when its episode ends. One that is cut off by `reset` or `close` is written as
+    well, neither terminated nor truncated, if it has a step.
+
+    Parameters
+    ----------
+    env : gymnasium.Env
+        A single environment of shipgym, in other wrappers or not.
+    folder : str or Path
+        Where the files go; made if it does not exist.
+    episode_trigger : callable of int, optional
+        Given the number of an episode, counted from 0, whether to record it. All by default.
+    trials : bool
+        Whether each episode is written as a trial too, `episode-00000.csv`, if it has two steps.
+    name_prefix : str
+        How the names of the files begin.
+    overwrite : bool
+        Whether files of an earlier recording may be replaced.
+
+    Raises
+    ------
+    InputError
+        If the environment is none of shipgym's, the folder cannot be made, or it holds recordings already.
+    """
+
+    def __init__(
+        self,
+        env: gymnasium.Env[Observation, Action],
+        folder: str | Path,
+        episode_trigger: Callable[[int], bool] | None = None,
+        *,
+        trials: bool = False,
+        name_prefix: str = "episode",
+        overwrite: bool = False,
+    ) -> None:
+        gymnasium.utils.RecordConstructorArgs.__init__(
+            self,
+            folder=str(folder),
+            episode_trigger=episode_trigger,
+            trials=trials,
+            name_prefix=name_prefix,
+            overwrite=overwrite,
+        )
+        _check_environment(env)
+        super().__init__(env)
+        self.episode_number = -1
+        self._trigger = episode_trigger
+        self._trials = trials
+        self._prefix = name_prefix
+        self._folder = _folder(Path(folder), name_prefix, overwrite)
+        self._since_seed = -1
+        self._recorded: _Recorded | None = None
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode, after writing one that is cut off so."""
+        self._write()
+        observation, info = super().reset(seed=seed, options=options)
+        self.episode_number += 1
+        self._since_seed = 0 if seed is not None else self._since_seed + 1
+        if self._trigger is None or self._trigger(self.episode_number):
+            self._recorded = _Recorded(self.env, self._since_seed, info)
+        return observation, info
+
+    def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """One step; the one that ends an episode writes its files."""
+        observation, reward, terminated, truncated, info = super().step(action)
+        if self._recorded is not None:
+            self._recorded.add(action, float(reward), terminated, truncated, info)
+            if terminated or truncated:
+                self._write()
+        return observation, reward, terminated, truncated, info
+
+    def close(self) -> None:
+        """Close the environment, after writing an episode that is cut off so."""
+        self._write()
+        super().close()
+
+    def _write(self) -> None:
+        recorded, self._recorded = self._recorded, None
+        if recorded is None or not recorded.rewards:
+            return
+        name = f"{self._prefix}-{self.episode_number:05d}"
+        episode = recorded.episode()
+        episode.save(self._folder / f"{name}.json")
+        if self._trials and episode.n_steps > 1:
+            episode.to_trial(name).to_csv(self._folder / f"{name}.csv")
+
+
+class _Recorded:
+    """An episode as far as it has come.
+
+    Path and ship are taken at its beginning, because the next reset may change them.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]) -> None:
+        ship: Any = env.unwrapped
+        self.rewards: list[float] = []
+        self._ship, self._model = ship, ship.model
+        self._states: list[dict[str, float]] = [ship.physical_state()]
+        self._actions: list[Floats] = []
+        self._commands: list[dict[str, float]] = []
+        self._parts: list[dict[str, float]] = []
+        self._info = [_numbers(info)]
+        self._outcome: dict[str, Any] = {}
+        self._rudder_actions = _are_rudders(env, ship)
+        waypoints = getattr(ship, "waypoints", None)
+        spec = env.spec
+        self._facts: dict[str, Any] = {
+            "environment": type(ship).__name__ if spec is None else spec.id,
+            "arguments": {} if spec is None else plain(spec.kwargs),
+            "model": self._model.name,
+            "seed": _seed(ship),
+            "number": since_seed,
+            "dt": float(ship.dt),
+            "length": self._model.particulars["length"],
+            "beam": self._model.particulars["beam"],
+            "rudder_limit": math.radians(self._model.steering.rudder_limit_deg),
+            "waypoints": None if waypoints is None else np.array(waypoints, dtype=float),
+            "corridor": getattr(ship, "corridor", None),
+        }
+
+    def add(
+        self, action: Any, reward: float, terminated: bool, truncated: bool, info: Mapping[str, Any]
+    ) -> None:
+        """One more step and what came of it."""
+        state = self._ship.physical_state()
+        numbers = np.array(action, dtype=float).reshape(-1)
+        self.rewards.append(reward)
+        self._states.append(state)
+        self._actions.append(numbers)
+        self._commands.append(self._ordered(state, numbers))
+        self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
+        self._info.append(_numbers(info))
+        said = next((info[key] for key in SUCCESS if key in info), None)
+        self._outcome = {
+            "terminated": bool(terminated),
+            "truncated": bool(truncated),
+            "success": None if said is None else bool(said),
+        }
+
+    def _ordered(self, state: Mapping[str, float], numbers: Floats) -> dict[str, float]:
+        """What was ordered in SI units: as the environment tells, or else as its actions say."""
+        told = {name: state[f"{name}_command"] for name in ("delta", "n") if f"{name}_command" in state}
+        if "delta" not in told and self._rudder_actions:
+            told["delta"] = float(np.clip(numbers[0], -1.0, 1.0)) * self._facts["rudder_limit"]
+        if "n" not in told and "n" in self._model.command_names and len(numbers) == 1:
+            told["n"] = self._model.service_shaft_speed
+        return told
+
+    def episode(self) -> Episode:
+        """All of it."""
+        return Episode(
+            states=_columns(self._states),
+            actions=np.array(self._actions),
+            rewards=np.array(self.rewards),
+            commands=_columns(self._commands),
+            reward_parts=_columns(self._parts),
+            info=_columns(self._info),
+            **self._facts,
+            **self._outcome,
+        )
+
+
+def _are_rudders(env: gymnasium.Env[Any, Any], ship: Any) -> bool:
+    """Whether an action is, without a wrapper in between that changes it, parts of the rudder limit."""
+    space = env.action_space
+    return (
+        isinstance(space, gymnasium.spaces.Box)
+        and space == ship.action_space
+        and space.low.reshape(-1)[0] == -1.0
+        and space.high.reshape(-1)[0] == 1.0
+    )
+
+
+def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
+    """What `info` tells in single finite numbers, without the parts of the reward and the success."""
+    return {
+        key: float(value)
+        for key, value in info.items()
+        if not key.startswith(REWARD)
+        and key not in SUCCESS
+        and isinstance(value, (bool, int, float, np.number, np.bool_))
+        and math.isfinite(value)
+    }
+
+
+def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
+    """Values over time by name; a name that some step lacks is left out."""
+    names = [name for name in rows[-1] if all(name in row for row in rows)]
+    return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
+
+
+def _seed(ship: Any) -> int | None:
+    """Seed of the environment's random numbers, None where its generator was put in by hand."""
+    seed = ship.np_random_seed
+    return None if seed is None or seed < 0 else int(seed)
+
+
+def _check_environment(env: Any) -> None:
+    if not isinstance(env, gymnasium.Env):
+        raise InputError(f"env: {env!r} found, expected a single environment; give each its own recorder")
+    for name in ("physical_state", "model", "dt"):
+        if not hasattr(env.unwrapped, name):
+            raise InputError(f"env: {env.unwrapped} has no '{name}', expected an environment of shipgym")
+
+
+def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
+    if Path(check_text(prefix, "name_prefix")).name != prefix:
+        raise InputError(f"name_prefix: {prefix!r} found, expected the beginning of a file's name")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"folder: {folder} cannot be made ({error.strerror})") from None
+    there = next(iter(sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))), None)
+    if there is not None and not overwrite:
+        raise InputError(
+            f"folder: {folder} holds '{there.name}' of an earlier recording; choose another folder or "
+            "overwrite=True"
+        )
+    return folder
+
+
+def plain(value: Any) -> Any:
+    """An argument of an environment as JSON can hold it: a model by its name, a weather by its fields."""
+    if isinstance(value, ShipModel):
+        return value.name
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if value is None or isinstance(value, (bool, int, str)):
+        return value
+    if isinstance(value, float):
+        return value if math.isfinite(value) else repr(value)
+    if isinstance(value, Mapping):
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(entry) for entry in value]
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if hasattr(value, "to_dict"):
+        return plain(value.to_dict())
+    return str(value)

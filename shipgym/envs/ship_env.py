@@ -1,0 +1,243 @@
+"""What the environments have in common: one ship under a task, in Gymnasium's clothes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import isfinite
+from pathlib import Path
+from typing import Any, ClassVar, SupportsFloat
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_keys
+from shipgym.envs.engine import STEP_OUTCOME, Engine, episode_key
+from shipgym.envs.task import RUDDER_ORDERS, Task
+from shipgym.envs.variety import Variety
+from shipgym.errors import InputError
+from shipgym.models import ShipModel, load_model
+
+Floats = NDArray[np.float64]
+Observation = NDArray[np.float32]
+Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
+DEFAULT_MODEL = "mariner-tls-svm"
+ENV_OPTIONS = ("model", "render_mode", "allow_unstable")
+
+
+def read_options(
+    task_type: type[Task], model: str | Path | ShipModel, options: Mapping[str, Any]
+) -> tuple[ShipModel, Task, Variety]:
+    """The ship, the task and the variety that an environment's keywords name.
+
+    Raises
+    ------
+    InputError
+        For an unknown model or keyword, or a value out of its range.
+    """
+    known = [*ENV_OPTIONS, *task_type.__dataclass_fields__, *Variety.names()]
+    check_keys(options, known, "environment options")
+    variety, rest = Variety.take_from(options)
+    ship = model if isinstance(model, ShipModel) else load_model(model)
+    return ship, task_type.from_options(rest), variety
+
+
+def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
+    """Observation and action space of a task for a ship."""
+    observed = task.observed(model)
+    low, high = (
+        np.array([getattr(quantity, bound) for quantity in observed], dtype=np.float32)
+        for bound in ("low", "high")
+    )
+    commands = 2 if task.action == "rudder-shaft" else 1
+    actions: Space = gymnasium.spaces.Box(-1.0, 1.0, (commands,), dtype=np.float32)
+    if task.action == "rudder-discrete":
+        actions = gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
+    return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
+
+
+class ShipEnv(gymnasium.Env[Observation, Any]):
+    """One ship under a task; the environments differ by `task_type` alone.
+
+    Parameters
+    ----------
+    model : str, Path or ShipModel
+        A shipped model's name, the path of a model file, or a model.
+    render_mode : {None, "human", "rgb_array"}
+        As Gymnasium has it.
+    allow_unstable : bool
+        Whether a model that was found unstable when it was identified may be used.
+    **options
+        Fields of the environment's task and of `shipgym.envs.variety.Variety`.
+
+    Raises
+    ------
+    InputError
+        For an unknown model or keyword, or an argument out of its range.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
+    task_type: ClassVar[type[Task]] = Task
+
+    def __init__(
+        self,
+        model: str | Path | ShipModel = DEFAULT_MODEL,
+        render_mode: str | None = None,
+        allow_unstable: bool = False,
+        **options: Any,
+    ) -> None:
+        self.render_mode = render_mode
+        self._artist = _artist(render_mode)
+        self.model, self.task, variety = read_options(self.task_type, model, options)
+        seen, commands = spaces(self.task, self.model)
+        self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
+        observed = self.task.observed(self.model)
+        self.observation_names = tuple(quantity.name for quantity in observed)
+        self.observation_scales = np.array([quantity.scale for quantity in observed])
+        self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
+        self._seen, self._outcomes = self._engine.shown
+        self._command = self._engine.command[:, 0]
+        self._names, self._flags = self.task.info_names, sorted(self.task.flags)
+        self._key = 0
+        self._episode = -1
+
+    @property
+    def dt(self) -> float:
+        """Control interval, s."""
+        return self._engine.dt
+
+    @property
+    def waypoints(self) -> Floats | None:
+        """North and east of this episode's path, m, shape (n, 2); None in course keeping."""
+        return self._engine.waypoints()
+
+    @property
+    def corridor(self) -> float | None:
+        """Half the width of the corridor along the path, m; None in course keeping."""
+        width = getattr(self.task, "corridor", None)
+        return None if width is None else float(width * self.model.particulars["length"])
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Begin an episode, straight ahead at service speed.
+
+        Parameters
+        ----------
+        seed : int, optional
+            Fixes this episode and all that follow it.
+        options : dict, optional
+            None are known.
+
+        Returns
+        -------
+        observation : float32 array
+        info : dict
+            As `step` has it, the parts of the reward 0.
+
+        Raises
+        ------
+        InputError
+            If there are options.
+        """
+        super().reset(seed=seed)
+        if options:
+            raise InputError(f"options: {options!r} found, expected none")
+        if seed is not None or self._episode < 0:
+            self._key = episode_key(self.np_random)
+            self._episode = -1
+        self._episode += 1
+        self._engine.begin([self._key], [self._episode])
+        if self._artist is not None:
+            self._artist.begin(self._engine)
+        if self.render_mode == "human":
+            self.render()
+        return self._seen[0].copy(), self._info(self._outcomes[STEP_OUTCOME:, 0].tolist())
+
+    def step(self, action: Any) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+        """Hold a command over one control interval.
+
+        Parameters
+        ----------
+        action : array of shape (n_commands,), or int
+            Commanded rudder, and shaft speed, parts of their limits, clipped to [-1, 1]; or the number of a
+            rudder order.
+
+        Returns
+        -------
+        observation : float32 array
+        reward : float
+        terminated, truncated : bool
+        info : dict
+            The parts of the reward, `heading_error` in rad, `envelope_distance`, `extrapolating`, and what
+            the environment's page names.
+
+        Raises
+        ------
+        InputError
+            If the action is not a finite number for each command.
+        """
+        self._order(action)
+        self._engine.advance()
+        reward, terminated, truncated, *rest = self._outcomes[:, 0].tolist()
+        if self._artist is not None:
+            self._artist.note(self._engine)
+        if self.render_mode == "human":
+            self.render()
+        return self._seen[0].copy(), reward, terminated > 0.0, truncated > 0.0, self._info(rest)
+
+    def _info(self, values: list[float]) -> dict[str, Any]:
+        info: dict[str, Any] = dict(zip(self._names, values, strict=True))
+        for flag in self._flags:
+            info[flag] = info[flag] > 0.0
+        return info
+
+    def _order(self, action: Any) -> None:
+        """Set the command, refusing what is none."""
+        if self.task.action == "rudder-discrete":
+            self._command[0] = RUDDER_ORDERS[_one_order(action)]
+            return
+        array = action if isinstance(action, np.ndarray) else np.asarray(action, dtype=np.float32)
+        if array.shape != self._command.shape:
+            what = "the commanded rudder" + (" and shaft speed" if len(self._command) > 1 else "")
+            raise InputError(f"action: shape {array.shape} found, expected {self._command.shape}: {what}")
+        for k, number in enumerate(array.tolist()):
+            if not isfinite(number):
+                raise InputError(f"action: {number} found, expected numbers in [-1, 1]: parts of the limit")
+            self._command[k] = number
+
+    def physical_state(self) -> dict[str, float]:
+        """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
+        return {name: float(value[0]) for name, value in self._engine.physical_state().items()}
+
+    def render(self) -> Any:
+        """The ship on her chart, uint8 array of shape (600, 600, 3); None without a render mode."""
+        if self._artist is None:
+            return None
+        picture = self._artist.picture(self._engine)
+        return picture if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Close the window, if there is one."""
+        if self._artist is not None:
+            self._artist.close()
+
+
+def _one_order(action: Any) -> int:
+    """The number of a discrete rudder order."""
+    array = np.asarray(action)
+    if array.shape != () or array.dtype.kind not in "iu" or not 0 <= array < len(RUDDER_ORDERS):
+        raise InputError(
+            f"action: {action!r} found, expected a whole number from 0 to {len(RUDDER_ORDERS) - 1}: "
+            "a rudder order"
+        )
+    return int(array)
+
+
+def _artist(render_mode: str | None) -> Any:
+    """Who draws, if anyone does."""
+    if render_mode is None:
+        return None
+    from shipgym.envs.artist import Artist
+
+    return Artist(render_mode)

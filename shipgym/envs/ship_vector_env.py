@@ -1,0 +1,266 @@
+"""Many ships under a task as one of Gymnasium's vector environments, on the compiled kernels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from shipgym.checks import check_keys, quoted
+from shipgym.envs.engine import NEXT_STEP, SAME_STEP, STAY, STEP_OUTCOME, Engine, episode_key, episode_keys
+from shipgym.envs.ship_env import DEFAULT_MODEL, read_options, spaces
+from shipgym.envs.task import RUDDER_ORDERS, Task
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Observation = NDArray[np.float32]
+Infos = dict[str, Any]
+
+ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
+KERNEL_MODES = {
+    AutoresetMode.DISABLED: STAY,
+    AutoresetMode.NEXT_STEP: NEXT_STEP,
+    AutoresetMode.SAME_STEP: SAME_STEP,
+}
+
+
+class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
+    """Many ships under a task; row i is the single environment reset with `seed + i`, bit for bit.
+
+    Parameters
+    ----------
+    num_envs : int
+        Number of rows.
+    model : str, Path or ShipModel
+        A shipped model's name, the path of a model file, or a model.
+    render_mode : {None, "rgb_array"}
+        Whether `render` gives pictures.
+    allow_unstable : bool
+        Whether a model that was found unstable when it was identified may be used.
+    autoreset_mode : AutoresetMode or str
+        When the next episode of a row begins.
+    threads : int
+        Number of threads that share the rows; the results do not depend on it.
+    **options
+        As for the single environment.
+
+    Raises
+    ------
+    InputError
+        For an unknown model or keyword, or an argument out of its range.
+    """
+
+    task_type: ClassVar[type[Task]] = Task
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        model: str | Path | ShipModel = DEFAULT_MODEL,
+        render_mode: str | None = None,
+        allow_unstable: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+        **options: Any,
+    ) -> None:
+        mode = _mode(autoreset_mode)
+        self.model, self.task, variety = read_options(self.task_type, model, options)
+        self._engine = Engine(self.model, num_envs, self.task, variety, allow_unstable, threads)
+        self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
+        self.render_mode = render_mode
+        self._artists = _artists(render_mode, num_envs)
+        self.num_envs = int(num_envs)
+        self.single_observation_space, self.single_action_space = spaces(self.task, self.model)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        observed = self.task.observed(self.model)
+        self.observation_names = tuple(quantity.name for quantity in observed)
+        self.observation_scales = np.array([quantity.scale for quantity in observed])
+        self._mode = KERNEL_MODES[mode]
+        self._everyone = np.ones(self.num_envs, dtype=np.bool_)
+        self._everyone.flags.writeable = False
+        self._keys: NDArray[np.uint64] | None = None
+
+    @property
+    def dt(self) -> float:
+        """Control interval, s."""
+        return self._engine.dt
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, Infos]:
+        """Begin an episode in each row.
+
+        Parameters
+        ----------
+        seed : int or sequence of int or None, optional
+            Row i has the seed `seed + i`, or number i of the sequence. Without one the next episodes begin.
+        options : dict, optional
+            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the others go on.
+
+        Returns
+        -------
+        observations : float32 array of shape (num_envs, n_observations)
+        infos : dict
+            Arrays of shape (num_envs,) with their masks.
+
+        Raises
+        ------
+        InputError
+            For other options, or seeds of another number than rows.
+        """
+        super().reset(seed=seed if isinstance(seed, int) else None)
+        mask = self._mask(options)
+        episodes = self._engine.episodes + np.uint64(1)
+        if self._keys is None:
+            self._keys = self._drawn_keys()
+            episodes[:] = 0
+        seeded = self._seeds(seed)
+        for row in np.flatnonzero(mask).tolist():
+            if (number := seeded[row]) is not None:
+                self._keys[row], episodes[row] = episode_keys(number), 0
+        self._engine.show_anew()
+        self._engine.begin(self._keys, episodes, mask)
+        for artist, begun in zip(self._artists, mask, strict=False):
+            if begun:
+                artist.begin(self._engine)
+        observations, outcomes = self._engine.shown
+        return observations, self._infos(outcomes, mask)
+
+    def _drawn_keys(self) -> NDArray[np.uint64]:
+        return np.array([episode_key(self.np_random) for _ in range(self.num_envs)], dtype=np.uint64)
+
+    def _mask(self, options: dict[str, Any] | None) -> Flags:
+        check_keys(options or {}, ["reset_mask"], "options")
+        mask = (options or {}).get("reset_mask", self._everyone)
+        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
+            raise InputError(f"options: reset_mask {mask!r} found, expected a bool array of {self.num_envs}")
+        if not mask.any():
+            raise InputError("options: reset_mask is False in all rows, expected one at least to begin anew")
+        return mask
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        if seed is None:
+            return [None] * self.num_envs
+        if isinstance(seed, int | np.integer):
+            return [int(seed) + row for row in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise InputError(f"seed: {len(seed)} found, expected one for each of {self.num_envs} rows")
+        return seed
+
+    def step(  # type: ignore[override]
+        self, actions: Any
+    ) -> tuple[Observation, Floats, Flags, Flags, Infos]:
+        """One control interval of all rows.
+
+        Parameters
+        ----------
+        actions : array of shape (num_envs, n_commands), or int array of shape (num_envs,)
+            See the single environment.
+
+        Returns
+        -------
+        observations : float32 array of shape (num_envs, n_observations)
+        rewards : array of shape (num_envs,)
+        terminated, truncated : bool arrays of shape (num_envs,)
+        infos : dict
+            Arrays of shape (num_envs,) with their masks; `final_obs` and `final_info` of episodes that ended
+            where the next one begins in the same step.
+
+        Raises
+        ------
+        InputError
+            If an action is not a number or their shape is another.
+        """
+        self._engine.order(self._commands(actions))
+        self._engine.show_anew()
+        self._engine.advance(self._mode)
+        observations, outcomes = self._engine.shown
+        rewards, terminated, truncated = outcomes[0].copy(), outcomes[1] > 0.0, outcomes[2] > 0.0
+        infos = self._infos(outcomes, self._everyone)
+        if self._mode == SAME_STEP:
+            ended = terminated | truncated
+            if ended.any():
+                infos |= self._final(ended, *self._engine.last_shown)
+        if self._artists:
+            self._note(outcomes)
+        return observations, rewards, terminated, truncated, infos
+
+    def _commands(self, actions: Any) -> Any:
+        if self.task.action != "rudder-discrete":
+            return actions
+        array = np.asarray(actions)
+        if array.shape != (self.num_envs,) or array.dtype.kind not in "iu":
+            raise InputError(
+                f"actions: {array.dtype} of shape {array.shape} found, "
+                f"expected int of shape ({self.num_envs},)"
+            )
+        if array.min() < 0 or array.max() >= len(ORDERS):
+            raise InputError(f"actions: {array} found, expected 0 to {len(ORDERS) - 1}: rudder orders")
+        return ORDERS[array][:, None]
+
+    def _infos(self, outcomes: Floats, mask: Flags) -> Infos:
+        """Rows of the outcome by name, with the mask of the rows that they are of."""
+        infos: Infos = {}
+        for name, row in zip(self.task.info_names, outcomes[STEP_OUTCOME:], strict=True):
+            infos[name] = row > 0.0 if name in self.task.flags else row
+            infos[f"_{name}"] = mask
+        return infos
+
+    def _final(self, ended: Flags, observations: Observation, outcomes: Floats) -> Infos:
+        """What episodes that ended showed last."""
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for row in np.flatnonzero(ended):
+            final_obs[row] = observations[row].copy()
+        kept = np.where(ended, outcomes, 0.0)
+        return {
+            "final_obs": final_obs, "_final_obs": ended,
+            "final_info": self._infos(kept, ended), "_final_info": ended,
+        }  # fmt: skip
+
+    def _note(self, outcomes: Floats) -> None:
+        """Let the wakes grow, or begin where an episode did."""
+        for row, artist in enumerate(self._artists):
+            begun = self._engine.steps[row] == 0
+            artist.begin(self._engine) if begun else artist.note(self._engine)
+
+    def physical_state(self) -> dict[str, Floats]:
+        """State, course to steer and weather by name, SI units, each of shape (num_envs,)."""
+        return self._engine.physical_state()
+
+    def render(self) -> tuple[Any, ...] | None:
+        """A picture of each row, uint8 arrays of shape (600, 600, 3); None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(artist.picture(self._engine) for artist in self._artists)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Nothing stays open."""
+
+
+def _mode(given: AutoresetMode | str) -> AutoresetMode:
+    if isinstance(given, AutoresetMode):
+        return given
+    by_name = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
+    if given not in by_name:
+        raise InputError(
+            f"autoreset_mode: {given!r} found, expected one of {quoted(m.value for m in AutoresetMode)}"
+        )
+    return by_name[given]
+
+
+def _artists(render_mode: str | None, num_envs: int) -> list[Any]:
+    """Who draws each row, if anyone does."""
+    if render_mode is None:
+        return []
+    if render_mode != "rgb_array":
+        raise InputError(f"render_mode: {render_mode!r} found, expected None or 'rgb_array'")
+    from shipgym.envs.artist import Artist
+
+    return [Artist(render_mode, lane) for lane in range(num_envs)]

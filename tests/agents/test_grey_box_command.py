@@ -1,0 +1,88 @@
+"""A grey box from the command line: what the table [identify] of a ship file says of it."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import shipgym
+from agents.cli import app
+
+OWN = 'structure = "abkowitz"\nmethod = "tls-svm"'
+QUICK = "C = 1.0\nepsilon = 0.1"  # chosen neither by folds nor by a search
+
+
+@pytest.fixture
+def ship_file(demo, tmp_path):
+    """The demo's ship file with another table [identify]."""
+
+    def write(identify):
+        text = demo.read_text()
+        assert OWN in text
+        path = tmp_path / "ship.toml"
+        path.write_text(text.replace(OWN, identify).replace('file = "', f'file = "{demo.parent}/'))
+        return path
+
+    return write
+
+
+def identified(ship, *options):
+    arguments = ["identify", str(ship), "--out", str(ship.parent / "out"), *options]
+    return CliRunner().invoke(app, arguments)
+
+
+def test_a_method_and_a_reference_ship_are_enough(ship_file):
+    ship = ship_file(f'method = "rm-svm"\nreference_model = "container-own.json"\n{QUICK}')
+    shipgym.load_model("tanker").save(ship.parent / "container-own.json")
+    answer = identified(ship)
+    assert answer.exit_code == 0, answer.stderr
+    assert "bare reference ship 'tanker'" in " ".join(answer.stdout.split())
+    model = shipgym.load_model(ship.parent / "out" / "model.json")
+    assert model.structure == "grey-box"
+    assert model.provenance["reference"]["name"] == "tanker"
+    ours = json.loads((ship.parent / "out" / "metrics.json").read_text())
+    zigzag = "zigzag_15_15.csv"
+    name = next(name for name in ours["trials"] if name.endswith(zigzag))
+    assert (ship.parent / "out" / "report.html").stat().st_size > 10_000
+    assert ours["trials"][name]["rmse"]["psi"] < 0.5 * ours["reference"]["trials"][name]["rmse"]["psi"]
+
+
+def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
+    block = "speed = 7.7175  # 15 knots\nblock_coefficient = 0.60"
+    ship = ship_file(f'structure = "grey-box"\nmethod = "rm-svm"\n{QUICK}')
+    ship.write_text(ship.read_text().replace("speed = 7.7175  # 15 knots", block))
+    answer = identified(ship, "--json")
+    assert answer.exit_code == 0, answer.stderr
+    reference = shipgym.load_model(ship.parent / "out" / "model.json").provenance["reference"]
+    assert reference["name"] == "mariner"
+    assert max(reference["similarity"], key=reference["similarity"].get) == "mariner"
+
+
+@pytest.mark.parametrize(
+    ("identify", "options", "said"),
+    [
+        (
+            'method = "rm-svm"',
+            [],
+            "found with structure 'abkowitz', expected structure 'grey-box', which has a reference ship",
+        ),
+        (
+            OWN,
+            ["--method", "rm-svm"],
+            "with a reference_model: 'auto', a shipped model's name or a model file",
+        ),
+        (OWN, ["--method", "rm-svm", "--reference-model", "tanker"], "expected structure 'grey-box'"),
+        ('method = "rm-svm"\nreference_model = "tankr"', [], "Did you mean 'tanker'"),
+        ('method = "rm-svm"\nreference_model = "auto"\nfolds = "luck"', [], "folds: 'luck' found"),
+        ('structure = "gray-box"', [], "Did you mean 'grey-box'"),
+    ],
+)
+def test_what_does_not_fit_is_one_message_and_nothing_written(ship_file, identify, options, said):
+    ship = ship_file(identify)
+    answer = identified(ship, *options)
+    assert answer.exit_code == 2
+    assert answer.stderr.startswith("error: ")
+    assert answer.stderr.count("\n") == 1
+    assert said in answer.stderr
+    assert answer.stdout == ""
+    assert not (ship.parent / "out").exists()

@@ -1,0 +1,144 @@
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shipgym import Episode, InputError
+
+STEPS = 4
+
+
+def states(**more):
+    names = ("x", "y", "psi", "u", "v", "r", "delta")
+    known = {name: np.linspace(0.1, 1.0 / 3.0, STEPS + 1) + k for k, name in enumerate(names)}
+    return known | more
+
+
+EPISODE = Episode(
+    environment="shipgym/PathFollowing-v0",
+    model="mariner",
+    dt=0.5,
+    length=160.93,
+    beam=23.17,
+    rudder_limit=0.7,
+    states=states(set_point=np.zeros(STEPS + 1)),
+    commands={"delta": np.array([0.1, -0.1, 0.2, 0.3])},
+    actions=np.array([[0.1], [-0.1], [0.2], [0.3]]),
+    rewards=-np.ones(STEPS),
+    reward_parts={"reward_heading": -np.ones(STEPS)},
+    info={"cross_track": np.linspace(0.0, 1.0, STEPS + 1)},
+    waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
+    corridor=60.0,
+    arguments={"model": "mariner", "sea": {"wind": None}},
+    seed=2**100,
+    number=3,
+    truncated=True,
+    success=True,
+)
+
+
+def test_what_is_read_is_what_was_written_to_the_last_digit(tmp_path):
+    EPISODE.save(tmp_path / "episode.json")
+    read = Episode.load(tmp_path / "episode.json")
+    for name in ("states", "commands", "reward_parts", "info"):
+        written, found = getattr(EPISODE, name), getattr(read, name)
+        assert list(written) == list(found)
+        assert all(np.array_equal(written[key], found[key]) for key in written)
+    for name in ("actions", "rewards", "waypoints", "t"):
+        assert np.array_equal(getattr(EPISODE, name), getattr(read, name))
+    for name in ("environment", "model", "dt", "length", "beam", "rudder_limit", "corridor", "arguments"):
+        assert getattr(EPISODE, name) == getattr(read, name)
+    for name in ("seed", "number", "terminated", "truncated", "success"):
+        assert getattr(EPISODE, name) == getattr(read, name)
+    assert [path.name for path in tmp_path.iterdir()] == ["episode.json"]
+
+
+def test_orders_of_a_trial_stand_where_they_begin_to_hold():
+    trial = EPISODE.to_trial()
+    assert trial.t.tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
+    assert trial["delta_command"].tolist() == [0.1, -0.1, 0.2, 0.3, 0.3]
+    assert "set_point" not in trial
+    assert trial.length == 160.93
+
+
+def test_the_heading_of_a_trial_goes_through_south_without_a_jump():
+    psi = np.array([3.1, 3.14, -3.1, -3.0, -2.9])
+    turned = replace(EPISODE, states=states(psi=psi)).to_trial()["psi"]
+    assert np.abs(np.diff(turned)).max() < 0.11
+
+
+def test_a_shaft_that_turns_as_ordered_is_part_of_the_trial():
+    episode = replace(EPISODE, commands={"n": np.full(STEPS, 1.5)})
+    assert episode.to_trial()["n"].tolist() == [1.5] * (STEPS + 1)
+    lagging = replace(episode, states=states(n=np.linspace(0.0, 1.0, STEPS + 1)))
+    assert lagging.to_trial()["n"][0] == 0.0
+
+
+def test_an_episode_cannot_be_changed():
+    with pytest.raises(ValueError, match="read-only"):
+        EPISODE.states["x"][0] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (("format",), 2, "format: 2 found, this version of shipgym reads format 1"),
+        (("kind",), None, "kind: None found, expected 'episode'"),
+        (("dt",), 0, "dt: 0 found, expected a number > 0"),
+        (("dt",), "1", "dt: '1' (a text; write the number without quotes) found"),
+        (("model",), "", "model: '' found"),
+        (("seed",), -1, "seed: -1 found, expected a whole number from 0 on"),
+        (("number",), 1.5, "number: 1.5 found"),
+        (("ship", "beam"), 500.0, "beam: 500 found, expected a number > 0 and <= 160.93"),
+        (("ship", "beem"), 1.0, "ship: unknown key 'beem'. Did you mean 'beam'?"),
+        (("path", "corridor"), -5.0, "corridor: -5 found"),
+        (("path", "waypoints"), [[0.0, 0.0]], "waypoints: shape (1, 2) found"),
+        (("states", "x"), [0.0, 1.0], "states.x: shape (2,) found, expected (5,)"),
+        (("states", "x"), [0.0, 1.0, None, 2.0, 3.0], "states.x[2]: None found, expected a number"),
+        (("states", "x"), [0.0, 1.0, True, 2.0, 3.0], "states.x[2]: True found"),
+        (("info", "cross_track"), [0.0] * STEPS, "info.cross_track: shape (4,) found, expected (5,)"),
+        (("commands", "delta"), 0.1, "commands.delta: 0.1 found, expected a list"),
+        (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
+        (("actions",), [[0.1], [0.2, 0.3], [0.1], [0.1]], "actions: expected an array of numbers"),
+        (("rewards",), [], "rewards: none found"),
+        (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards: nan found at 1, expected finite numbers"),
+        (("outcome", "success"), "yes", "success: 'yes' found, expected true or false"),
+        (("states",), {"x": [0.0] * 5}, "states: 'y', 'psi', 'delta' missing"),
+        (("note",), "", "unknown key 'note'"),
+    ],
+)
+def test_a_wrong_field_is_named_with_its_file(tmp_path, place, value, said):
+    path = tmp_path / "episode.json"
+    EPISODE.save(path)
+    content = json.loads(path.read_text())
+    *tables, key = place
+    table = content
+    for name in tables:
+        table = table[name]
+    table[key] = value
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=f"^{re.escape(f'{path}: ')}.*{re.escape(said)}"):
+        Episode.load(path)
+
+
+@pytest.mark.parametrize("name", ["states", "outcome", "dt"])
+def test_a_missing_field_is_named(tmp_path, name):
+    path = tmp_path / "episode.json"
+    EPISODE.save(path)
+    content = json.loads(path.read_text())
+    del content[name]
+    path.write_text(json.dumps(content))
+    with pytest.raises(InputError, match=f"'{name}' is missing"):
+        Episode.load(path)
+
+
+def test_a_file_cut_in_half_is_told_so(tmp_path):
+    path = tmp_path / "episode.json"
+    EPISODE.save(path)
+    path.write_text(path.read_text()[:200])
+    with pytest.raises(InputError, match="cut short"):
+        Episode.load(path)
+    with pytest.raises(InputError, match="there is no such episode file"):
+        Episode.load(tmp_path / "absent.json")

@@ -1,0 +1,184 @@
+"""The native vector environments: Gymnasium's promises, and the single environments row by row."""
+
+import warnings
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode
+from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatistics
+
+import shipgym
+from shipgym import InputError
+from shipgym.envs.checker import check_vector_env
+from shipgym.envs.registration import TASKS, VARIANTS
+
+COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+SHORT = {"episode_steps": 23}
+MODES = tuple(AutoresetMode)
+
+
+@pytest.fixture(scope="module")
+def mariner():
+    return shipgym.load_model("mariner")
+
+
+def vector(name, num_envs=3, **options):
+    return gymnasium.make_vec(name, num_envs=num_envs, **{"model": "mariner", **options})
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("name", [COURSE, PATH])
+def test_conformance_and_rows_that_are_single_environments(name, mode):
+    check_vector_env(
+        lambda: vector(name, 3, autoreset_mode=mode, **SHORT),
+        lambda: gymnasium.make(name, model="mariner", **SHORT),
+        n_steps=60,
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        (COURSE, {"sea": "rough", "noise": 1.0, "measurement": "filtered"}),
+        (PATH, {"sea": ["calm", "moderate"], "noise": 2.0, "model": "mariner-tls-svm"}),
+        (PATH, {"model": "mariner-tls-svm", "model_uncertainty": "posterior", "speed_range": (0.7, 1.0)}),
+        (COURSE, {"action": "rudder-discrete"}),
+        (PATH, {"model": "kvlcc2", "action": "rudder-shaft"}),
+        (COURSE, {"model": "container", "roll": True, "roll_weight": 1.0, "sea": "moderate"}),
+    ],
+)
+def test_rows_are_single_environments_with_every_option(name, options):
+    options = {"model": "mariner", **SHORT, **options}
+    check_vector_env(
+        lambda: gymnasium.make_vec(name, num_envs=66 if "sea" in options else 3, **options),
+        lambda: gymnasium.make(name, **options),
+        n_steps=30,
+    )
+
+
+def test_every_id_makes_both():
+    for task in TASKS:
+        for variant in VARIANTS:
+            name = f"shipgym/{task}{variant}-v0"
+            many, one = gymnasium.make_vec(name, num_envs=2), gymnasium.make(name)
+            assert many.single_observation_space == one.observation_space
+            assert many.single_action_space == one.action_space
+            assert many.observation_names == one.unwrapped.observation_names
+            seen, _ = many.reset(seed=5)
+            np.testing.assert_array_equal(seen[1], one.reset(seed=6)[0])
+
+
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_change_nothing(threads):
+    runs = []
+    for count in (1, threads):
+        env = vector(PATH, 200, threads=count, sea="moderate", **SHORT)
+        env.reset(seed=3)
+        env.action_space.seed(1)
+        runs.append([env.step(env.action_space.sample())[:4] for _ in range(50)])
+    for one, other in zip(*runs, strict=True):
+        for a, b in zip(one, other, strict=True):
+            np.testing.assert_array_equal(a, b)
+
+
+@pytest.mark.parametrize("mode", [AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP])
+def test_infos_are_those_of_gymnasiums_own_vector_environment(mode):
+    ours = vector(PATH, 4, autoreset_mode=mode, **SHORT)
+    theirs = gymnasium.make_vec(
+        PATH, 4, "sync", vector_kwargs={"autoreset_mode": mode}, model="mariner", **SHORT
+    )
+    ours.action_space.seed(0)
+    first = [env.reset(seed=8)[1] for env in (ours, theirs)]
+    seen = {key for key in first[0] if not key.startswith("_")}
+    for infos, expected in [first, *(_infos(ours, theirs) for _ in range(50))]:
+        assert infos.keys() == expected.keys()
+        for key in seen:
+            assert infos[key].dtype == expected[key].dtype
+            np.testing.assert_array_equal(infos[key], expected[key])
+            np.testing.assert_array_equal(infos[f"_{key}"], expected[f"_{key}"])
+        for key in infos.keys() & {"final_obs"}:
+            for row in np.flatnonzero(infos["_final_obs"]):
+                np.testing.assert_array_equal(infos[key][row], expected[key][row])
+        for key in seen if "final_info" in infos else ():
+            np.testing.assert_array_equal(infos["final_info"][key], expected["final_info"][key])
+
+
+def _infos(ours, theirs):
+    actions = ours.action_space.sample()
+    return [env.step(actions)[-1] for env in (ours, theirs)]
+
+
+def test_gymnasiums_vector_wrappers_work_on_it():
+    env = NormalizeObservation(RecordEpisodeStatistics(vector(COURSE, 5, **SHORT)))
+    env.reset(seed=0)
+    lengths = []
+    for _ in range(60):
+        *_, infos = env.step(env.action_space.sample())
+        lengths += infos["episode"]["l"][infos["_episode"]].tolist() if "episode" in infos else []
+    assert len(lengths) >= 10
+    assert set(lengths) <= set(range(1, 24))
+
+
+def test_a_vector_environment_says_what_is_wrong(mariner):
+    for options, message in (
+        ({"num_envs": 0}, "num_envs: 0 found"),
+        ({"sae": "calm"}, "Did you mean 'sea'"),
+        ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
+        ({"threads": 0}, "threads: 0 found"),
+        ({"render_mode": "human"}, "render_mode: 'human' found"),
+        ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
+        ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
+        ({"speed_range": 0.5}, "speed_range: 0.5 found"),
+        ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5"),
+    ):
+        with pytest.raises(InputError, match=message):
+            vector(COURSE, **{"num_envs": 2, **options})
+    env = vector(COURSE, 2)
+    with pytest.raises(InputError, match="reset_mask"):
+        env.reset(options={"reset_mask": np.zeros(3, dtype=np.bool_)})
+    with pytest.raises(InputError, match="seed: 3 found"):
+        env.reset(seed=[1, 2, 3])
+    discrete = vector(COURSE, 2, action="rudder-discrete")
+    discrete.reset(seed=0)
+    with pytest.raises(InputError, match="rudder orders"):
+        discrete.step(np.array([0, 9]))
+
+
+def test_ships_differ_from_episode_to_episode_and_return_with_the_seed():
+    heavy = replace(shipgym.load_model("mariner"), name="heavy")
+    options = {"ensemble": [heavy], "loading_range": (0.5, 2.0), "speed_range": (0.5, 1.0)}
+    env = vector(COURSE, 300, **options)
+    env.reset(seed=0)
+    speeds = env.physical_state()["u"]
+    assert 0.5 <= speeds.min() / 7.7175 < 0.55
+    assert 0.95 < speeds.max() / 7.7175 <= 1.0
+    for _ in range(20):
+        env.step(np.ones((300, 1), dtype=np.float32))
+    rates = env.physical_state()["r"] / speeds
+    assert rates.max() > 2.0 * rates.min() > 0.0
+    env.reset(seed=0)
+    np.testing.assert_array_equal(env.physical_state()["u"], speeds)
+    env.reset()
+    assert not np.array_equal(env.physical_state()["u"], speeds)
+
+
+def test_a_task_is_the_same_whatever_ship_is_drawn():
+    plain, drawn = vector(PATH, 5), vector(PATH, 5, speed_range=(0.5, 1.0))
+    for env in (plain, drawn):
+        env.reset(seed=1)
+    np.testing.assert_array_equal(plain.physical_state()["psi"], drawn.physical_state()["psi"])
+    np.testing.assert_array_equal(plain.unwrapped._engine.waypoints(4), drawn.unwrapped._engine.waypoints(4))
+
+
+def test_workers_of_other_processes():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make_vec(
+            f"shipgym:{COURSE}", 2, "async", vector_kwargs={"context": "spawn"}, model="mariner"
+        )
+    seen, _ = env.reset(seed=4)
+    ours, _ = vector(COURSE, 2).reset(seed=4)
+    np.testing.assert_array_equal(seen, ours)
+    env.close()
