@@ -97,6 +97,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
         self._seen, self._outcomes = self._engine.shown
         self._command = self._engine.command[:, 0]
+        self._least = self.task.least_commands(self.model)
         self._names, self._flags = self.task.info_names, sorted(self.task.flags)
         self._key = 0
         self._episode = -1
@@ -204,7 +205,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         for k, number in enumerate(array.tolist()):
             if not isfinite(number):
                 raise InputError(f"action: {number} found, expected numbers in [-1, 1]: parts of the limit")
-            self._command[k] = number
+            self._command[k] = max(number, self._least[k])
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""

@@ -16,6 +16,7 @@ from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.kernels import voyage_rows as rows
 from shipgym.models import ShipModel
+from shipgym.simulation.orders import turns_astern
 from shipgym.simulation.sensors import SEA_TRIAL
 from shipgym.simulation.weather_column import as_weather
 from shipgym.weather.conditions import Weather
@@ -197,6 +198,11 @@ class Task:
             Observed("heading_error_integral", -1.0, 1.0, integral, at[7]),
         )
         return steering + self.observed_of_task(model) + self._observed_extras(model)
+
+    def least_commands(self, model: ShipModel) -> tuple[float, ...]:
+        """Least command of each, parts of the limits: a shaft that may not turn astern is stopped instead."""
+        shaft = (-1.0 if turns_astern(model) else 0.0,) if self.action == "rudder-shaft" else ()
+        return (-1.0, *shaft)
 
     def observed_of_task(self, model: ShipModel) -> tuple[Observed, ...]:
         """What the task itself adds to what is observed."""
