@@ -38,6 +38,8 @@ def read_options(
     known = [*ENV_OPTIONS, *task_type.__dataclass_fields__, *Variety.names()]
     check_keys(options, known, "environment options")
     variety, rest = Variety.take_from(options)
+    if not isinstance(model, str | Path | ShipModel):
+        raise InputError(f"model: {model!r} found, expected a name, the path of a model file, or a ShipModel")
     ship = model if isinstance(model, ShipModel) else load_model(model)
     return ship, task_type.from_options(rest), variety
 

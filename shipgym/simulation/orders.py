@@ -63,7 +63,7 @@ def check_units(model: ShipModel, orders: Floats, where: str = "commands") -> No
 
 
 def turns_astern(model: ShipModel) -> bool:
-    """Whether the shaft may turn astern: a table of terms is taken at its word, a grey box at its reference's."""
+    """Whether the shaft may turn astern: a table of terms is taken at its word."""
     dynamics = model.dynamics
     if isinstance(dynamics, Equations):
         return dynamics.astern
