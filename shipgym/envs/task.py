@@ -176,7 +176,7 @@ class Task:
         if self.dt is not None:
             longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
             check_number(self.dt, "dt", at_most=longest, hint=f"s: {LONGEST_INTERVAL:g} ship lengths")
-        if "delta" not in model.command_names:
+        if not getattr(model.dynamics, "has_rudder", True):
             raise InputError(f"model: {model.name!r} has no rudder, expected a ship that is steered by one")
         if self.roll and "phi" not in model.state_names:
             raise InputError(

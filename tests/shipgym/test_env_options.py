@@ -1,4 +1,4 @@
-"""Options of the environments: instruments, what is observed and commanded, seas, depth, and ships that differ."""
+"""Options of the environments: instruments, observations, commands, seas, depth, and ships that differ."""
 
 from dataclasses import replace
 
