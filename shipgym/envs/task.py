@@ -144,7 +144,7 @@ class Task:
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
         """The weathers of which each episode has one."""
-        several = list(self.sea) if isinstance(self.sea, list | tuple) else [self.sea]
+        several: Sequence[Any] = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
         return tuple(as_weather(one, "sea", None) for one in several)
 
     @property

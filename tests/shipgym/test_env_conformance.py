@@ -1,4 +1,4 @@
-"""What Gymnasium, stable-baselines3 and worker processes ask of an environment; wrong arguments and actions."""
+"""What Gymnasium, stable-baselines3 and workers ask of an environment; wrong arguments and actions."""
 
 import math
 import warnings
@@ -209,5 +209,5 @@ def test_weather_needs_the_size_of_a_ship():
 
 def test_reset_says_what_is_wrong():
     env = gymnasium.make(PATH, model="mariner").unwrapped
-    with pytest.raises(InputError, match="options: .*'wind'"):
+    with pytest.raises(InputError, match=r"options: .*'wind'"):
         env.reset(options={"wind": 3.0})
