@@ -85,7 +85,8 @@ class Task:
         How many times further out than the training data the model may be taken before the episode
         ends (see `Envelope.distance`).
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed.
+        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed. A
+        shaft whose propeller is known ahead only is stopped by an order astern.
     roll : bool
         Whether roll angle and rate are observed.
     roll_weight : float
