@@ -26,8 +26,11 @@ TROUBLED = Weather(
 )
 
 
+SIZES = {"corridor": 1.0, "ground": 4.0, "episode_steps": 1500}  # whatever the defaults are
+
+
 def make(**options):
-    return gymnasium.make(ID, **{"model": "mariner", **options}).unwrapped
+    return gymnasium.make(ID, **{"model": "mariner", **SIZES, **options}).unwrapped
 
 
 def pd(observation):
