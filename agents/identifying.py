@@ -53,6 +53,11 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
     return chosen
 
 
+def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, Any]:
+    """Options of the command line: those with a name of their own, which go first, and those of `--set`."""
+    return parsed_options(texts) | {name: value for name, value in named.items() if value is not None}
+
+
 def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
     """Options written as on the command line, `name=value` with a value as in the ship file.
 
