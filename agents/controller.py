@@ -128,8 +128,9 @@ class Controller:
 
         Parameters
         ----------
-        observation : array-like of shape (8,) or (n, 8)
-            Of the course-keeping environment.
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of any of the environments: it steers by the first eight, those of course keeping, whose
+            heading error is against the line-of-sight course where a path is followed.
         state, episode_start, deterministic
             Not used: the controller has no memory and no chance in it.
 
@@ -143,13 +144,12 @@ class Controller:
         Raises
         ------
         InputError
-            If the observation has another shape.
+            If the observation has fewer entries, or another number of dimensions.
         """
-        seen = np.asarray(observation, dtype=np.float64)
-        if seen.ndim not in (1, 2) or seen.shape[-1] != len(self.observation_names):
-            n = len(self.observation_names)
-            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n})")
-        deviations = self._deviations(seen)
+        seen, n = np.asarray(observation, dtype=np.float64), len(self.observation_names)
+        if seen.ndim not in (1, 2) or seen.shape[-1] < n:
+            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n}), or more")
+        deviations = self._deviations(seen[..., :n])
         order = np.full(seen.shape[:-1], self.neutral_rudder)
         for gain, (signal, sign) in self.feedback.items():
             order = order + sign * self.gains[gain] * deviations[signal]
@@ -168,12 +168,12 @@ class Controller:
         }
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse to steer what shows other quantities, or in other scales, than those designed for.
+        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
 
         Parameters
         ----------
         names : sequence of str
-            `observation_names` of an environment.
+            `observation_names` of an environment; it may show more than what is steered by.
         scales : sequence of float
             Its `observation_scales`.
         where : str
@@ -184,8 +184,9 @@ class Controller:
         InputError
             Naming the first difference.
         """
-        check_names(names, self.observation_names, where)
-        for name, found, expected in zip(names, scales, self.observation_scales, strict=True):
+        n = len(self.observation_names)
+        check_names(names[:n], self.observation_names, where)
+        for name, found, expected in zip(names[:n], scales[:n], self.observation_scales, strict=True):
             if abs(found - expected) > SCALE_TOLERANCE * abs(expected):
                 raise InputError(
                     f"{where}: the scale of '{name}' is {found:g}, but controller '{self.name}' was "

@@ -29,6 +29,7 @@ import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
 from identification.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
+from shipgym.envs.registration import TASKS
 from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
@@ -59,6 +60,21 @@ for _ in range(40):
     least = min(least, time.process_time() - start)
 print(50 / least)
 """
+SYNC_STEPS_IN_PYTHON = """
+import sys, time
+import gymnasium, numpy as np, shipgym
+n = int(sys.argv[3])
+env = gymnasium.make_vec(sys.argv[1], num_envs=n, vectorization_mode="sync", model=sys.argv[2])
+env.reset(seed=0)
+actions = np.zeros((n, 1), dtype=np.float32)
+least = float("inf")
+for _ in range(5):
+    start = time.process_time()
+    for _ in range(5):
+        env.step(actions)
+    least = min(least, time.process_time() - start)
+print(5 * n / least)
+"""
 FIRST_STEP = """
 import time
 start = time.perf_counter()
@@ -82,7 +98,9 @@ class Row:
     aim: str
 
 
-def best_time(work: Callable[[], object], repeats: int = 5) -> float:
+def best_time(
+    work: Callable[[], object], repeats: int = 5, clock: Callable[[], float] = time.process_time
+) -> float:
     """Least processor time of some repeats, s.
 
     Not the clock on the wall, which counts what else the machine does. The caches are shared all the same, so
@@ -90,9 +108,9 @@ def best_time(work: Callable[[], object], repeats: int = 5) -> float:
     """
     times = []
     for _ in range(repeats):
-        start = time.process_time()
+        start = clock()
         work()
-        times.append(time.process_time() - start)
+        times.append(clock() - start)
     return min(times)
 
 
@@ -131,12 +149,62 @@ def single_environment(n_steps: int = 1000) -> Row:
     )
 
 
+def native_speed(
+    env_id: str, n_envs: int, clock: Callable[[], float] = time.process_time, **options: Any
+) -> float:
+    """Steps per second of a native vector environment of Gymnasium, by all that its `step` returns."""
+    env = gymnasium.make_vec(env_id, num_envs=n_envs, vectorization_mode="vector_entry_point", **options)
+    env.reset(seed=0)
+    env.action_space.seed(0)
+    actions = env.action_space.sample()
+    steps = min(max(SHORT_STEPS // n_envs, 1), 500)
+    return steps * n_envs / best_time(lambda: [env.step(actions) for _ in range(steps)], SHORT_REPEATS, clock)
+
+
+def native_against_python(task: str, n_envs: int = 64) -> Row:
+    """The native vector environment against SyncVectorEnv of the same files run as plain Python."""
+    env_id = f"shipgym/{task}-v0"
+    native = native_speed(env_id, n_envs, model=MODEL)
+    (plain,) = run_python(SYNC_STEPS_IN_PYTHON, env_id, MODEL, str(n_envs), NUMBA_DISABLE_JIT="1")
+    return Row(
+        f"{n_envs} {task}, gymnasium.make_vec",
+        f"{native / 1e6:.1f} M steps/s",
+        f"SyncVectorEnv in plain Python {plain / 1e3:.2f} k steps/s",
+        native / plain,
+        "100 times",
+    )
+
+
+def native_against_cart_pole(n_envs: int = 1024) -> Row:
+    """The native vector environment against Gymnasium's own of CartPole."""
+    native = native_speed("shipgym/CourseKeeping-v0", n_envs, model=MODEL)
+    poles = native_speed("CartPole-v1", n_envs)
+    return Row(
+        f"{n_envs} CourseKeeping, gymnasium.make_vec",
+        f"{native / 1e6:.1f} M steps/s",
+        f"Gymnasium's native CartPole {poles / 1e6:.1f} M steps/s",
+        native / poles,
+        "1 time",
+    )
+
+
+def learning(task: str) -> Row:
+    """Frames per second of PPO with the shipped settings, on two cores, and what part of it is ours."""
+    from learning_speed import ppo_speed  # here, because torch takes seconds to import
+
+    frames, share = ppo_speed(f"shipgym/{task}-v0")
+    return Row(
+        f"PPO, 64 {task}, two cores",
+        f"{frames / 1e3:.1f} k frames/s",
+        f"{100.0 * share:.1f} % of the time in the environment",
+        None,
+        "40 k frames/s, 15 %",
+    )
+
+
 def vector_speed(n_envs: int, task: str = "CourseKeeping", **options: Any) -> float:
-    """Environment steps per second of a native vector environment, with all that Gymnasium asks for."""
-    envs = gymnasium.make_vec(f"shipgym/{task}-v0", num_envs=n_envs, model=MODEL, **options)
-    envs.reset(seed=0)
-    actions, steps = np.zeros((n_envs, 1), np.float32), min(max(SHORT_STEPS // n_envs, 1), 500)
-    return steps * n_envs / best_time(lambda: [envs.step(actions) for _ in range(steps)], SHORT_REPEATS)
+    """Environment steps per second of a native vector environment of ours."""
+    return native_speed(f"shipgym/{task}-v0", n_envs, model=MODEL, **options)
 
 
 def vector_environment(task: str, n_envs: int, aim: str) -> Row:
@@ -152,8 +220,8 @@ def vector_environment(task: str, n_envs: int, aim: str) -> Row:
 
 
 def two_threads(n_envs: int = 16384) -> Row:
-    """Two threads against one."""
-    one, two = vector_speed(n_envs), vector_speed(n_envs, threads=2)
+    """Two threads against one, by the clock on the wall: needs two idle cores."""
+    one, two = (vector_speed(n_envs, clock=time.perf_counter, threads=threads) for threads in (1, 2))
     return Row(
         f"CourseKeeping, {n_envs} at once, two threads",
         f"{two / 1e6:.1f} M steps/s",
@@ -328,7 +396,10 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         ),
         *(partial(weather, n) for n in (1024, 4096)),
         two_threads,
+        *(partial(native_against_python, task) for task in TASKS),
+        native_against_cart_pole,
     ],
+    "learning": [partial(learning, task) for task in TASKS],
     "physics": [
         *(partial(batched_physics, ship, n, aim) for ship, aim in FLEET.items() for n in (1024, 4096)),
         zigzag_run,

@@ -237,6 +237,10 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         """State, course to steer and weather by name, SI units, each of shape (num_envs,)."""
         return self._engine.physical_state()
 
+    def waypoints(self, row: int = 0) -> Floats | None:
+        """North and east of the path of a row's episode, m, shape (n, 2); None in course keeping."""
+        return self._engine.waypoints(row)
+
     def render(self) -> tuple[Any, ...] | None:
         """A picture of each row, uint8 arrays of shape (600, 600, 3); None without a render mode."""
         if self.render_mode is None:
