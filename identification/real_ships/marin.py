@@ -161,10 +161,10 @@ def _circles(axis: Any, models_: dict[str, ShipModel]) -> None:
 
 
 TEXT = """
-Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's law. The settings come
-from HSVA data alone but for one: how much worse a stronger pull may be on the zigzags (a quarter) was set when
-it was known how the turns depend on the pull. MARIN's zigzags are predicted open loop from the measured
-rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
+Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's law. The settings
+come from HSVA data alone but for one: how much worse a stronger pull may be on the zigzags (a quarter) was
+set when it was known how the turns depend on the pull. MARIN's zigzags are predicted open loop from the
+measured rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
 
 {zigzags}
 

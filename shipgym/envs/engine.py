@@ -107,7 +107,8 @@ class Engine:
         self._ships = _ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
         self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
         self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
-        self._actions = np.zeros((2 if self.task.action == "rudder-shaft" else 1, self.num_envs), np.float32)
+        self._least = np.array(self.task.least_commands(self.model), dtype=np.float32)[:, None]
+        self._actions = np.zeros((len(self._least), self.num_envs), np.float32)
         self._n_shown = int(self._settings[rows.N_SHOWN])
         self._n_outcomes = STEP_OUTCOME + len(self.task.info_names)
         self.show_anew()
@@ -212,7 +213,7 @@ class Engine:
             raise InputError(
                 f"actions: {array[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
             )
-        self._actions[:] = array.T
+        np.maximum(array.T, self._least, out=self._actions)
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """One control interval; a lane whose episode is over stays as it is and earns 0.

@@ -38,6 +38,8 @@ def read_options(
     known = [*ENV_OPTIONS, *task_type.__dataclass_fields__, *Variety.names()]
     check_keys(options, known, "environment options")
     variety, rest = Variety.take_from(options)
+    if not isinstance(model, str | Path | ShipModel):
+        raise InputError(f"model: {model!r} found, expected a name, the path of a model file, or a ShipModel")
     ship = model if isinstance(model, ShipModel) else load_model(model)
     return ship, task_type.from_options(rest), variety
 
@@ -97,6 +99,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
         self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
         self._command = self._engine.command[:, 0]
+        self._least = self.task.least_commands(self.model)
         self._discrete = self.task.action == "rudder-discrete"
         self._names = self.task.info_names
         self._flags = [(name, k) for k, name in enumerate(self._names) if name in self.task.flags]
@@ -206,7 +209,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         for k, number in enumerate(array.tolist()):
             if not isfinite(number):
                 raise InputError(f"action: {number} found, expected numbers in [-1, 1]: parts of the limit")
-            self._command[k] = number
+            self._command[k] = max(number, self._least[k])
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""

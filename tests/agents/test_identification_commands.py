@@ -152,6 +152,24 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     assert found["hold_out"] == [held]
 
 
+def test_the_whole_chain_takes_the_same_options(demo, tmp_path):
+    held = "zigzag_10_10.csv"
+    answer = shipgym(
+        "autopilot", demo, "--out", tmp_path / "out", "--draws", "3", "--structure", "linear-steering",
+        "--method", "abc-lssvr", "--objective", "training", "--hold-out", held, "--set", "seed=3",
+        "--set", "bounds=[1, 1e6]", "--json",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.stderr
+    assert json.loads(answer.stdout)["trials"][held]["use"] == "validate"
+    told = load_model(tmp_path / "out" / "model.json").provenance
+    assert (told["method"], told["settings"]["objective"]) == ("abc-lssvr", "training")
+    assert max(found["C"] for found in told["search"].values()) <= 1e6
+    refused = shipgym("autopilot", demo, "--out", tmp_path / "no", "--set", "sede=3")
+    assert refused.exit_code == 2
+    assert "Did you mean 'seed'" in refused.stderr
+    assert not (tmp_path / "no").exists()
+
+
 def test_extra_trials_are_seen_by_the_refinement_alone(ship, demo):
     turn = f"{demo.parent}/turning_circle_35.csv"
     _, result = identified(
