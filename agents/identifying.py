@@ -45,7 +45,8 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
             own[option] = str(ship.path.parent / own[option])
     chosen = own | check_options({k: v for k, v in given.items() if v is not None}, "options")
     if chosen.get("method") == RM_SVM and "reference_model" in chosen:
-        chosen.setdefault("structure", GREY_BOX)
+        named = given if given.get("method") == RM_SVM else chosen  # the command line goes before the file
+        chosen["structure"] = named.get("structure") or GREY_BOX
     if chosen.get("structure") == GREY_BOX:
         chosen.setdefault("reference_model", "auto")
     elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:
