@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
-from typing import Annotated
+from typing import Annotated, Any
 
 import gymnasium
 import numpy as np
@@ -29,8 +29,6 @@ import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
 from identification.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.simulation.sensors import Sensors
@@ -133,24 +131,35 @@ def single_environment(n_steps: int = 1000) -> Row:
     )
 
 
-def batched_environment(n_envs: int) -> Row:
-    """Environment steps per second of the batch engine, one core, against the single environment."""
-    task = CourseKeepingTask(episode_steps=10**9)
-    engine = CourseKeepingEngine(shipgym.load_model(MODEL), n_envs, task)
-    alone = CourseKeepingEngine(shipgym.load_model(MODEL), 1, task)
-    steps, actions, action = (
-        SHORT_STEPS // n_envs,
-        np.zeros((n_envs, 1), np.float32),
-        np.zeros((1, 1), np.float32),
-    )
-    batched = steps * n_envs / best_time(lambda: [engine.step(actions) for _ in range(steps)], SHORT_REPEATS)
-    single = 1000 / best_time(lambda: [alone.step(action) for _ in range(1000)], SHORT_REPEATS)
+def vector_speed(n_envs: int, task: str = "CourseKeeping", **options: Any) -> float:
+    """Environment steps per second of a native vector environment, with all that Gymnasium asks for."""
+    envs = gymnasium.make_vec(f"shipgym/{task}-v0", num_envs=n_envs, model=MODEL, **options)
+    envs.reset(seed=0)
+    actions, steps = np.zeros((n_envs, 1), np.float32), min(max(SHORT_STEPS // n_envs, 1), 500)
+    return steps * n_envs / best_time(lambda: [envs.step(actions) for _ in range(steps)], SHORT_REPEATS)
+
+
+def vector_environment(task: str, n_envs: int, aim: str) -> Row:
+    """A native vector environment on one core, against one environment at a time."""
+    batched, single = vector_speed(n_envs, task), vector_speed(1, task)
     return Row(
-        f"{n_envs} ships in one batch",
+        f"{task}, {n_envs} at once",
         f"{batched / 1e6:.1f} M steps/s",
-        f"one ship at a time {single / 1e3:.0f} k steps/s",
+        f"one at a time {single / 1e3:.0f} k steps/s",
         batched / single,
-        "",
+        aim,
+    )
+
+
+def two_threads(n_envs: int = 16384) -> Row:
+    """Two threads against one."""
+    one, two = vector_speed(n_envs), vector_speed(n_envs, threads=2)
+    return Row(
+        f"CourseKeeping, {n_envs} at once, two threads",
+        f"{two / 1e6:.1f} M steps/s",
+        f"one thread {one / 1e6:.1f} M steps/s",
+        two / one,
+        "1.7 times",
     )
 
 
@@ -181,21 +190,11 @@ def batched_physics(name: str, n_ships: int, aim: str) -> Row:
 
 
 def weather(n_envs: int) -> Row:
-    """Environment steps per second of the batch with current, wind and waves, against calm water."""
+    """A native vector environment with current, wind and waves, against calm water."""
     sea = Weather(current=Current(1.0, variation=0.2), wind=Wind(12.0), waves=Waves(3.25, 9.7))
-    model = shipgym.load_model(MODEL)
-    speeds = []
-    for what in (sea, "calm"):
-        engine = CourseKeepingEngine(model, n_envs, CourseKeepingTask(what, episode_steps=10**9))
-        engine.advance()
-        steps = SHORT_STEPS // n_envs
-        seconds = best_time(
-            lambda engine=engine, steps=steps: [engine.advance() for _ in range(steps)], SHORT_REPEATS
-        )
-        speeds.append(steps * n_envs / seconds)
-    rough, calm = speeds
+    rough, calm = vector_speed(n_envs, sea=sea), vector_speed(n_envs)
     return Row(
-        f"{n_envs} ships in current, wind and waves",
+        f"CourseKeeping, {n_envs} at once, in current, wind and waves",
         f"{rough / 1e6:.1f} M steps/s",
         f"calm {calm / 1e6:.1f} M steps/s",
         rough / calm,
@@ -322,8 +321,13 @@ def start_up() -> list[Row]:
 GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
     "environments": [
         single_environment,
-        *(partial(batched_environment, n) for n in (64, 1024, 4096)),
+        *(
+            partial(vector_environment, task, n, aim)
+            for task in ("CourseKeeping", "PathFollowing")
+            for n, aim in ((64, "15 M steps/s"), (1024, "35 M steps/s"), (4096, "40 M steps/s"))
+        ),
         *(partial(weather, n) for n in (1024, 4096)),
+        two_threads,
     ],
     "physics": [
         *(partial(batched_physics, ship, n, aim) for ship, aim in FLEET.items() for n in (1024, 4096)),
