@@ -131,6 +131,12 @@ def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
     assert "reference_model" not in identification_settings(ShipFile.load(path), {"structure": "abkowitz"})
 
 
+def test_rm_svm_on_the_command_line_goes_before_the_structure_of_the_ship_file(demo):
+    ship, given = ShipFile.load(demo), {"method": "rm-svm", "reference_model": "tanker"}
+    assert identification_settings(ship, {**given, "structure": None})["structure"] == "grey-box"
+    assert identification_settings(ship, {**given, "structure": "norrbin"})["structure"] == "norrbin"
+
+
 @pytest.mark.parametrize("text", ["seed", "=3", "sede=3", "seed=three"])
 def test_an_option_written_wrongly_is_named(text):
     with pytest.raises(InputError, match="--set"):
