@@ -13,10 +13,12 @@ if TYPE_CHECKING:
     from agents.controller_file import load_agent
     from agents.flight import Flights, StepResponses, fly, step_response
     from agents.lq import LQ
+    from agents.lqg import LQG
     from agents.pid import PID
 
 _HOME = {
     "LQ": "agents.lq",
+    "LQG": "agents.lqg",
     "PID": "agents.pid",
     "Controller": "agents.controller",
     "Flights": "agents.flight",
@@ -29,6 +31,7 @@ _HOME = {
 
 __all__ = [
     "LQ",
+    "LQG",
     "PID",
     "Controller",
     "Flights",

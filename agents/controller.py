@@ -9,14 +9,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.linear_loop import Margins, SampledShip, loop_margins
+from agents.linear_loop import (
+    Compensator,
+    Margins,
+    SampledShip,
+    compensator_margins,
+    feedback_row,
+    sample_ship,
+)
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
@@ -67,6 +74,8 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
+    #: Arrays that the file holds beside the gains: names of fields, and of the lengths of their axes.
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     gains: dict[str, float]
     neutral_rudder: float
@@ -80,7 +89,12 @@ class Controller:
 
     @classmethod
     def designed(
-        cls, model: ShipModel, ship: SampledShip, gains: dict[str, float], design: dict[str, float]
+        cls,
+        model: ShipModel,
+        ship: SampledShip,
+        gains: dict[str, float],
+        design: dict[str, float],
+        **more: Any,
     ) -> Self:
         """The controller with these gains, its margins computed.
 
@@ -94,23 +108,52 @@ class Controller:
             By the names of `feedback`.
         design : dict of str to float
             How they were found.
+        **more
+            Further fields of the class.
 
         Raises
         ------
         InputError
             If the closed loop is unstable.
         """
-        by_signal = {signal: sign * gains[gain] for gain, (signal, sign) in cls.feedback.items()}
-        return cls(
+        unknown = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
+        found = cls(
             gains=gains,
             neutral_rudder=ship.about.rudder,
             neutral_sway=ship.about.sway,
-            margins=loop_margins(ship, by_signal, f"{cls.__name__} on model '{model.name}'"),
+            margins=unknown,
             observation_scales=tuple(observation_scales(model).tolist()),
             model_name=model.name,
             model_sha256=model_hash(model),
             design={"dt": ship.dt, **design},
+            **more,
         )
+        return replace(found, margins=found._margins(ship, model))
+
+    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
+        return compensator_margins(ship, self.loop(), f"{type(self).__name__} on model '{model.name}'")
+
+    def loop(self) -> Compensator:
+        """The controller for small motions, without limits: what its margins are computed from."""
+        by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
+        return Compensator.static(feedback_row(by_signal))
+
+    def margins_on(self, model: ShipModel) -> Margins:
+        """Margins and bandwidth of the same controller on another ship.
+
+        Raises
+        ------
+        InputError
+            If the closed loop is unstable, or the model has no straight course.
+        """
+        return self._margins(sample_ship(model, self.design["dt"]), model)
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships.
+
+        What there is to remember is in the state that `predict` hands back, so one controller may steer
+        any number of episodes side by side.
+        """
 
     @property
     def name(self) -> str:
@@ -128,8 +171,9 @@ class Controller:
 
         Parameters
         ----------
-        observation : array-like of shape (8,) or (n, 8)
-            Of the course-keeping environment.
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of any of the environments: it steers by the first eight, those of course keeping, whose
+            heading error is against the line-of-sight course where a path is followed.
         state, episode_start, deterministic
             Not used: the controller has no memory and no chance in it.
 
@@ -143,13 +187,12 @@ class Controller:
         Raises
         ------
         InputError
-            If the observation has another shape.
+            If the observation has fewer entries, or another number of dimensions.
         """
-        seen = np.asarray(observation, dtype=np.float64)
-        if seen.ndim not in (1, 2) or seen.shape[-1] != len(self.observation_names):
-            n = len(self.observation_names)
-            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n})")
-        deviations = self._deviations(seen)
+        seen, n = np.asarray(observation, dtype=np.float64), len(self.observation_names)
+        if seen.ndim not in (1, 2) or seen.shape[-1] < n:
+            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n}), or more")
+        deviations = self._deviations(seen[..., :n])
         order = np.full(seen.shape[:-1], self.neutral_rudder)
         for gain, (signal, sign) in self.feedback.items():
             order = order + sign * self.gains[gain] * deviations[signal]
@@ -168,12 +211,12 @@ class Controller:
         }
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse to steer what shows other quantities, or in other scales, than those designed for.
+        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
 
         Parameters
         ----------
         names : sequence of str
-            `observation_names` of an environment.
+            `observation_names` of an environment; it may show more than what is steered by.
         scales : sequence of float
             Its `observation_scales`.
         where : str
@@ -184,8 +227,9 @@ class Controller:
         InputError
             Naming the first difference.
         """
-        check_names(names, self.observation_names, where)
-        for name, found, expected in zip(names, scales, self.observation_scales, strict=True):
+        n = len(self.observation_names)
+        check_names(names[:n], self.observation_names, where)
+        for name, found, expected in zip(names[:n], scales[:n], self.observation_scales, strict=True):
             if abs(found - expected) > SCALE_TOLERANCE * abs(expected):
                 raise InputError(
                     f"{where}: the scale of '{name}' is {found:g}, but controller '{self.name}' was "

@@ -3,7 +3,7 @@
 Format 1:
 
     format               1
-    kind                 "pid" or "lq"
+    kind                 "pid", "lq", ... (`HOMES`)
     observation_names    what it observes, in order
     observation_scales   physical value of each observation of 1, SI units
     gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
@@ -12,6 +12,7 @@ Format 1:
     model                {"name", "sha256"}: what it was designed on
     margins              {name: value or null for no limit}
     design               {name: value}: how it was designed
+    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
 """
 
 from __future__ import annotations
@@ -38,7 +39,11 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-HOMES = {"pid": ("agents.pid", "PID"), "lq": ("agents.lq", "LQ")}
+HOMES = {
+    "pid": ("agents.pid", "PID"),
+    "lq": ("agents.lq", "LQ"),
+    "lqg": ("agents.lqg", "LQG"),
+}
 
 
 def save(controller: Controller, path: Path) -> None:
@@ -49,8 +54,13 @@ def save(controller: Controller, path: Path) -> None:
     InputError
         If the folder does not exist or cannot be written.
     """
+    write_json(controller_content(controller), path)
+
+
+def controller_content(controller: Controller) -> dict[str, Any]:
+    """What a controller's file holds."""
     margins = asdict(controller.margins)
-    content = {
+    content: dict[str, Any] = {
         "format": FORMAT,
         "kind": controller.kind,
         "observation_names": list(controller.observation_names),
@@ -62,7 +72,9 @@ def save(controller: Controller, path: Path) -> None:
         "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
         "design": controller.design,
     }
-    write_json(content, path)
+    if controller.arrays:
+        content["arrays"] = {name: getattr(controller, name).tolist() for name in controller.arrays}
+    return content
 
 
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
@@ -77,7 +89,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
     Returns
     -------
     Controller
-        A `PID` or an `LQ`.
+        Of the kind that was saved.
 
     Raises
     ------
@@ -96,12 +108,13 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
-    check_keys(content, FIELDS, where)
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(FIELDS)}")
+    check_keys(content, (*FIELDS, "arrays"), where)
+    _check_all_there(content, FIELDS, where)
     home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
     design: type[Controller] = getattr(import_module(home), name)
+    expected = (*FIELDS, "arrays") if design.arrays else FIELDS
+    check_keys(content, expected, where)
+    _check_all_there(content, expected, where)
     model = check_table(content["model"], f"{where}: model")
     check_keys(model, ("name", "sha256"), f"{where}: model")
     _check_observations(content["observation_names"], where)
@@ -114,7 +127,39 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
         model_name=check_text(model.get("name"), f"{where}: model.name"),
         model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
         design=_design(content["design"], f"{where}: design"),
+        **_arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays"),
     )
+
+
+def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
+    for name in expected:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(expected)}")
+
+
+def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict[str, Any]:
+    """Arrays of finite numbers, whose axes of one name have one length."""
+    table = check_table(value, where)
+    check_keys(table, tuple(axes), where)
+    lengths: dict[str, int] = {}
+    arrays = {}
+    for name, named in axes.items():
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
+        try:
+            array = np.array(table[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where}.{name}: expected nested lists of numbers; {REMEDY}") from None
+        fits = array.ndim == len(named) and bool(np.isfinite(array).all())
+        if fits:
+            fits = all(lengths.setdefault(axis, n) == n for axis, n in zip(named, array.shape, strict=True))
+        if not fits:
+            raise InputError(
+                f"{where}.{name}: shape {array.shape} or a number that is not finite found, expected finite "
+                f"numbers of shape ({', '.join(named)}); {REMEDY}"
+            )
+        arrays[name] = array
+    return arrays
 
 
 def _check_observations(names: Any, where: str) -> None:

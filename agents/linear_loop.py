@@ -21,6 +21,7 @@ from shipgym.models import ShipModel
 from shipgym.models.linear import StraightRunning, linearise, nomoto_of, straight_running
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 SIGNALS = ("sway", "yaw_rate", "heading_error", "rudder", "heading_error_integral")
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(5)
@@ -152,6 +153,35 @@ def feedback_row(feedback: Mapping[str, float]) -> Floats:
     return np.array([[feedback.get(signal, 0.0) for signal in SIGNALS]])
 
 
+@dataclass(frozen=True, eq=False)
+class Compensator:
+    """A linear controller with a memory: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
+
+    Attributes
+    ----------
+    A : array of shape (n_memory, n_memory)
+    B : array of shape (n_memory, 5)
+    C : array of shape (1, n_memory)
+    D : array of shape (1, 5)
+        y in the order of `SIGNALS`, deviations in SI units.
+    """
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+    @classmethod
+    def static(cls, row: Floats) -> Compensator:
+        """Feedback without a memory, of a row of shape (1, 5)."""
+        n = len(SIGNALS)
+        return cls(np.zeros((0, 0)), np.zeros((0, n)), np.zeros((1, 0)), row)
+
+    def closed_loop(self, ship: SampledShip) -> Floats:
+        """Matrix of ship and memory from one control interval to the next."""
+        return np.block([[ship.A + ship.B @ self.D, ship.B @ self.C], [self.B, self.A]])
+
+
 def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) -> Margins:
     """Stability margins and bandwidth of order = sum of feedback times signal.
 
@@ -173,11 +203,32 @@ def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) ->
     InputError
         If the closed loop is unstable.
     """
+    return compensator_margins(ship, Compensator.static(feedback_row(feedback)), name)
+
+
+def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) -> Margins:
+    """Stability margins and bandwidth of any linear controller.
+
+    Parameters
+    ----------
+    ship : SampledShip
+    compensator : Compensator
+    name : str
+        Of the design, for the message.
+
+    Returns
+    -------
+    Margins
+        From the frequency response of the sampled loop (`control.stability_margins`).
+
+    Raises
+    ------
+    InputError
+        If the closed loop is unstable.
+    """
     import control
 
-    row = feedback_row(feedback)
-    closed = ship.A + ship.B @ row
-    largest = float(np.abs(np.linalg.eigvals(closed)).max())
+    largest = float(np.abs(np.linalg.eigvals(compensator.closed_loop(ship))).max())
     if largest >= 1.0:
         raise InputError(
             f"{name}: the closed loop is unstable with these gains (largest sampled pole {largest:.4f}, "
@@ -185,29 +236,30 @@ def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) ->
         )
     nyquist = np.pi / ship.dt
     omega = np.geomspace(SLOWEST * nyquist, 0.999 * nyquist, FREQUENCIES)
-    of_rudder = feedback_row({"rudder": feedback.get("rudder", 0.0)})
-    opened = control.ss(ship.A + ship.B @ of_rudder, ship.B, of_rudder - row, 0.0, ship.dt)
-    response = opened(np.exp(1j * omega * ship.dt))
-    found: Any = control.stability_margins(control.frd(response, omega), returnall=True)
+    opened, following = _responses(ship, compensator, omega)
+    found: Any = control.stability_margins(control.frd(opened, omega), returnall=True)
     gains, phases, _, _, crossings, _ = (np.asarray(values, dtype=float) for values in found)
+    beyond = np.flatnonzero(np.abs(following) < np.sqrt(0.5))
     return Margins(
         gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
         phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
         delay_margin_s=float(min(np.radians(phases % 360.0) / crossings, default=np.inf)),
-        bandwidth_rad_s=_bandwidth(ship, closed, row, omega),
+        bandwidth_rad_s=float(omega[beyond[0]]) if len(beyond) else float(omega[-1]),
         lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
     )
 
 
-def _bandwidth(ship: SampledShip, closed: Floats, row: Floats, omega: Floats) -> float:
-    """Frequency from which the heading follows its set-point with less than 1 / sqrt(2), rad/s."""
+def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tuple[Complexes, Complexes]:
+    """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
     import control
 
-    set_point = ship.B * row[0, ERROR]
-    set_point[INTEGRAL] += ship.dt
-    heading = np.zeros((1, len(SIGNALS)))
-    heading[0, ERROR] = -1.0
-    following = control.ss(closed, set_point, heading, 0.0, ship.dt)
-    gain = np.abs(following(np.exp(1j * omega * ship.dt)))
-    beyond = np.flatnonzero(gain < np.sqrt(0.5))
-    return float(omega[beyond[0]]) if len(beyond) else float(omega[-1])
+    z = np.exp(1j * omega * ship.dt)
+    n = len(SIGNALS)
+    motions = control.ss(ship.A, ship.B, np.eye(n), 0.0, ship.dt)(z)[:, 0]
+    c = compensator
+    orders = control.ss(c.A, c.B, c.C, c.D, ship.dt)(z)[0] if len(c.A) else np.tile(c.D.T, len(z))
+    of_rudder = orders[RUDDER] * motions[RUDDER]
+    of_motions = (orders * motions).sum(axis=0) - of_rudder
+    set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
+    following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
+    return -of_motions / (1.0 - of_rudder), following
