@@ -9,21 +9,27 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
     from agents.flight import Flights, StepResponses, fly, step_response
+    from agents.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
     from agents.lq import LQ
     from agents.lqg import LQG
     from agents.pid import PID
 
 _HOME = {
+    "AdaptiveLineOfSight": "agents.los_autopilot",
+    "IntegralLineOfSight": "agents.los_autopilot",
     "LQ": "agents.lq",
     "LQG": "agents.lqg",
+    "LineOfSight": "agents.los_autopilot",
     "PID": "agents.pid",
     "Controller": "agents.controller",
     "Flights": "agents.flight",
     "Policy": "agents.controller",
     "StepResponses": "agents.flight",
+    "check_controller": "agents.checker",
     "fly": "agents.flight",
     "load_agent": "agents.controller_file",
     "step_response": "agents.flight",
@@ -33,10 +39,14 @@ __all__ = [
     "LQ",
     "LQG",
     "PID",
+    "AdaptiveLineOfSight",
     "Controller",
     "Flights",
+    "IntegralLineOfSight",
+    "LineOfSight",
     "Policy",
     "StepResponses",
+    "check_controller",
     "fly",
     "load_agent",
     "step_response",

@@ -74,6 +74,11 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
+    #: What it observes, and names of its gains where they are not those of `feedback`.
+    observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    gain_names: ClassVar[tuple[str, ...]] = ()
+    #: Whether it leads another controller, its `autopilot`, which the file holds too.
+    has_autopilot: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and of the lengths of their axes.
     arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 

@@ -12,6 +12,7 @@ Format 1:
     model                {"name", "sha256"}: what it was designed on
     margins              {name: value or null for no limit}
     design               {name: value}: how it was designed
+    autopilot            a controller of this format; only of guidance
     arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
 """
 
@@ -28,7 +29,6 @@ import numpy as np
 from agents.controller import Controller, check_names
 from agents.linear_loop import Margins
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel
@@ -39,10 +39,14 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
+MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
 HOMES = {
     "pid": ("agents.pid", "PID"),
     "lq": ("agents.lq", "LQ"),
     "lqg": ("agents.lqg", "LQG"),
+    "los": ("agents.los_autopilot", "LineOfSight"),
+    "ilos": ("agents.los_autopilot", "IntegralLineOfSight"),
+    "alos": ("agents.los_autopilot", "AdaptiveLineOfSight"),
 }
 
 
@@ -74,6 +78,8 @@ def controller_content(controller: Controller) -> dict[str, Any]:
     }
     if controller.arrays:
         content["arrays"] = {name: getattr(controller, name).tolist() for name in controller.arrays}
+    if controller.has_autopilot:
+        content["autopilot"] = controller_content(getattr(controller, "autopilot"))  # noqa: B009
     return content
 
 
@@ -108,26 +114,33 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
-    check_keys(content, (*FIELDS, "arrays"), where)
+    check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
     home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
     design: type[Controller] = getattr(import_module(home), name)
-    expected = (*FIELDS, "arrays") if design.arrays else FIELDS
+    has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
+    expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
     check_keys(content, expected, where)
     _check_all_there(content, expected, where)
     model = check_table(content["model"], f"{where}: model")
     check_keys(model, ("name", "sha256"), f"{where}: model")
-    _check_observations(content["observation_names"], where)
+    _check_observations(content["observation_names"], design.observes, where)
+    more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
+    if design.has_autopilot:
+        more["autopilot"] = _controller(
+            check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
+        )
     return design(
-        gains=_numbers(content["gains"], tuple(design.feedback), f"{where}: gains"),
+        gains=_numbers(content["gains"], design.gain_names or tuple(design.feedback), f"{where}: gains"),
         neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
         neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
         margins=_margins(content["margins"], f"{where}: margins"),
-        observation_scales=_scales(content["observation_scales"], where),
+        observation_scales=_scales(content["observation_scales"], design.observes, where),
         model_name=check_text(model.get("name"), f"{where}: model.name"),
         model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
         design=_design(content["design"], f"{where}: design"),
-        **_arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays"),
+        observation_names=design.observes,
+        **more,
     )
 
 
@@ -162,20 +175,20 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict
     return arrays
 
 
-def _check_observations(names: Any, where: str) -> None:
+def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> None:
     """The observations must be those of the environment, in its order."""
     if not isinstance(names, list):
         raise InputError(f"{where}: observation_names: {names!r} found, expected a list of names")
-    check_names([str(name) for name in names], OBSERVATION_NAMES, f"{where}: observation_names")
+    check_names([str(name) for name in names], expected, f"{where}: observation_names")
 
 
-def _scales(value: Any, where: str) -> tuple[float, ...]:
-    n = len(OBSERVATION_NAMES)
+def _scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+    n = len(names)
     if not isinstance(value, list) or len(value) != n:
         found = len(value) if isinstance(value, list) else repr(value)
         raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
     return tuple(
-        check_number(scale, f"{where}: observation_scales[{i}] ('{OBSERVATION_NAMES[i]}')", above=0.0)
+        check_number(scale, f"{where}: observation_scales[{i}] ('{names[i]}')", above=0.0)
         for i, scale in enumerate(value)
     )
 
