@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from agents.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
     from agents.lq import LQ
     from agents.lqg import LQG
+    from agents.mpc import MPC
     from agents.pid import PID
 
 _HOME = {
@@ -24,6 +25,7 @@ _HOME = {
     "LQ": "agents.lq",
     "LQG": "agents.lqg",
     "LineOfSight": "agents.los_autopilot",
+    "MPC": "agents.mpc",
     "PID": "agents.pid",
     "Controller": "agents.controller",
     "Flights": "agents.flight",
@@ -38,6 +40,7 @@ _HOME = {
 __all__ = [
     "LQ",
     "LQG",
+    "MPC",
     "PID",
     "AdaptiveLineOfSight",
     "Controller",
