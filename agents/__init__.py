@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from agents.lqg import LQG
     from agents.mpc import MPC
     from agents.pid import PID
+    from agents.scheduled_lq import ScheduledLQ
 
 _HOME = {
     "AdaptiveLineOfSight": "agents.los_autopilot",
@@ -30,6 +31,7 @@ _HOME = {
     "Controller": "agents.controller",
     "Flights": "agents.flight",
     "Policy": "agents.controller",
+    "ScheduledLQ": "agents.scheduled_lq",
     "StepResponses": "agents.flight",
     "check_controller": "agents.checker",
     "fly": "agents.flight",
@@ -48,6 +50,7 @@ __all__ = [
     "IntegralLineOfSight",
     "LineOfSight",
     "Policy",
+    "ScheduledLQ",
     "StepResponses",
     "check_controller",
     "fly",

@@ -44,6 +44,7 @@ HOMES = {
     "pid": ("agents.pid", "PID"),
     "lq": ("agents.lq", "LQ"),
     "lqg": ("agents.lqg", "LQG"),
+    "lq-scheduled": ("agents.scheduled_lq", "ScheduledLQ"),
     "mpc": ("agents.mpc", "MPC"),
     "los": ("agents.los_autopilot", "LineOfSight"),
     "ilos": ("agents.los_autopilot", "IntegralLineOfSight"),

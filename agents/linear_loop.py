@@ -96,7 +96,9 @@ def rate_weight(model: ShipModel) -> float:
     return float(RATE_WEIGHT * length_time(model) ** 2 + (FULL_RATE_ERROR / model.steering.rate) ** 2)
 
 
-def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> SampledShip:
+def sample_ship(
+    model: ShipModel, dt: float, first_order: bool = False, speed: float | None = None
+) -> SampledShip:
     """The linearised ship with its steering gear, sampled with the command held (zero-order hold).
 
     A gear without lag is taken to reach its order within the interval. Of a table with a memory of yaw the
@@ -109,6 +111,8 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
         Control interval, s.
     first_order : bool
         Whether yaw is reduced to K / (1 + T s), without sway or memory.
+    speed : float, optional
+        Surge speed at which the ship is linearised, m/s; by default that of straight running.
 
     Returns
     -------
@@ -121,7 +125,7 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     """
     import control  # here, because it takes a second to import
 
-    about = straight_running(model)
+    about = straight_running(model, speed)
     steering, rudder = linearise(model, about)
     if first_order:
         form = nomoto_of(steering, rudder)
