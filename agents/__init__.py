@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
+    from agents.filtered_pid import FilteredPID
     from agents.flight import Flights, StepResponses, fly, step_response
     from agents.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
     from agents.lq import LQ
@@ -29,6 +30,7 @@ _HOME = {
     "MPC": "agents.mpc",
     "PID": "agents.pid",
     "Controller": "agents.controller",
+    "FilteredPID": "agents.filtered_pid",
     "Flights": "agents.flight",
     "Policy": "agents.controller",
     "ScheduledLQ": "agents.scheduled_lq",
@@ -46,6 +48,7 @@ __all__ = [
     "PID",
     "AdaptiveLineOfSight",
     "Controller",
+    "FilteredPID",
     "Flights",
     "IntegralLineOfSight",
     "LineOfSight",

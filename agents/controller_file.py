@@ -42,6 +42,7 @@ FIELDS = (
 MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
 HOMES = {
     "pid": ("agents.pid", "PID"),
+    "pid-filtered": ("agents.filtered_pid", "FilteredPID"),
     "lq": ("agents.lq", "LQ"),
     "lqg": ("agents.lqg", "LQG"),
     "lq-scheduled": ("agents.scheduled_lq", "ScheduledLQ"),

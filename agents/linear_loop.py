@@ -182,8 +182,12 @@ class Compensator:
         return cls(np.zeros((0, 0)), np.zeros((0, n)), np.zeros((1, 0)), row)
 
     def closed_loop(self, ship: SampledShip) -> Floats:
-        """Matrix of ship and memory from one control interval to the next."""
-        return np.block([[ship.A + ship.B @ self.D, ship.B @ self.C], [self.B, self.A]])
+        """Matrix of ship and memory from one control interval to the next, without an integral not used."""
+        whole = np.block([[ship.A + ship.B @ self.D, ship.B @ self.C], [self.B, self.A]])
+        if np.any(self.D[:, INTEGRAL]) or np.any(self.B[:, INTEGRAL]):
+            return whole
+        kept = np.arange(len(whole)) != INTEGRAL
+        return whole[np.ix_(kept, kept)]
 
 
 def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) -> Margins:
