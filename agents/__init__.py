@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from agents.adaptive_lq import AdaptiveLQ
     from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from agents.lqg import LQG
     from agents.mpc import MPC
     from agents.pid import PID
+    from agents.robustness import MarginSpread, margin_spread
     from agents.scheduled_lq import ScheduledLQ
 
 _HOME = {
@@ -28,7 +30,9 @@ _HOME = {
     "LQG": "agents.lqg",
     "LineOfSight": "agents.los_autopilot",
     "MPC": "agents.mpc",
+    "MarginSpread": "agents.robustness",
     "PID": "agents.pid",
+    "AdaptiveLQ": "agents.adaptive_lq",
     "Controller": "agents.controller",
     "FilteredPID": "agents.filtered_pid",
     "Flights": "agents.flight",
@@ -38,6 +42,7 @@ _HOME = {
     "check_controller": "agents.checker",
     "fly": "agents.flight",
     "load_agent": "agents.controller_file",
+    "margin_spread": "agents.robustness",
     "step_response": "agents.flight",
 }
 
@@ -46,18 +51,21 @@ __all__ = [
     "LQG",
     "MPC",
     "PID",
+    "AdaptiveLQ",
     "AdaptiveLineOfSight",
     "Controller",
     "FilteredPID",
     "Flights",
     "IntegralLineOfSight",
     "LineOfSight",
+    "MarginSpread",
     "Policy",
     "ScheduledLQ",
     "StepResponses",
     "check_controller",
     "fly",
     "load_agent",
+    "margin_spread",
     "step_response",
 ]
 

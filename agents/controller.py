@@ -1,6 +1,6 @@
 """The classical autopilots' common part: from what the environment shows to the rudder.
 
-A controller is a list of gains on deviations from straight running. It keeps no state: the integral of
+A controller is a list of gains on deviations from straight running. By itself it keeps no state: the integral of
 the heading error, with its anti-windup, is part of the observation.
 """
 

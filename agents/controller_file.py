@@ -46,6 +46,7 @@ HOMES = {
     "lq": ("agents.lq", "LQ"),
     "lqg": ("agents.lqg", "LQG"),
     "lq-scheduled": ("agents.scheduled_lq", "ScheduledLQ"),
+    "lq-adaptive": ("agents.adaptive_lq", "AdaptiveLQ"),
     "mpc": ("agents.mpc", "MPC"),
     "los": ("agents.los_autopilot", "LineOfSight"),
     "ilos": ("agents.los_autopilot", "IntegralLineOfSight"),

@@ -123,15 +123,38 @@ def sample_ship(
     InputError
         If the model has no straight course.
     """
-    import control  # here, because it takes a second to import
-
     about = straight_running(model, speed)
     steering, rudder = linearise(model, about)
     if first_order:
         form = nomoto_of(steering, rudder)
         steering = np.diag([-1.0 / length_time(model), -1.0 / form.T])
         rudder = np.array([[0.0], [form.rudder_effect]])
-    lag = model.steering.time_constant
+    return sample_steering(steering, rudder, model.steering.time_constant, dt, about)
+
+
+def sample_steering(
+    steering: Floats, rudder: Floats, lag: float, dt: float, about: StraightRunning
+) -> SampledShip:
+    """The same from linear steering dynamics.
+
+    Parameters
+    ----------
+    steering : array of shape (2, 2)
+    rudder : array of shape (2, 1)
+        d/dt (v, r) = steering (v, r) + rudder delta, SI units.
+    lag : float
+        Of the steering gear, s.
+    dt : float
+        Control interval, s.
+    about : StraightRunning
+        The state about which motions are small.
+
+    Returns
+    -------
+    SampledShip
+    """
+    import control  # here, because it takes a second to import
+
     n = RUDDER + 1
     A, B = np.zeros((n, n)), np.zeros((n, 1))
     A[:ERROR, :ERROR] = steering
