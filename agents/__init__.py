@@ -9,33 +9,63 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from agents.adaptive_lq import AdaptiveLQ
+    from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
+    from agents.filtered_pid import FilteredPID
     from agents.flight import Flights, StepResponses, fly, step_response
+    from agents.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
     from agents.lq import LQ
+    from agents.lqg import LQG
+    from agents.mpc import MPC
     from agents.pid import PID
+    from agents.robustness import MarginSpread, margin_spread
+    from agents.scheduled_lq import ScheduledLQ
 
 _HOME = {
+    "AdaptiveLineOfSight": "agents.los_autopilot",
+    "IntegralLineOfSight": "agents.los_autopilot",
     "LQ": "agents.lq",
+    "LQG": "agents.lqg",
+    "LineOfSight": "agents.los_autopilot",
+    "MPC": "agents.mpc",
+    "MarginSpread": "agents.robustness",
     "PID": "agents.pid",
+    "AdaptiveLQ": "agents.adaptive_lq",
     "Controller": "agents.controller",
+    "FilteredPID": "agents.filtered_pid",
     "Flights": "agents.flight",
     "Policy": "agents.controller",
+    "ScheduledLQ": "agents.scheduled_lq",
     "StepResponses": "agents.flight",
+    "check_controller": "agents.checker",
     "fly": "agents.flight",
     "load_agent": "agents.controller_file",
+    "margin_spread": "agents.robustness",
     "step_response": "agents.flight",
 }
 
 __all__ = [
     "LQ",
+    "LQG",
+    "MPC",
     "PID",
+    "AdaptiveLQ",
+    "AdaptiveLineOfSight",
     "Controller",
+    "FilteredPID",
     "Flights",
+    "IntegralLineOfSight",
+    "LineOfSight",
+    "MarginSpread",
     "Policy",
+    "ScheduledLQ",
     "StepResponses",
+    "check_controller",
     "fly",
     "load_agent",
+    "margin_spread",
     "step_response",
 ]
 

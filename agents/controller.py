@@ -1,6 +1,6 @@
 """The classical autopilots' common part: from what the environment shows to the rudder.
 
-A controller is a list of gains on deviations from straight running. It keeps no state: the integral of
+A controller is a list of gains on deviations from straight running. By itself it keeps no state: the integral of
 the heading error, with its anti-windup, is part of the observation.
 """
 
@@ -9,14 +9,21 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.linear_loop import Margins, SampledShip, loop_margins
+from agents.linear_loop import (
+    Compensator,
+    Margins,
+    SampledShip,
+    compensator_margins,
+    feedback_row,
+    sample_ship,
+)
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
@@ -67,6 +74,13 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
+    #: What it observes, and names of its gains where they are not those of `feedback`.
+    observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    gain_names: ClassVar[tuple[str, ...]] = ()
+    #: Whether it leads another controller, its `autopilot`, which the file holds too.
+    has_autopilot: ClassVar[bool] = False
+    #: Arrays that the file holds beside the gains: names of fields, and of the lengths of their axes.
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {}
 
     gains: dict[str, float]
     neutral_rudder: float
@@ -80,7 +94,12 @@ class Controller:
 
     @classmethod
     def designed(
-        cls, model: ShipModel, ship: SampledShip, gains: dict[str, float], design: dict[str, float]
+        cls,
+        model: ShipModel,
+        ship: SampledShip,
+        gains: dict[str, float],
+        design: dict[str, float],
+        **more: Any,
     ) -> Self:
         """The controller with these gains, its margins computed.
 
@@ -94,23 +113,52 @@ class Controller:
             By the names of `feedback`.
         design : dict of str to float
             How they were found.
+        **more
+            Further fields of the class.
 
         Raises
         ------
         InputError
             If the closed loop is unstable.
         """
-        by_signal = {signal: sign * gains[gain] for gain, (signal, sign) in cls.feedback.items()}
-        return cls(
+        unknown = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
+        found = cls(
             gains=gains,
             neutral_rudder=ship.about.rudder,
             neutral_sway=ship.about.sway,
-            margins=loop_margins(ship, by_signal, f"{cls.__name__} on model '{model.name}'"),
+            margins=unknown,
             observation_scales=tuple(observation_scales(model).tolist()),
             model_name=model.name,
             model_sha256=model_hash(model),
             design={"dt": ship.dt, **design},
+            **more,
         )
+        return replace(found, margins=found._margins(ship, model))
+
+    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
+        return compensator_margins(ship, self.loop(), f"{type(self).__name__} on model '{model.name}'")
+
+    def loop(self) -> Compensator:
+        """The controller for small motions, without limits: what its margins are computed from."""
+        by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
+        return Compensator.static(feedback_row(by_signal))
+
+    def margins_on(self, model: ShipModel) -> Margins:
+        """Margins and bandwidth of the same controller on another ship.
+
+        Raises
+        ------
+        InputError
+            If the closed loop is unstable, or the model has no straight course.
+        """
+        return self._margins(sample_ship(model, self.design["dt"]), model)
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships.
+
+        What there is to remember is in the state that `predict` hands back, so one controller may steer
+        any number of episodes side by side.
+        """
 
     @property
     def name(self) -> str:

@@ -3,7 +3,7 @@
 Format 1:
 
     format               1
-    kind                 "pid" or "lq"
+    kind                 "pid", "lq", ... (`HOMES`)
     observation_names    what it observes, in order
     observation_scales   physical value of each observation of 1, SI units
     gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
@@ -12,6 +12,8 @@ Format 1:
     model                {"name", "sha256"}: what it was designed on
     margins              {name: value or null for no limit}
     design               {name: value}: how it was designed
+    autopilot            a controller of this format; only of guidance
+    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
 """
 
 from __future__ import annotations
@@ -27,7 +29,6 @@ import numpy as np
 from agents.controller import Controller, check_names
 from agents.linear_loop import Margins
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel
@@ -38,7 +39,19 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-HOMES = {"pid": ("agents.pid", "PID"), "lq": ("agents.lq", "LQ")}
+MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
+HOMES = {
+    "pid": ("agents.pid", "PID"),
+    "pid-filtered": ("agents.filtered_pid", "FilteredPID"),
+    "lq": ("agents.lq", "LQ"),
+    "lqg": ("agents.lqg", "LQG"),
+    "lq-scheduled": ("agents.scheduled_lq", "ScheduledLQ"),
+    "lq-adaptive": ("agents.adaptive_lq", "AdaptiveLQ"),
+    "mpc": ("agents.mpc", "MPC"),
+    "los": ("agents.los_autopilot", "LineOfSight"),
+    "ilos": ("agents.los_autopilot", "IntegralLineOfSight"),
+    "alos": ("agents.los_autopilot", "AdaptiveLineOfSight"),
+}
 
 
 def save(controller: Controller, path: Path) -> None:
@@ -49,8 +62,13 @@ def save(controller: Controller, path: Path) -> None:
     InputError
         If the folder does not exist or cannot be written.
     """
+    write_json(controller_content(controller), path)
+
+
+def controller_content(controller: Controller) -> dict[str, Any]:
+    """What a controller's file holds."""
     margins = asdict(controller.margins)
-    content = {
+    content: dict[str, Any] = {
         "format": FORMAT,
         "kind": controller.kind,
         "observation_names": list(controller.observation_names),
@@ -62,7 +80,11 @@ def save(controller: Controller, path: Path) -> None:
         "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
         "design": controller.design,
     }
-    write_json(content, path)
+    if controller.arrays:
+        content["arrays"] = {name: getattr(controller, name).tolist() for name in controller.arrays}
+    if controller.has_autopilot:
+        content["autopilot"] = controller_content(getattr(controller, "autopilot"))  # noqa: B009
+    return content
 
 
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
@@ -77,7 +99,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
     Returns
     -------
     Controller
-        A `PID` or an `LQ`.
+        Of the kind that was saved.
 
     Raises
     ------
@@ -96,41 +118,81 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
-    check_keys(content, FIELDS, where)
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(FIELDS)}")
+    check_keys(content, (*FIELDS, *MORE_FIELDS), where)
+    _check_all_there(content, FIELDS, where)
     home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
     design: type[Controller] = getattr(import_module(home), name)
+    has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
+    expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
+    check_keys(content, expected, where)
+    _check_all_there(content, expected, where)
     model = check_table(content["model"], f"{where}: model")
     check_keys(model, ("name", "sha256"), f"{where}: model")
-    _check_observations(content["observation_names"], where)
+    _check_observations(content["observation_names"], design.observes, where)
+    more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
+    if design.has_autopilot:
+        more["autopilot"] = _controller(
+            check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
+        )
     return design(
-        gains=_numbers(content["gains"], tuple(design.feedback), f"{where}: gains"),
+        gains=_numbers(content["gains"], design.gain_names or tuple(design.feedback), f"{where}: gains"),
         neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
         neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
         margins=_margins(content["margins"], f"{where}: margins"),
-        observation_scales=_scales(content["observation_scales"], where),
+        observation_scales=_scales(content["observation_scales"], design.observes, where),
         model_name=check_text(model.get("name"), f"{where}: model.name"),
         model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
         design=_design(content["design"], f"{where}: design"),
+        observation_names=design.observes,
+        **more,
     )
 
 
-def _check_observations(names: Any, where: str) -> None:
+def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
+    for name in expected:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(expected)}")
+
+
+def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict[str, Any]:
+    """Arrays of finite numbers, whose axes of one name have one length."""
+    table = check_table(value, where)
+    check_keys(table, tuple(axes), where)
+    lengths: dict[str, int] = {}
+    arrays = {}
+    for name, named in axes.items():
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
+        try:
+            array = np.array(table[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where}.{name}: expected nested lists of numbers; {REMEDY}") from None
+        fits = array.ndim == len(named) and bool(np.isfinite(array).all())
+        if fits:
+            fits = all(lengths.setdefault(axis, n) == n for axis, n in zip(named, array.shape, strict=True))
+        if not fits:
+            raise InputError(
+                f"{where}.{name}: shape {array.shape} or a number that is not finite found, expected finite "
+                f"numbers of shape ({', '.join(named)}); {REMEDY}"
+            )
+        arrays[name] = array
+    return arrays
+
+
+def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> None:
     """The observations must be those of the environment, in its order."""
     if not isinstance(names, list):
         raise InputError(f"{where}: observation_names: {names!r} found, expected a list of names")
-    check_names([str(name) for name in names], OBSERVATION_NAMES, f"{where}: observation_names")
+    check_names([str(name) for name in names], expected, f"{where}: observation_names")
 
 
-def _scales(value: Any, where: str) -> tuple[float, ...]:
-    n = len(OBSERVATION_NAMES)
+def _scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+    n = len(names)
     if not isinstance(value, list) or len(value) != n:
         found = len(value) if isinstance(value, list) else repr(value)
         raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
     return tuple(
-        check_number(scale, f"{where}: observation_scales[{i}] ('{OBSERVATION_NAMES[i]}')", above=0.0)
+        check_number(scale, f"{where}: observation_scales[{i}] ('{names[i]}')", above=0.0)
         for i, scale in enumerate(value)
     )
 

@@ -21,6 +21,7 @@ from shipgym.models import ShipModel
 from shipgym.models.linear import StraightRunning, linearise, nomoto_of, straight_running
 
 Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
 
 SIGNALS = ("sway", "yaw_rate", "heading_error", "rudder", "heading_error_integral")
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(5)
@@ -95,7 +96,9 @@ def rate_weight(model: ShipModel) -> float:
     return float(RATE_WEIGHT * length_time(model) ** 2 + (FULL_RATE_ERROR / model.steering.rate) ** 2)
 
 
-def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> SampledShip:
+def sample_ship(
+    model: ShipModel, dt: float, first_order: bool = False, speed: float | None = None
+) -> SampledShip:
     """The linearised ship with its steering gear, sampled with the command held (zero-order hold).
 
     A gear without lag is taken to reach its order within the interval. Of a table with a memory of yaw the
@@ -108,6 +111,8 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
         Control interval, s.
     first_order : bool
         Whether yaw is reduced to K / (1 + T s), without sway or memory.
+    speed : float, optional
+        Surge speed at which the ship is linearised, m/s; by default that of straight running.
 
     Returns
     -------
@@ -118,15 +123,38 @@ def sample_ship(model: ShipModel, dt: float, first_order: bool = False) -> Sampl
     InputError
         If the model has no straight course.
     """
-    import control  # here, because it takes a second to import
-
-    about = straight_running(model)
+    about = straight_running(model, speed)
     steering, rudder = linearise(model, about)
     if first_order:
         form = nomoto_of(steering, rudder)
         steering = np.diag([-1.0 / length_time(model), -1.0 / form.T])
         rudder = np.array([[0.0], [form.rudder_effect]])
-    lag = model.steering.time_constant
+    return sample_steering(steering, rudder, model.steering.time_constant, dt, about)
+
+
+def sample_steering(
+    steering: Floats, rudder: Floats, lag: float, dt: float, about: StraightRunning
+) -> SampledShip:
+    """The same from linear steering dynamics.
+
+    Parameters
+    ----------
+    steering : array of shape (2, 2)
+    rudder : array of shape (2, 1)
+        d/dt (v, r) = steering (v, r) + rudder delta, SI units.
+    lag : float
+        Of the steering gear, s.
+    dt : float
+        Control interval, s.
+    about : StraightRunning
+        The state about which motions are small.
+
+    Returns
+    -------
+    SampledShip
+    """
+    import control  # here, because it takes a second to import
+
     n = RUDDER + 1
     A, B = np.zeros((n, n)), np.zeros((n, 1))
     A[:ERROR, :ERROR] = steering
@@ -152,6 +180,39 @@ def feedback_row(feedback: Mapping[str, float]) -> Floats:
     return np.array([[feedback.get(signal, 0.0) for signal in SIGNALS]])
 
 
+@dataclass(frozen=True, eq=False)
+class Compensator:
+    """A linear controller with a memory: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
+
+    Attributes
+    ----------
+    A : array of shape (n_memory, n_memory)
+    B : array of shape (n_memory, 5)
+    C : array of shape (1, n_memory)
+    D : array of shape (1, 5)
+        y in the order of `SIGNALS`, deviations in SI units.
+    """
+
+    A: Floats
+    B: Floats
+    C: Floats
+    D: Floats
+
+    @classmethod
+    def static(cls, row: Floats) -> Compensator:
+        """Feedback without a memory, of a row of shape (1, 5)."""
+        n = len(SIGNALS)
+        return cls(np.zeros((0, 0)), np.zeros((0, n)), np.zeros((1, 0)), row)
+
+    def closed_loop(self, ship: SampledShip) -> Floats:
+        """Matrix of ship and memory from one control interval to the next, without an integral not used."""
+        whole = np.block([[ship.A + ship.B @ self.D, ship.B @ self.C], [self.B, self.A]])
+        if np.any(self.D[:, INTEGRAL]) or np.any(self.B[:, INTEGRAL]):
+            return whole
+        kept = np.arange(len(whole)) != INTEGRAL
+        return whole[np.ix_(kept, kept)]
+
+
 def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) -> Margins:
     """Stability margins and bandwidth of order = sum of feedback times signal.
 
@@ -173,11 +234,32 @@ def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) ->
     InputError
         If the closed loop is unstable.
     """
+    return compensator_margins(ship, Compensator.static(feedback_row(feedback)), name)
+
+
+def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) -> Margins:
+    """Stability margins and bandwidth of any linear controller.
+
+    Parameters
+    ----------
+    ship : SampledShip
+    compensator : Compensator
+    name : str
+        Of the design, for the message.
+
+    Returns
+    -------
+    Margins
+        From the frequency response of the sampled loop (`control.stability_margins`).
+
+    Raises
+    ------
+    InputError
+        If the closed loop is unstable.
+    """
     import control
 
-    row = feedback_row(feedback)
-    closed = ship.A + ship.B @ row
-    largest = float(np.abs(np.linalg.eigvals(closed)).max())
+    largest = float(np.abs(np.linalg.eigvals(compensator.closed_loop(ship))).max())
     if largest >= 1.0:
         raise InputError(
             f"{name}: the closed loop is unstable with these gains (largest sampled pole {largest:.4f}, "
@@ -185,29 +267,30 @@ def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) ->
         )
     nyquist = np.pi / ship.dt
     omega = np.geomspace(SLOWEST * nyquist, 0.999 * nyquist, FREQUENCIES)
-    of_rudder = feedback_row({"rudder": feedback.get("rudder", 0.0)})
-    opened = control.ss(ship.A + ship.B @ of_rudder, ship.B, of_rudder - row, 0.0, ship.dt)
-    response = opened(np.exp(1j * omega * ship.dt))
-    found: Any = control.stability_margins(control.frd(response, omega), returnall=True)
+    opened, following = _responses(ship, compensator, omega)
+    found: Any = control.stability_margins(control.frd(opened, omega), returnall=True)
     gains, phases, _, _, crossings, _ = (np.asarray(values, dtype=float) for values in found)
+    beyond = np.flatnonzero(np.abs(following) < np.sqrt(0.5))
     return Margins(
         gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
         phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
         delay_margin_s=float(min(np.radians(phases % 360.0) / crossings, default=np.inf)),
-        bandwidth_rad_s=_bandwidth(ship, closed, row, omega),
+        bandwidth_rad_s=float(omega[beyond[0]]) if len(beyond) else float(omega[-1]),
         lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
     )
 
 
-def _bandwidth(ship: SampledShip, closed: Floats, row: Floats, omega: Floats) -> float:
-    """Frequency from which the heading follows its set-point with less than 1 / sqrt(2), rad/s."""
+def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tuple[Complexes, Complexes]:
+    """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
     import control
 
-    set_point = ship.B * row[0, ERROR]
-    set_point[INTEGRAL] += ship.dt
-    heading = np.zeros((1, len(SIGNALS)))
-    heading[0, ERROR] = -1.0
-    following = control.ss(closed, set_point, heading, 0.0, ship.dt)
-    gain = np.abs(following(np.exp(1j * omega * ship.dt)))
-    beyond = np.flatnonzero(gain < np.sqrt(0.5))
-    return float(omega[beyond[0]]) if len(beyond) else float(omega[-1])
+    z = np.exp(1j * omega * ship.dt)
+    n = len(SIGNALS)
+    motions = control.ss(ship.A, ship.B, np.eye(n), 0.0, ship.dt)(z)[:, 0]
+    c = compensator
+    orders = control.ss(c.A, c.B, c.C, c.D, ship.dt)(z)[0] if len(c.A) else np.tile(c.D.T, len(z))
+    of_rudder = orders[RUDDER] * motions[RUDDER]
+    of_motions = (orders * motions).sum(axis=0) - of_rudder
+    set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
+    following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
+    return -of_motions / (1.0 - of_rudder), following

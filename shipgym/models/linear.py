@@ -105,7 +105,7 @@ class Nomoto:
         return self.K / self.T
 
 
-def straight_running(model: ShipModel) -> StraightRunning:
+def straight_running(model: ShipModel, speed: float | None = None) -> StraightRunning:
     """Speed, drift and neutral rudder at which a ship runs straight.
 
     A single-screw ship needs a little rudder to run straight (Mariner 1.1 degrees to port). Where the model's
@@ -114,6 +114,9 @@ def straight_running(model: ShipModel) -> StraightRunning:
     Parameters
     ----------
     model : ShipModel
+    speed : float, optional
+        Surge speed that is held instead, m/s, with the shaft as at service speed: a ship that has lost
+        speed in a turn or in weather.
 
     Returns
     -------
@@ -124,21 +127,25 @@ def straight_running(model: ShipModel) -> StraightRunning:
     InputError
         If the model has no straight course within physical drift and rudder angles.
     """
-    found = _balance(model, [name for name in BALANCED_BY if name in model.state_names])
+    found = None
+    if speed is None:
+        found = _balance(model, [name for name in BALANCED_BY if name in model.state_names])
     if found is None or not SLOWEST < found["u"] / model.particulars["speed"] < FASTEST:
-        found = _balance(model, [name for name in BALANCED_BY if name in model.state_names and name != "u"])
+        others = [name for name in BALANCED_BY if name in model.state_names and name != "u"]
+        found = _balance(model, others, speed)
     if found is None:
+        held = speed or model.particulars["speed"]
         raise InputError(
             f"model {model.name!r}: no straight course found with less than "
-            f"{np.degrees(LARGEST_RUDDER):.0f} deg of rudder at {model.particulars['speed']:g} m/s; identify "
+            f"{np.degrees(LARGEST_RUDDER):.0f} deg of rudder at {held:g} m/s; identify "
             f"it from trials that turn to both sides, or check the sign of the rudder"
         )
-    others = (found.get(name, 0.0) for name in ("phi", "n", "q"))
-    return StraightRunning(found["u"], found["v"], found["delta"], *others)
+    rest = (found.get(name, 0.0) for name in ("phi", "n", "q"))
+    return StraightRunning(found["u"], found["v"], found["delta"], *rest)
 
 
-def _balance(model: ShipModel, unknowns: list[str]) -> dict[str, float] | None:
-    """State without accelerations, found from service speed by changing the unknowns; SI units by name."""
+def _balance(model: ShipModel, unknowns: list[str], speed: float | None = None) -> dict[str, float] | None:
+    """State without accelerations, found from a speed by changing the unknowns; SI units by name."""
     from scipy.optimize import root
 
     columns = [model.state_names.index(name) for name in unknowns]
@@ -147,6 +154,8 @@ def _balance(model: ShipModel, unknowns: list[str]) -> dict[str, float] | None:
 
     def state_with(deviations: Floats) -> Floats:
         state = model.service_state.copy()
+        if speed is not None and "u" in model.state_names:
+            state[model.state_names.index("u")] = speed
         state[columns] += deviations * scales[columns]
         return state
 

@@ -1,0 +1,92 @@
+"""Adaptive LQ: it ends at the design of the ship that it steers, whatever it was designed on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents import LQ, AdaptiveLQ, check_controller, fly, load_agent
+from agents.adaptive_lq import GAINS
+from agents.linear_loop import SIGNALS
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.errors import InputError
+from shipgym.models import load_model
+from shipgym.models.conversions import nomoto, nomoto2_ship
+
+MARINER = load_model("mariner")
+GENTLE = CourseKeepingTask(course_change_deg=10.0, episode_steps=2000)
+
+
+def changed(**factors):
+    coefficients = {name: value * factors.get(name, 1.0) for name, value in MARINER.coefficients.items()}
+    return replace(MARINER, coefficients=coefficients)
+
+
+WEAK_RUDDER = changed(N_d=0.5, N_ud=0.5, N_r=1.5, N_ur=1.5, N_v=1.3, N_uv=1.3)
+UNSTABLE = changed(N_v=1.7, N_uv=1.7)
+
+
+def sail(controller, model, steps, task=GENTLE, state=None):
+    """State after so many steps of two episodes, shape (2, memory_size)."""
+    engine = CourseKeepingEngine(model, 2, task)
+    seen = engine.reset(np.arange(2))
+    for _ in range(steps):
+        action, state = controller.predict(seen, state)
+        seen, *_ = engine.step(action)
+    return state
+
+
+@pytest.mark.parametrize(
+    ("believed", "true"), [(WEAK_RUDDER, MARINER), (MARINER, UNSTABLE), (MARINER, WEAK_RUDDER)]
+)
+def test_it_converges_to_the_design_of_the_true_ship(believed, true):
+    adaptive = AdaptiveLQ.from_model(believed, noise=0.0)
+    wanted = np.array([LQ.from_model(true).gains[signal] for signal in SIGNALS])
+    begun = np.array([adaptive.gains[signal] for signal in SIGNALS])
+    reached = sail(adaptive, true, 1500)[:, GAINS]
+    size = np.abs(wanted)
+    assert np.all(np.abs(reached - wanted) < 0.12 * size)
+    before, after = (np.linalg.norm((gains - wanted) / size, axis=-1) for gains in (begun, reached))
+    assert np.all(after < 0.35 * before)
+
+
+def test_a_ship_that_changes_at_sea_is_followed():
+    """The rudder loses half of its effect; after half an hour its new one is known."""
+    adaptive = AdaptiveLQ.from_model(MARINER, noise=0.0, forgetting_lengths=10.0)
+    effects = []
+    state = None
+    for ship in (MARINER, WEAK_RUDDER):
+        state = sail(adaptive, ship, 1000 if state is None else 2000, state=state)
+        effects.append(adaptive.coefficients(state[0])[1, 2] / AdaptiveLQ.from_model(ship).prior[1, 2])
+    assert effects == pytest.approx([1.0, 1.0], abs=0.08)
+
+
+def test_on_its_own_ship_it_stays_near_its_design_at_no_more_cost():
+    adaptive, lq = AdaptiveLQ.from_model(MARINER), LQ.from_model(MARINER)
+    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(12)) for pilot in (adaptive, lq))
+    assert ours.cost.mean() < 1.01 * theirs.cost.mean()
+
+
+def test_in_noise_it_keeps_what_it_gained():
+    """A model wrong by half in the rudder's effect; noise of a sea trial's sensors."""
+    task = CourseKeepingTask(course_change_deg=30.0, episode_steps=1500, noise=1.0)
+    ours, theirs = (
+        fly(kind.from_model(WEAK_RUDDER), MARINER, task, np.arange(12)) for kind in (AdaptiveLQ, LQ)
+    )
+    assert ours.cost.mean() < theirs.cost.mean()
+    assert not ours.terminated.any()
+
+
+def test_it_is_a_controller_and_a_file(tmp_path):
+    adaptive = AdaptiveLQ.from_model(MARINER)
+    check_controller(adaptive, MARINER, n_steps=45)
+    adaptive.save(tmp_path / "adaptive.json")
+    again = load_agent(tmp_path / "adaptive.json", MARINER)
+    assert np.array_equal(*(sail(one, MARINER, 50) for one in (adaptive, again)))
+
+
+def test_a_ship_without_sway_is_refused():
+    ship = nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering)
+    with pytest.raises(InputError, match="has no sway, expected one with surge, sway and yaw"):
+        AdaptiveLQ.from_model(ship)

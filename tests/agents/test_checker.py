@@ -1,0 +1,121 @@
+"""The conformance suite finds each broken promise and passes controllers that keep them."""
+
+import numpy as np
+import pytest
+
+from agents import LQ, LQG, PID, check_controller
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.models import load_model
+
+MARINER = load_model("mariner")
+
+
+@pytest.mark.parametrize("kind", [PID, LQ, LQG])
+def test_our_controllers_pass_in_both_tasks(kind):
+    controller = kind.from_model(MARINER)
+    check_controller(controller, n_steps=20)
+    check_controller(controller, MARINER, PathFollowingTask(), n_steps=20)
+
+
+class Helmsman:
+    """A user's own: rudder like heading error."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return self.answer(np.asarray(observation), state)
+
+    def answer(self, seen, state):
+        return seen[..., :1], state
+
+
+class Moody(Helmsman):
+    def __init__(self):
+        self.calls = 0
+
+    def answer(self, seen, state):
+        self.calls += 1
+        return seen[..., :1] * (1.0 - 1e-3 * self.calls), state
+
+
+class Herd(Helmsman):
+    def answer(self, seen, state):
+        return np.broadcast_to(seen[..., :1].mean(), seen[..., :1].shape), state
+
+
+class Hanger(Helmsman):
+    """Remembers the last heading error, also beyond the episode."""
+
+    def answer(self, seen, state):
+        before = seen[..., :1] if state is None else state
+        return 0.5 * (seen[..., :1] + before), seen[..., :1].copy()
+
+
+class Vandal(Helmsman):
+    def answer(self, seen, state):
+        action = seen[..., :1].copy()
+        seen *= 1.0
+        seen[..., -1] = 0.123
+        return action, state
+
+
+class Divider(Helmsman):
+    def answer(self, seen, state):
+        return seen[..., :1] * np.nan, state
+
+
+class Hard(Helmsman):
+    def answer(self, seen, state):
+        return 100.0 * seen[..., :1], state
+
+
+class Flat(Helmsman):
+    def answer(self, seen, state):
+        return seen[..., 0], state
+
+
+class Curt(Helmsman):
+    def answer(self, seen, state):
+        return seen[..., :1]
+
+
+class Short:
+    def predict(self, observation):
+        return observation[..., :1], None
+
+
+class Misnamed(Helmsman):
+    observation_names = ("heading_error", *OBSERVATION_NAMES[1:])
+
+
+class Misscaled(Helmsman):
+    observation_names = OBSERVATION_NAMES
+    observation_scales = (1.0, 2.0)
+
+
+def test_a_user_s_own_passes():
+    check_controller(Helmsman())
+    check_controller(Helmsman(), load_model("kvlcc2"), n_steps=3)
+
+
+@pytest.mark.parametrize(
+    ("controller", "message"),
+    [
+        (Moody(), "asked again with the same state it answers"),
+        (Herd(), "ship 0 alone: .* rows of a batch and episodes must not know of each other"),
+        (Hanger(), "with episode_start True and the state of another episode"),
+        (Vandal(), "the observation was changed"),
+        (Divider(), "step 0: action .*nan.* found"),
+        (Hard(), r"expected \[-1, 1\]"),
+        (Flat(), r"action of shape \(3,\) found, expected \(3, 1\)"),
+        (Curt(), "ndarray found, expected a pair: action and state"),
+        (Short(), "unexpected keyword argument 'state'; expected predict"),
+        (object(), "no method 'predict' found"),
+        (Misnamed(), "observation 0 is 'heading_error_sin', expected 'heading_error'"),
+        (Misscaled(), "made for the scale 2 of 'heading_error_cos', which is 1"),
+    ],
+    ids=lambda value: type(value).__name__ if not isinstance(value, str) else "",
+)
+def test_a_broken_promise_is_named(controller, message):
+    with pytest.raises(InputError, match=message):
+        check_controller(controller, MARINER)

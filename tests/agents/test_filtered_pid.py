@@ -1,0 +1,115 @@
+"""PID with reference filter, anti-windup and wave filter: what each of them does."""
+
+import numpy as np
+import pytest
+
+from agents import PID, FilteredPID, check_controller, fly, load_agent, step_response
+from agents.filtered_pid import LEAD, TURN, notch_band
+from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
+from shipgym.errors import InputError
+from shipgym.models import load_model
+
+MARINER = load_model("mariner")
+INFINITE = float("inf")
+
+
+@pytest.fixture(scope="module")
+def filtered():
+    return FilteredPID.from_model(MARINER)
+
+
+def test_its_loop_has_the_margins_of_the_plain_pid(filtered):
+    plain = PID.from_model(MARINER)
+    assert filtered.gains == plain.gains
+    assert filtered.margins.gain_margin == pytest.approx(plain.margins.gain_margin, rel=1e-6)
+    assert filtered.margins.phase_margin_deg == pytest.approx(plain.margins.phase_margin_deg, rel=1e-6)
+
+
+def test_the_reference_is_the_step_response_of_three_equal_poles():
+    """1 - (1 + w t + (w t)^2 / 2) exp(-w t), for a course change that the ship has not followed yet."""
+    pid = FilteredPID.from_model(MARINER, frequency=0.02, reference_share=1.0)
+    scales, state, reference = observation_scales(MARINER), None, []
+    for k in range(400):
+        error = np.radians(20.0) if k else 0.0
+        seen = np.array([np.sin(error), np.cos(error), 0.0, 0.0, 7.0, 0.0, 0.0, 0.0]) / scales
+        _, state = pid.predict(seen, state)
+        reference.append(np.radians(20.0) + state[LEAD])
+    t = 0.02 * np.arange(399)
+    expected = np.radians(20.0) * (1.0 - (1.0 + t + 0.5 * t**2) * np.exp(-t))
+    assert np.abs(np.array(reference[1:]) - expected).max() < np.radians(0.5)
+
+
+def test_the_reference_turns_no_faster_than_asked():
+    pid = FilteredPID.from_model(MARINER, largest_turn_rate_deg_s=0.2)
+    response = step_response(pid, MARINER, 60.0, duration=900.0)
+    steady = np.diff(np.degrees(response.heading[0]))[100:250]
+    assert steady == pytest.approx(0.2, abs=0.02)
+    assert np.degrees(response.heading[0, -1]) == pytest.approx(60.0, abs=0.3)
+
+
+def test_a_gentler_reference_needs_less_rudder(filtered):
+    gentle = FilteredPID.from_model(MARINER, reference_share=1.5)
+    largest = [np.abs(step_response(pid, MARINER, 30.0).rudder).max() for pid in (gentle, filtered)]
+    assert largest[0] < 0.7 * largest[1]
+
+
+def test_with_the_reference_it_costs_less_than_the_plain_pid(filtered):
+    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(16)) for pilot in (filtered, PID.from_model(MARINER)))
+    assert ours.cost.mean() < theirs.cost.mean()
+
+
+def test_anti_windup_halves_the_overshoot_of_a_weak_rudder():
+    """A course change with the rudder at its limit for long: the integral gives back what is cut off."""
+    overshoots = []
+    for tracking in (2.0, INFINITE):
+        pid = FilteredPID.from_model(
+            MARINER, integral_lengths=6.0, reference_share=INFINITE, tracking_lengths=tracking
+        )
+        heading = step_response(pid, MARINER, 60.0, duration=1500.0).heading[0]
+        overshoots.append(np.degrees(heading.max()) - 60.0)
+    assert overshoots[0] < 0.6 * overshoots[1]
+
+
+def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
+    band, once, twice = notch_band(0.7)
+
+    def passes(turn):
+        z = np.exp(1j * turn)
+        return abs(1.0 - band * (1.0 - z**-2) / (1.0 + once / z + twice / z**2))
+
+    assert passes(0.7) == pytest.approx(0.1 / 0.7, rel=1e-9)
+    assert passes(1e-6) == pytest.approx(1.0, abs=1e-5)
+    assert passes(np.pi) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_the_wave_filter_spares_the_rudder(filtered):
+    deaf = FilteredPID.from_model(MARINER, wave_period=9.0)
+    task = CourseKeepingTask(sea="moderate")
+    ours, theirs = (fly(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
+    assert ours.rudder_travel_deg_min.mean() < 0.7 * theirs.rudder_travel_deg_min.mean()
+    assert ours.cost.mean() < theirs.cost.mean()
+    assert 35.0 < deaf.margins.phase_margin_deg < filtered.margins.phase_margin_deg
+
+
+def test_a_steady_course_is_reached_without_error(filtered):
+    heading = step_response(filtered, MARINER, 20.0, duration=2500.0).heading[0]
+    assert np.degrees(heading[-1]) == pytest.approx(20.0, abs=0.01)
+
+
+@pytest.mark.parametrize("period", [None, 9.0])
+def test_it_is_a_controller_and_a_file(period, tmp_path):
+    pid = FilteredPID.from_model(MARINER, wave_period=period)
+    check_controller(pid, MARINER, CourseKeepingTask(noise=1.0), n_steps=20)
+    pid.save(tmp_path / "pid.json")
+    again = load_agent(tmp_path / "pid.json", MARINER)
+    shown = np.random.default_rng(0).uniform(-0.3, 0.3, (4, 8))
+    _, state = pid.predict(shown)
+    assert np.array_equal(again.predict(shown, state)[0], pid.predict(shown, state)[0])
+    assert state.shape == (4, pid.memory_size)
+    assert np.all(state[:, TURN] != 0.0)
+
+
+def test_impossible_designs_are_refused():
+    for arguments in ({"reference_share": 0.0}, {"tracking_lengths": -1.0}, {"wave_period": 1.0}):
+        with pytest.raises(InputError, match=f"{next(iter(arguments))}: .* found"):
+            FilteredPID.from_model(MARINER, **arguments)

@@ -1,0 +1,116 @@
+"""Line of sight over heading autopilots: what a current does, and what integral and adaptive forms undo."""
+
+import numpy as np
+import pytest
+
+from agents import (
+    LQ,
+    LQG,
+    PID,
+    AdaptiveLineOfSight,
+    IntegralLineOfSight,
+    LineOfSight,
+    check_controller,
+    load_agent,
+)
+from shipgym.envs.path_following import PathFollowingEngine
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.models import load_model
+from shipgym.weather.conditions import Current, Weather
+
+MARINER = load_model("mariner")
+LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]
+CURRENT = 1.5
+STRAIGHT = PathFollowingTask(
+    waypoints=[(0.0, 0.0), (300.0 * LENGTH, 0.0)],
+    sea=Weather(current=Current(CURRENT, 90.0)),
+    episode_steps=2600,
+)
+
+
+def cross_track(controller, task, n=1):
+    """Cross-track errors, m, shape (n_steps, n), and rewards summed, shape (n,)."""
+    engine = PathFollowingEngine(MARINER, n, task)
+    seen, state, errors, total = engine.reset(np.arange(n)), None, [], np.zeros(n)
+    for step in range(task.episode_steps):
+        action, state = controller.predict(seen, state, np.full(n, step == 0))
+        seen, rewards, *_ = engine.step(action)
+        total += rewards
+        errors.append(engine.info("cross_track").copy())
+    return np.array(errors), total
+
+
+@pytest.mark.parametrize("law", [IntegralLineOfSight, AdaptiveLineOfSight])
+def test_a_steady_current_leaves_no_error(law):
+    errors, _ = cross_track(law.from_model(MARINER), STRAIGHT)
+    assert np.abs(errors).max() > 0.3 * LENGTH
+    assert np.abs(errors[-100:]).max() < 1e-4 * LENGTH
+
+
+def test_without_integral_the_ship_is_set_off_by_the_lookahead_times_the_tangent_of_the_crab_angle():
+    errors, _ = cross_track(LineOfSight.from_model(MARINER), STRAIGHT)
+    assert errors[-1] == pytest.approx(2.5 * LENGTH * np.tan(np.arcsin(CURRENT / SPEED)), rel=0.02)
+    shorter, _ = cross_track(LineOfSight.from_model(MARINER, lookahead_lengths=1.5), STRAIGHT)
+    assert shorter[-1] == pytest.approx(0.6 * errors[-1], rel=0.02)
+
+
+@pytest.mark.parametrize("pilot", [PID, LQG])
+def test_any_heading_autopilot_is_led(pilot):
+    guided = IntegralLineOfSight.from_model(MARINER, autopilot=pilot.from_model(MARINER))
+    errors, _ = cross_track(guided, STRAIGHT)
+    assert np.abs(errors[-100:]).max() < 1e-3 * LENGTH
+
+
+def test_paths_with_turns_in_a_current_cost_less_with_the_integral():
+    task = PathFollowingTask(sea=Weather(current=Current(CURRENT)))
+    integral, plain = (
+        cross_track(law.from_model(MARINER), task, 16)[1] for law in (IntegralLineOfSight, LineOfSight)
+    )
+    assert integral.mean() > 0.85 * plain.mean()  # rewards are negative
+
+
+def test_with_the_task_s_own_lookahead_plain_line_of_sight_is_the_autopilot_itself():
+    task = PathFollowingTask(episode_steps=300)
+    ours, theirs = (
+        cross_track(pilot, task, 4)[0] for pilot in (LineOfSight.from_model(MARINER), LQ.from_model(MARINER))
+    )
+    assert ours == pytest.approx(theirs, abs=0.002 * LENGTH)
+
+
+@pytest.mark.parametrize("law", [LineOfSight, IntegralLineOfSight, AdaptiveLineOfSight])
+@pytest.mark.parametrize("pilot", [LQ, LQG])
+def test_it_is_a_controller_and_a_file(law, pilot, tmp_path):
+    guided = law.from_model(MARINER, autopilot=pilot.from_model(MARINER))
+    check_controller(guided, MARINER, PathFollowingTask(noise=1.0), n_steps=20)
+    guided.save(tmp_path / "guided.json")
+    again = load_agent(tmp_path / "guided.json", MARINER)
+    assert type(again) is law
+    assert type(again.autopilot) is pilot
+    task = PathFollowingTask(episode_steps=50)
+    assert np.array_equal(*(cross_track(one, task, 2)[0] for one in (guided, again)))
+    assert guided.margins_on(MARINER) == guided.autopilot.margins
+
+
+class Learned:
+    """A policy that is none of ours."""
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.clip(observation[..., :1] - observation[..., 2:3], -1.0, 1.0), state
+
+
+def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
+    guided = IntegralLineOfSight.from_model(MARINER, autopilot=Learned())
+    check_controller(guided, MARINER, PathFollowingTask(), n_steps=5)
+    with pytest.raises(InputError, match="autopilot: Learned found, expected a controller of shipgym"):
+        guided.save(tmp_path / "guided.json")
+
+
+def test_course_keeping_and_another_corridor_are_refused():
+    guided = IntegralLineOfSight.from_model(MARINER)
+    with pytest.raises(InputError, match="in one and not in the other: cross_track"):
+        check_controller(guided, MARINER)
+    with pytest.raises(InputError, match=r"scale 160\.93 of 'cross_track', which is 80\.465"):
+        check_controller(guided, MARINER, PathFollowingTask(corridor=0.5))
+    with pytest.raises(InputError, match=r"observation: shape \(8,\) found, expected \(9,\)"):
+        guided.predict(np.zeros(8))

@@ -1,0 +1,144 @@
+"""LQG autopilot: the filter is Kalman's, the loop LQ's and the filter's, and noise moves the rudder less."""
+
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+
+from agents import LQ, LQG, fly, load_agent, step_response
+from agents.linear_loop import sample_ship
+from agents.lqg import kalman_gain, rudder_response, wave_model
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.task import control_interval
+from shipgym.errors import InputError
+from shipgym.models import load_model
+from shipgym.models.conversions import nomoto, nomoto2_ship
+from shipgym.models.linear import straight_running
+from shipgym.steering import SteeringGear
+
+MARINER = load_model("mariner")
+
+
+def unstable():
+    factors = {"N_v": 1.7, "N_uv": 1.7}
+    coefficients = {name: value * factors.get(name, 1.0) for name, value in MARINER.coefficients.items()}
+    return replace(MARINER, coefficients=coefficients)
+
+
+def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
+    transition, _ = rudder_response(MARINER, straight_running(MARINER), 1.0)
+    output, process, noise = np.eye(3)[1:], np.diag([1e-3, 1e-8, 1e-7]), np.diag([1e-7, 3e-6])
+    gain, deviation = kalman_gain(transition, process, output, noise)
+    predictor, _, _ = control.dlqe(transition, np.eye(3), output, process, noise)
+    assert transition @ gain == pytest.approx(np.asarray(predictor), rel=1e-9)
+    covariance = np.eye(3)
+    for _ in range(2000):
+        innovation = output @ covariance @ output.T + noise
+        limit = covariance @ output.T @ np.linalg.inv(innovation)
+        covariance = transition @ (covariance - limit @ output @ covariance) @ transition.T + process
+    assert gain == pytest.approx(limit, rel=1e-6)
+    assert deviation == pytest.approx(np.sqrt(np.diag(innovation)), rel=1e-6)
+
+
+@pytest.mark.parametrize("model", [MARINER, unstable()], ids=["stable", "unstable"])
+def test_poles_of_the_loop_are_those_of_lq_and_of_the_filter(model):
+    """Separation; up to the mean of the measured rudder that the filter takes for what was held."""
+    lqg, ship = LQG.from_model(model), sample_ship(model, control_interval(model))
+    poles = np.linalg.eigvals(lqg.loop().closed_loop(ship))
+    regulator = np.linalg.eigvals(LQ.from_model(model).loop().closed_loop(ship))
+    trusted = np.eye(3) - lqg.kalman @ lqg.output
+    observer = np.linalg.eigvals(trusted @ lqg.transition)
+    for pole in (*regulator, *observer):
+        assert np.abs(poles - pole).min() < 0.02
+    assert lqg.margins.gain_margin > 3.0
+    assert lqg.margins.phase_margin_deg > 35.0
+
+
+def test_the_wave_model_keeps_its_deviation_and_period():
+    transition, drive = wave_model(9.0, 0.02, 1.0)
+    covariance = np.zeros((2, 2))
+    for _ in range(2000):
+        covariance = transition @ covariance @ transition.T + drive
+    assert np.sqrt(covariance[0, 0]) == pytest.approx(0.02, rel=1e-6)
+    pole = np.linalg.eigvals(transition)[0]
+    assert 2.0 * np.pi / np.abs(np.log(pole)) == pytest.approx(9.0, rel=1e-6)
+
+
+def gain_at(controller, period):
+    """Size of the order per heading in first-order motion of a period."""
+    omega, dt = 2.0 * np.pi / period, controller.design["dt"]
+    loop = controller.loop()
+    response = control.ss(loop.A, loop.B, loop.C, loop.D, dt)(np.exp(1j * omega * dt))[0]
+    return np.abs(response[2] - 1j * omega * response[1])
+
+
+def test_first_order_motion_is_not_answered_where_it_is_modelled():
+    plain, notched = LQG.from_model(MARINER), LQG.from_model(MARINER, wave_period=9.0)
+    assert gain_at(notched, 9.0) < 0.2 * gain_at(plain, 9.0)
+    assert notched.margins.gain_margin > 2.0
+    task = CourseKeepingTask(sea="moderate", noise=1.0)
+    quiet, lively = (fly(one, MARINER, task, np.arange(16)) for one in (notched, plain))
+    assert quiet.rudder_travel_deg_min.mean() < 0.8 * lively.rudder_travel_deg_min.mean()
+
+
+def test_noise_and_sea_move_the_rudder_less_than_with_lq_at_no_higher_cost():
+    lq, lqg = LQ.from_model(MARINER), LQG.from_model(MARINER)
+    for task, saved in (
+        (CourseKeepingTask(noise=3.0), 0.75),
+        (CourseKeepingTask(sea="rough", noise=1.0), 0.75),
+    ):
+        one, other = (fly(pilot, MARINER, task, np.arange(16)) for pilot in (lqg, lq))
+        assert one.cost.mean() < other.cost.mean()
+        assert one.rudder_travel_deg_min.mean() < saved * other.rudder_travel_deg_min.mean()
+
+
+def test_without_noise_it_costs_as_much_as_lq():
+    lq, lqg = (fly(kind.from_model(MARINER), MARINER, seeds=np.arange(16)) for kind in (LQ, LQG))
+    assert lqg.cost.mean() == pytest.approx(lq.cost.mean(), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        replace(unstable(), steering=SteeringGear(35.0, 2.5)),
+        nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering),
+    ],
+    ids=["unstable", "memory of yaw"],
+)
+def test_a_new_course_is_taken_at_once_and_kept(model):
+    heading = np.degrees(step_response(LQG.from_model(model), model, 20.0, duration=1200.0).heading[0])
+    assert heading[-200:] == pytest.approx(20.0, abs=0.2)
+    assert heading.max() < 23.0
+
+
+def test_the_file_holds_the_filter(tmp_path):
+    lqg = LQG.from_model(MARINER, wave_period=9.0)
+    lqg.save(tmp_path / "lqg.json")
+    again = load_agent(tmp_path / "lqg.json", MARINER)
+    observations = np.random.default_rng(0).uniform(-0.3, 0.3, (5, 3, 8))
+    ours = theirs = None
+    for seen in observations:
+        action, ours = lqg.predict(seen, ours)
+        repeated, theirs = again.predict(seen, theirs)
+        assert np.array_equal(action, repeated)
+    text = (tmp_path / "lqg.json").read_text()
+    (tmp_path / "cut.json").write_text(text.replace('"kalman"', '"calman"'))
+    with pytest.raises(InputError, match=r"arrays: unknown key 'calman'\. Did you mean 'kalman'"):
+        load_agent(tmp_path / "cut.json")
+
+
+def test_the_state_is_that_of_as_many_ships():
+    lqg = LQG.from_model(MARINER)
+    _, state = lqg.predict(np.zeros((3, 8)))
+    with pytest.raises(InputError, match=r"state: shape \(3, 4\) found, expected \(2, 4\)"):
+        lqg.predict(np.zeros((2, 8)), state)
+
+
+def test_impossible_designs_are_refused():
+    with pytest.raises(
+        InputError, match="wave_period: 1 found, expected a number > 2; two control intervals"
+    ):
+        LQG.from_model(MARINER, wave_period=1.0)
+    with pytest.raises(InputError, match="noise: 0 found"):
+        LQG.from_model(MARINER, noise=0.0)

@@ -1,0 +1,119 @@
+"""Model predictive control: LQ where no limit is near, the best plan within the limits where one is."""
+
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from agents import LQ, MPC, check_controller, fly, load_agent
+from agents.linear_loop import SIGNALS, rate_weight
+from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
+from shipgym.errors import InputError
+from shipgym.models import load_model
+from shipgym.steering import SteeringGear
+
+pytest.importorskip("osqp", reason="extra mpc is not installed")
+MARINER = load_model("mariner")
+SLOW = replace(MARINER, steering=SteeringGear(35.0, 0.6))
+
+
+def seen(error, yaw_rate, rudder, model=MARINER):
+    """Observations of ships without drift, shape (n, 8)."""
+    zero = np.zeros_like(error)
+    columns = [np.sin(error), np.cos(error), yaw_rate, zero, zero, rudder, rudder, zero]
+    return np.stack(columns, axis=-1) / observation_scales(model)
+
+
+def test_without_a_limit_in_reach_it_is_lq():
+    mpc, lq = MPC.from_model(MARINER, rate_weight_s2=rate_weight(MARINER)), LQ.from_model(MARINER)
+    assert mpc.gains == lq.gains
+    assert mpc.margins == lq.margins
+    random = np.random.default_rng(0)
+    error, rate, rudder = random.uniform(-1.0, 1.0, (3, 50)) * np.radians([[2.0], [0.05], [0.5]])
+    shown = seen(error, rate, rudder)
+    assert mpc.predict(shown)[0] == pytest.approx(lq.predict(shown)[0], abs=1e-6)
+
+
+def hard_questions(model, n=20):
+    random = np.random.default_rng(1)
+    widths = np.radians([[60.0], [0.5], [30.0]])
+    return random.uniform(-1.0, 1.0, (3, n)) * widths
+
+
+@pytest.mark.parametrize("model", [MARINER, SLOW], ids=["lag", "slow"])
+def test_rudder_and_its_rate_keep_to_their_limits(model):
+    mpc = MPC.from_model(model)
+    error, rate, rudder = hard_questions(model)
+    order = mpc.predict(seen(error, rate, rudder, model))[0][:, 0] * model.steering.limit
+    deviation = rudder - mpc.neutral_rudder
+    moved = mpc.transition[3, 3] * deviation + mpc.effect[3] * (order - mpc.neutral_rudder) - deviation
+    largest = model.steering.rate * mpc.design["dt"]
+    assert np.abs(moved).max() == pytest.approx(largest, rel=1e-5)
+    assert np.abs(order).max() <= model.steering.limit * (1.0 + 1e-6)
+
+
+def test_the_plan_is_the_cheapest_within_the_limits():
+    """Against scipy's solver on the plan's own numbers, LQ's cost of a plan being a square of corrections."""
+    mpc = MPC.from_model(SLOW, horizon_lengths=0.6)
+    lowest, highest = mpc._bounds(SLOW.steering.limit)
+    error, rate, rudder = hard_questions(SLOW, 6)
+    order = mpc.predict(seen(error, rate, rudder, SLOW))[0][:, 0] * SLOW.steering.limit
+    row = np.array([mpc.gains[signal] for signal in SIGNALS])
+    for k in range(6):
+        state = np.array([-mpc.neutral_sway, rate[k], error[k], rudder[k] - mpc.neutral_rudder, 0.0])
+        planned = mpc.plan.by_state @ state
+        within = [
+            {"type": "ineq", "fun": lambda v, p=planned: highest - p - mpc.plan.by_correction @ v},
+            {"type": "ineq", "fun": lambda v, p=planned: p + mpc.plan.by_correction @ v - lowest},
+        ]
+        start = np.zeros(mpc.plan.by_correction.shape[1])
+        best = minimize(
+            lambda v: 50.0 * v @ v, start, jac=lambda v: 100.0 * v, method="SLSQP", constraints=within
+        )
+        expected = row @ state + best.x[0] + mpc.neutral_rudder
+        assert order[k] == pytest.approx(expected, abs=np.radians(0.1))
+
+
+def test_corrections_cost_their_squares_beside_lq():
+    """J(x, v) - J(x, 0) = (R + B'PB) sum v^2, here by summing the cost of the linear ship."""
+    mpc = MPC.from_model(MARINER)
+    row = np.array([mpc.gains[signal] for signal in SIGNALS])
+    integral_time = mpc.design["integral_lengths"] * 160.93 / 7.7175
+
+    def cost(corrections):
+        x, total = np.array([0.2, 0.001, 0.1, 0.02, 0.5]), 0.0
+        for k in range(3000):
+            order = row @ x + (corrections[k] if k < len(corrections) else 0.0)
+            before, x = x[3], mpc.transition @ x + mpc.effect * order
+            total += x[2] ** 2 + 0.1 * x[3] ** 2 + (x[4] / integral_time) ** 2
+            total += mpc.design["rate_weight_s2"] * ((x[3] - before) / mpc.design["dt"]) ** 2
+        return total
+
+    plain = cost([])
+    one, two = cost([0.01]) - plain, cost([0.0, -0.01]) - plain
+    assert one > 0.0
+    assert two == pytest.approx(one, rel=1e-6)
+    assert cost([0.02, 0.01]) - plain == pytest.approx(5.0 * one, rel=1e-6)
+
+
+def test_a_slow_gear_costs_less_than_with_lq():
+    task, seeds = CourseKeepingTask(episode_steps=120, change_interval_steps=60), np.arange(6)
+    ours, theirs = (fly(kind.from_model(SLOW), SLOW, task, seeds).cost.mean() for kind in (MPC, LQ))
+    assert ours < theirs
+
+
+def test_it_is_a_controller_and_a_file(tmp_path):
+    mpc = MPC.from_model(SLOW)
+    check_controller(mpc, SLOW, n_steps=20)
+    mpc.save(tmp_path / "mpc.json")
+    again = load_agent(tmp_path / "mpc.json", SLOW)
+    shown = seen(*hard_questions(SLOW), SLOW)
+    assert np.array_equal(again.predict(shown)[0], mpc.predict(shown)[0])
+
+
+def test_without_the_solver_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "osqp", None)
+    with pytest.raises(InputError, match=r"OSQP is not installed; .* pip install 'shipgym\[mpc\]'"):
+        MPC.from_model(MARINER)
