@@ -79,7 +79,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
-    task_type: ClassVar[type[Task]] = Task
+    task_type: ClassVar[type[Task]]
 
     def __init__(
         self,

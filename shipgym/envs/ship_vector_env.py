@@ -52,7 +52,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         For an unknown model or keyword, or an argument out of its range.
     """
 
-    task_type: ClassVar[type[Task]] = Task
+    task_type: ClassVar[type[Task]]
 
     def __init__(
         self,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -68,7 +69,7 @@ class Observed(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Task:
+class Task(ABC):
     """What is asked of an autopilot.
 
     Attributes
@@ -254,9 +255,9 @@ class Task:
         settings[rows.N_LIST], settings[rows.LIST :] = len(listed), listed
         return settings
 
+    @abstractmethod
     def own_settings(self, model: ShipModel) -> Sequence[float]:
         """Settings of the task's own kernel, in its order."""
-        raise NotImplementedError
 
     def listed(self, model: ShipModel) -> Sequence[float]:
         """Numbers of any count that the task's own kernel reads."""

@@ -39,6 +39,7 @@ def test_every_id_and_variant_conforms_without_a_warning(check, name, options):
         warnings.simplefilter("error")
         env = gymnasium.make(name, **options)
         check(env.unwrapped)
+    assert env.spec.id == name
 
 
 @pytest.mark.parametrize("name", IDS)
