@@ -1,7 +1,7 @@
 """The classical autopilots' common part: from what the environment shows to the rudder.
 
-A controller is a list of gains on deviations from straight running. By itself it keeps no state: the integral of
-the heading error, with its anti-windup, is part of the observation.
+A controller is a list of gains on deviations from straight running. By itself it keeps no state: the integral
+of the heading error, with its anti-windup, is part of the observation.
 """
 
 from __future__ import annotations
