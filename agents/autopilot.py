@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -40,9 +40,7 @@ def build_autopilot(
     *,
     draws: int = 200,
     seed: int = 0,
-    structure: str | None = None,
-    method: str | None = None,
-    samples: str | None = None,
+    options: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
@@ -60,8 +58,8 @@ def build_autopilot(
         Number of models drawn from the coefficient covariance, at least 2.
     seed : int
         Of the draws and of the episodes flown.
-    structure, method, samples : str, optional
-        As in `identify`; by default what the ship file says, as for all other options.
+    options : mapping, optional
+        Of `identify`, by name, trials by file; those not given are the ship file's.
     progress : callable, optional
         Called as the work goes on.
 
@@ -81,10 +79,7 @@ def build_autopilot(
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
-    result = examine(
-        ship_file, draws=int(draws), seed=int(seed), structure=structure, method=method,
-        samples=samples, progress=progress,
-    )  # fmt: skip
+    result = examine(ship_file, draws=int(draws), seed=int(seed), options=options, progress=progress)
     with whole_folder(folder, FILES) as draft:
         _tell(progress, "writing the report", 0, 1)
         write_json(result.metrics, draft / "metrics.json")
@@ -102,16 +97,13 @@ def examine(
     *,
     draws: int = 200,
     seed: int = 0,
-    structure: str | None = None,
-    method: str | None = None,
-    samples: str | None = None,
+    options: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
-    given = {"structure": structure, "method": method, "samples": samples}
-    trials, arguments = trials_of(ship, identification_settings(ship, given))
+    trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
     _tell(progress, "reading trials", 1, 1)
     _tell(progress, "identifying", 0, 1)
     identification = identify_trials(ship, trials, arguments)

@@ -7,12 +7,35 @@ standard error and nothing written; 130 interrupted.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.command import FAILED, Json, Method, Samples, ShipFileArgument, Structure, answered, fail
+from agents.command import (
+    FAILED,
+    HoldOut,
+    Json,
+    Method,
+    Objective,
+    Preprocessing,
+    Prior,
+    PriorStrength,
+    Rank,
+    Reference,
+    Repair,
+    Samples,
+    Set,
+    ShipFileArgument,
+    Structure,
+    Uncertainty,
+    Weight,
+    answered,
+    fail,
+)
 from agents.identification_commands import advise_command, identify_command, reduce_command
+
+if TYPE_CHECKING:
+    from agents.autopilot_result import AutopilotResult
 
 app = typer.Typer(
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
@@ -112,30 +135,46 @@ def autopilot_command(
     structure: Structure = None,
     method: Method = None,
     samples: Samples = None,
+    preprocessing: Preprocessing = None,
+    repair: Repair = None,
+    uncertainty: Uncertainty = None,
+    prior: Prior = None,
+    prior_strength: PriorStrength = None,
+    reference: Reference = None,
+    hold_out: HoldOut = None,
+    objective: Objective = None,
+    rank: Rank = None,
+    weight: Weight = None,
+    options: Set = None,
     as_json: Json = False,
 ) -> None:
     """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
 
-    Exits with 1 if the identified model is unstable; the report then says so.
+    Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
+    model is unstable; the report then says so.
     """
     from agents.autopilot import build_autopilot
-    from agents.terminal import (
-        criteria_table,
-        prediction_table,
-        print_json,
-        progress_bars,
-        ranking_table,
-        warn,
-    )
+    from agents.identifying import given_options
+    from agents.terminal import progress_bars
+
+    given = {
+        "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
+        "repair": repair, "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
+        "reference_model": reference, "hold_out": hold_out or None, "objective": objective, "rank": rank,
+        "C": weight,
+    }  # fmt: skip
+    chosen = given_options(given, options or ())
+    with progress_bars(not as_json) as progress:
+        result = build_autopilot(ship, out, draws=draws, seed=seed, options=chosen, progress=progress)
+    _told(result, out / "report.html", draws, as_json)
+
+
+def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+    """Print the result of the chain; fail for an unstable model."""
+    from agents.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.terminal import out as console
     from identification.concerns import concerns
 
-    with progress_bars(not as_json) as progress:
-        result = build_autopilot(
-            ship, out, draws=draws, seed=seed, structure=structure, method=method, samples=samples,
-            progress=progress,
-        )  # fmt: skip
-    report = out / "report.html"
     if as_json:
         print_json({**result.metrics, "report": str(report)})
     elif result.verification is not None:

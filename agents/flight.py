@@ -86,6 +86,8 @@ def fly(
     models: ShipModel | Sequence[ShipModel],
     task: CourseKeepingTask | None = None,
     seeds: ArrayLike = 0,
+    *,
+    allow_unstable: bool = False,
 ) -> Flights:
     """Fly episodes of course keeping, all at once.
 
@@ -100,6 +102,8 @@ def fly(
     seeds : array-like of int
         Seeds of the episodes. With several models: one for all, or of shape (n_models,), one each, or
         (n_models, n_episodes). With one model any shape.
+    allow_unstable : bool
+        Whether models that were found unstable when they were identified may be flown, with a warning.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def fly(
     ------
     InputError
         If the controller was designed for other observations, answers with something that is not a
-        command for each ship, or seeds and models do not fit.
+        command for each ship, seeds and models do not fit, or a model is unstable.
     """
     fleet = _fleet(models)
     several = len(fleet) > 1
@@ -126,7 +130,7 @@ def fly(
         )
     lanes = [model for model in fleet for _ in range(numbers[0].size)] if several else fleet
     _check_fits(controller, lanes[0])
-    engine = CourseKeepingEngine(lanes, numbers.size, task)
+    engine = CourseKeepingEngine(lanes, numbers.size, task, allow_unstable=allow_unstable)
     return _flights(_sums(controller, engine, numbers.reshape(-1)), engine.dt, numbers)
 
 
@@ -203,6 +207,8 @@ def step_response(
     step_deg: float = 20.0,
     duration: float | None = None,
     task: CourseKeepingTask | None = None,
+    *,
+    allow_unstable: bool = False,
 ) -> StepResponses:
     """Turn ships from straight ahead to a new course, all at once.
 
@@ -218,6 +224,8 @@ def step_response(
         In s; by default the time to travel 16 ship lengths.
     task : CourseKeepingTask, optional
         Its control interval and bounds are used.
+    allow_unstable : bool
+        As in `fly`.
 
     Returns
     -------
@@ -238,7 +246,7 @@ def step_response(
     asked = task or CourseKeepingTask()
     steps = int(np.ceil(duration / asked.interval(fleet[0])))
     straight = replace(asked, course_change_deg=0.0, episode_steps=steps + 1)
-    engine = CourseKeepingEngine(fleet, len(fleet), straight)
+    engine = CourseKeepingEngine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     observations = engine.reset(0)
     course = _ShiftedCourse(engine, np.radians(step_deg))
     heading, rudder = np.zeros((len(fleet), steps + 1)), np.zeros((len(fleet), steps + 1))

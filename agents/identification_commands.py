@@ -7,7 +7,27 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from agents.command import FAILED, Json, Samples, ShipFileArgument, Structure, answered, fail
+from agents.command import (
+    FAILED,
+    HoldOut,
+    Json,
+    Method,
+    Objective,
+    Preprocessing,
+    Prior,
+    PriorStrength,
+    Rank,
+    Reference,
+    Repair,
+    Samples,
+    Set,
+    ShipFileArgument,
+    Structure,
+    Uncertainty,
+    Weight,
+    answered,
+    fail,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,38 +36,6 @@ if TYPE_CHECKING:
     from shipgym.ship_file import ShipFile
 
 Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
-AnyMethod = Annotated[
-    str | None,
-    typer.Option(help="How the coefficients are fitted; default: the ship file's, else tls-svm."),
-]
-Preprocessing = Annotated[
-    str | None, typer.Option(help="How channels are smoothed: spline, savgol, median, rts or none.")
-]
-Repair = Annotated[
-    bool | None, typer.Option("--repair/--no-repair", help="Replace outliers, fill short dropouts.")
-]
-Uncertainty = Annotated[str | None, typer.Option(help="Standard errors: analytic or bootstrap.")]
-Prior = Annotated[
-    str | None, typer.Option(help="Pull coefficients to: auto, a reference ship, clarke or kijima.")
-]
-PriorStrength = Annotated[
-    float | None, typer.Option(help="Of the pull, 0 to inf; default: by cross-validation.")
-]
-Reference = Annotated[
-    str | None, typer.Option("--reference-model", help="Reference ship of a grey box: auto, a name or file.")
-]
-HoldOut = Annotated[
-    list[str] | None, typer.Option(metavar="FILE", help="Predict this trial only; may be repeated.")
-]
-Objective = Annotated[
-    str | None, typer.Option(help="What a search makes small: k-fold, training or free-running.")
-]
-Rank = Annotated[int | None, typer.Option(min=1, help="Directions of the features that are kept.")]
-Weight = Annotated[float | None, typer.Option("--C", help="Weight of the errors of an LS-SVM.")]
-Set = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="OPTION=VALUE", help="Any option of the table [identify]; repeatable."),
-]
 
 
 @answered
@@ -55,7 +43,7 @@ def identify_command(
     ship: ShipFileArgument,
     out: Out,
     structure: Structure = None,
-    method: AnyMethod = None,
+    method: Method = None,
     samples: Samples = None,
     preprocessing: Preprocessing = None,
     repair: Repair = None,
@@ -98,15 +86,11 @@ def identify_command(
 
 def _chosen(ship: Path, given: dict[str, Any], options: Sequence[str]) -> tuple[ShipFile, dict[str, Any]]:
     """The ship file, and the options: of the command line first."""
-    from agents.identifying import identification_settings, parsed_options
+    from agents.identifying import given_options, identification_settings
     from shipgym.ship_file import ShipFile
 
     read = ShipFile.load(ship)
-    return read, identification_settings(read, parsed_options(options) | _known(given))
-
-
-def _known(given: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in given.items() if value is not None}
+    return read, identification_settings(read, given_options(given, options))
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
@@ -182,7 +166,7 @@ def advise_command(
     ] = None,
     number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
     structure: Structure = None,
-    method: AnyMethod = None,
+    method: Method = None,
     samples: Samples = None,
     options: Set = None,
     as_json: Json = False,
@@ -222,7 +206,7 @@ def reduce_command(
         float, typer.Option(min=0.0, help="By how much the R2 of stretches held out may fall.")
     ] = 1e-3,
     structure: Structure = None,
-    method: AnyMethod = None,
+    method: Method = None,
     samples: Samples = None,
     options: Set = None,
     as_json: Json = False,

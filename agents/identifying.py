@@ -45,12 +45,18 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
             own[option] = str(ship.path.parent / own[option])
     chosen = own | check_options({k: v for k, v in given.items() if v is not None}, "options")
     if chosen.get("method") == RM_SVM and "reference_model" in chosen:
-        chosen.setdefault("structure", GREY_BOX)
+        named = given if given.get("method") == RM_SVM else chosen  # the command line goes before the file
+        chosen["structure"] = named.get("structure") or GREY_BOX
     if chosen.get("structure") == GREY_BOX:
         chosen.setdefault("reference_model", "auto")
     elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:
         chosen.pop("reference_model", None)  # of the structure that the ship file names
     return chosen
+
+
+def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, Any]:
+    """Options of the command line: those with a name of their own, which go first, and those of `--set`."""
+    return parsed_options(texts) | {name: value for name, value in named.items() if value is not None}
 
 
 def parsed_options(texts: Sequence[str]) -> dict[str, Any]:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from identification.following import Course, follow
     from identification.forces import ForceRegression, force_regression, identify_forces
     from identification.lssvm import LSSVM, TruncatedLSSVM
+    from identification.options import Options
     from identification.pipeline import identify
     from identification.polynomial import polynomial_coefficients
     from identification.recursive import (
@@ -45,6 +46,7 @@ _HOME = {
     "IdentificationResult": "identification.result",
     "LSSVM": "identification.lssvm",
     "MultiInnovationLeastSquares": "identification.recursive",
+    "Options": "identification.options",
     "ParticleSwarm": "identification.tuning",
     "RecursiveLeastSquares": "identification.recursive",
     "ReducedIdentification": "identification.reduced",
@@ -83,6 +85,7 @@ __all__ = [
     "GridSearch",
     "IdentificationResult",
     "MultiInnovationLeastSquares",
+    "Options",
     "ParticleSwarm",
     "RecursiveLeastSquares",
     "ReducedIdentification",

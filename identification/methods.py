@@ -19,8 +19,9 @@ from identification.recursive import MultiInnovationLeastSquares, RecursiveLeast
 from identification.rm_svm import RMSVM, fit_rm_svm
 from identification.samples import Samples
 from identification.tuning import Optimiser, TunedLSSVM
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number, did_you_mean
 from shipgym.errors import InputError
+from shipgym.identify_table import OPTIONS
 from shipgym.models import ShipModel
 from shipgym.trial import Trial
 
@@ -50,6 +51,11 @@ class FitTask:
 def each_equation(make: Callable[[], Machine], task: FitTask) -> Machines:
     """Fit one machine to each equation by itself."""
     return fit_all(make, task.samples)
+
+
+def _meant(setting: str) -> str:
+    """The option that is meant by one that does not exist."""
+    return "" if setting in OPTIONS else did_you_mean(setting, OPTIONS)
 
 
 @dataclass(frozen=True)
@@ -89,7 +95,7 @@ class Method:
         if unknown:
             raise InputError(
                 f"settings: {', '.join(unknown)} found, which method {self.name!r} does not know; leave them "
-                "out, or choose the method that they are for"
+                f"out, or choose the method that they are for.{_meant(unknown[0])}"
             )
         return self.fit(partial(self.machine, **settings), task)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, is_dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from identification.folds import TRIALS
 from identification.grey_box import bare_metrics
 from identification.guarded_fit import GuardedFit, guarded_fit
 from identification.methods import get_method
+from identification.options import Options
 from identification.prediction import predict, trial_metrics
 from identification.prior import with_prior
 from identification.problem import Problem, pose
@@ -24,8 +25,6 @@ from identification.result import IdentificationResult
 from identification.samples import Samples
 from identification.threads import on_one_thread
 from identification.uncertainty import coefficient_covariance, joint_covariance
-from shipgym.checks import check_choice
-from shipgym.errors import InputError
 from shipgym.models import GreyBox, ShipModel
 from shipgym.particulars import Particulars
 from shipgym.steering import SteeringGear
@@ -33,7 +32,6 @@ from shipgym.trial import Trial
 
 Floats = NDArray[np.float64]
 
-UNCERTAINTIES = ("analytic", "bootstrap")
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
@@ -63,60 +61,19 @@ def identify(
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
 
-    Trials marked `validate` are predicted, and influence nothing else.
+    Trials marked `validate` are predicted, and influence no coefficient. `Options` tells of each option that
+    is not told of here.
 
     Parameters
     ----------
     trials : sequence of Trial
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and n for structures
         that know the shaft speed.
-    structure : str
-        Terms of the model: a name of `shipgym.list_structures`.
-    method : str
-        A name of `identification.methods.METHODS`: truncated LS-SVM (`tls-svm`), LS-SVM of given C (`ls-svm`)
-        or of one found by grid, particle swarm, bee colony or differential evolution (`cv-lssvr`,
-        `pso-lssvr`, `abc-lssvr`, `de-lssvr`), or scikit-learn's least squares, ridge and support
-        vector regression (`ls`, `ridge`, `svr`), or refinement of a truncated LS-SVM by simulation
-        (`output-error`); for the structure `grey-box` also RM-SVM (`rm-svm`).
-    samples : {"spline", "integral", "euler"}
-        How the samples become a regression.
     particulars : Particulars or mapping
         Of the ship; at least the length, and, for structures of forces, what is needed to estimate mass and
-        added mass.
-        The service speed is estimated from the start of the trials where absent.
+        added mass. The service speed is estimated from the start of the trials where absent.
     steering : SteeringGear, optional
         Estimated from the rudders of the trials where absent.
-    service_shaft_speed : float, optional
-        Shaft speed at service speed, 1/s, for structures that know it; by default that at the start of the
-        trials.
-    name : str, optional
-        Of the model; by default the ship's.
-    window : int, optional
-        Sampling steps over which the velocities are integrated; see `samples.build_samples`.
-    smooth : bool
-        Whether noisy channels are smoothed first.
-    preprocessing : {"spline", "savgol", "median", "rts", "none"}, optional
-        How they are smoothed (`preprocess.smoothed_channels`); by default by splines.
-    repair : bool
-        Whether outliers are replaced and short dropouts filled first (`preprocess.repaired`).
-    uncertainty : {"analytic", "bootstrap"}
-        Where the covariance comes from: the formula for errors correlated over the time to sail one ship
-        length, or refits to blocks of that time drawn with replacement (`bootstrap`).
-    guarded : bool
-        Whether a model that runs away (`guard.reasons_unstable`) is fitted again with a penalty on what
-        is large in a hard turn and invisible in the data. The provenance tells what was done.
-    hold_out : sequence of str
-        Names of trials that are predicted only, as if they were marked `validate`.
-    reference_model : str or ShipModel, optional
-        Of the structure "grey-box": a model, its name or file, or "auto" for the reference ship most like
-        this one (`similarity.select_reference`).
-    prior : str or ShipModel, optional
-        What the coefficients are pulled to: a reference ship's ("auto" for the most similar, or a model, its
-        name or file), or the regression formulas "clarke" or "kijima". See `prior`.
-    prior_strength : float, optional
-        0 for none, infinite for the prior itself; by default chosen by cross-validation.
-    prior_folds : {"trials", "largest-rudder"}
-        What that holds out: each trial in turn, or those of the largest rudder.
     **settings
         Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
         `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
@@ -130,64 +87,49 @@ def identify(
     InputError
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
-    chosen = get_method(method)
-    check_choice(uncertainty, UNCERTAINTIES, "uncertainty")
-    sampling: dict[str, Any] = {
-        "service_shaft_speed": service_shaft_speed, "name": name, "window": window, "smooth": smooth,
-        "preprocessing": preprocessing, "repair": repair, "hold_out": hold_out,
-        "reference_model": reference_model,
-    }  # fmt: skip
-    problem = pose(trials, structure, samples, particulars, steering, **sampling)
-    blank, regression, used = problem.blank, problem.samples, problem.used
-    if prior is None and prior_strength is not None:
-        raise InputError(f"prior_strength: {prior_strength} found without a prior; name one, or leave it out")
-    if prior is None and prior_folds != TRIALS:
-        raise InputError(f"prior_folds: {prior_folds!r} found without a prior; name one, or leave it out")
-    if prior is not None:
-        chosen = with_prior(chosen, prior, prior_strength, blank, prior_folds)
+    get_method(method)
+    options = Options(
+        structure, method, samples, service_shaft_speed=service_shaft_speed, name=name, window=window,
+        smooth=smooth, preprocessing=preprocessing, repair=repair, uncertainty=uncertainty, guarded=guarded,
+        hold_out=hold_out, reference_model=reference_model, prior=prior, prior_strength=prior_strength,
+        prior_folds=prior_folds,
+    )  # fmt: skip
+    problem = pose(trials, structure, samples, particulars, steering, **options.posed())
+    call = options.call(settings, problem.trials, particulars, steering)
+    return _identified(options, settings, problem, steering is None, call)
+
+
+def _identified(
+    options: Options,
+    settings: Mapping[str, Any],
+    problem: Problem,
+    steering_estimated: bool,
+    call: dict[str, Any],
+) -> IdentificationResult:
+    """Fit, guard, refine, and judge by the trials."""
+    chosen, blank = get_method(options.method), problem.blank
+    regression, used = problem.samples, problem.used
+    if options.prior is not None:
+        chosen = with_prior(chosen, options.prior, options.prior_strength, blank, options.prior_folds)
     refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
-    fit = guarded_fit(chosen, of_machine, regression, blank, used, guarded)
+    fit = guarded_fit(chosen, of_machine, regression, blank, used, options.guarded)
     refined = refine(fit, regression, used, refinement, _memory(blank.particulars)) if refinement else None
     fit = refined.fit if refined else fit
     provenance = {
-        "structure": structure,
-        "method": method,
-        "samples": samples,
-        "settings": _asked(sampling, guarded, of_machine),
-        "steering": "estimated" if steering is None else "given",
+        "structure": options.structure,
+        "method": options.method,
+        "samples": options.samples,
+        "settings": options.asked(of_machine),
+        "steering": "estimated" if steering_estimated else "given",
         **_reference(problem),
-        **({"prior": _name(prior), **_prior_found(fit)} if prior is not None else {}),
+        **({"prior": _name(options.prior), **_prior_found(fit)} if options.prior is not None else {}),
         **_origin(fit, regression, used),
         **({"refinement": refined.report} if refined else {}),
-        **({"uncertainty": uncertainty} if uncertainty != "analytic" else {}),
+        **({"uncertainty": options.uncertainty} if options.uncertainty != "analytic" else {}),
     }
-    covariance = _covariance(fit, regression, blank, refined, uncertainty)
+    covariance = _covariance(fit, regression, blank, refined, options.uncertainty)
     model = replace(fit.model, covariance=covariance, provenance=provenance)
-    call = {
-        "structure": structure, "method": method, "samples": samples, **sampling, "guarded": guarded,
-        "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
-        "prior_folds": prior_folds, **settings,
-        "particulars": particulars, "steering": steering,
-    }  # fmt: skip
     return _judged(model, fit, problem, call)
-
-
-def _asked(sampling: Mapping[str, Any], guarded: bool, of_machine: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings for the provenance: those of the samples and of the machine."""
-    asked = {"window": sampling["window"], "smooth": sampling["smooth"], "guarded": guarded, **of_machine}
-    if sampling["preprocessing"] is not None:
-        asked["preprocessing"] = sampling["preprocessing"]
-    return {key: _plain(value) for key, value in asked.items()}
-
-
-def _call(arguments: Mapping[str, Any], trials: Sequence[Trial]) -> dict[str, Any]:
-    """The whole call for settings.json, trials by name, use and hash."""
-    known = [{"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256} for trial in trials]
-    return {
-        "software": f"shipgym {shipgym.__version__}",
-        **{key: _plain(value) for key, value in arguments.items()},
-        "trials": known,
-    }
 
 
 def _memory(ship: Particulars) -> float:
@@ -237,17 +179,19 @@ def _searched(fit: GuardedFit) -> dict[str, Any]:
 
 
 def _judged(
-    model: ShipModel, fit: GuardedFit, problem: Problem, call: Mapping[str, Any]
+    model: ShipModel, fit: GuardedFit, problem: Problem, call: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its predictions of all trials that are not skipped, and its diagnostics."""
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
+    model = _marked(model, [name for name, predicted in predictions.items() if predicted is None])
+    stable = bool((model.provenance or {})["stable"])
     bare = {"reference": bare_metrics(model, trials)} if isinstance(model.table, GreyBox) else {}
     return IdentificationResult(
         model=model,
-        stable=fit.stable,
+        stable=stable,
         metrics={
-            "stable": fit.stable,
+            "stable": stable,
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
@@ -256,8 +200,17 @@ def _judged(
         trials=trials,
         samples=problem.samples,
         machines=fit.machines,
-        settings=_call(call, problem.trials),
+        settings=call,
         searches={q: search for q, m in fit.machines.items() if (search := getattr(m, "search_", None))},
+    )
+
+
+def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:
+    """The model, marked where it runs away on a recorded trial, one held out too."""
+    if not lost:
+        return model
+    return replace(
+        model, provenance={**(model.provenance or {}), "stable": False, "runs_away_on": list(lost)}
     )
 
 
@@ -276,20 +229,3 @@ def _name(model: str | ShipModel) -> str:
 def _prior_found(fit: GuardedFit) -> dict[str, Any]:
     """Strength of the prior and what it was, from the machines."""
     return next(iter(getattr(machine, "prior_", {}) for machine in fit.machines.values()), {})
-
-
-def _plain(value: Any) -> Any:
-    """A setting as JSON knows it: infinity as null, models and trials by their names."""
-    if isinstance(value, ShipModel | Trial):
-        return value.name
-    if isinstance(value, Particulars | SteeringGear):
-        return value.to_dict()
-    if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items()}
-    if is_dataclass(value) and not isinstance(value, type):
-        return {"kind": type(value).__name__, **{k: _plain(v) for k, v in asdict(value).items()}}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, list | tuple | set | frozenset):
-        return [_plain(item) for item in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -99,9 +99,7 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         For a reference that does not exist, or too little known to choose one.
     """
     ship, table = blank.particulars, blank.table
-    if reference == AUTO:
-        reference, _ = select_reference(ship.completed())
-    model = converted_model(reference, ship, blank.steering, blank.service_shaft_speed)
+    model = _at_target(reference, blank)
     samples = build_samples(
         virtual_trials(model), table, ship, smooth=False, gear=blank.steering, window=1,
         shaft_speed=blank.service_shaft_speed,
@@ -116,6 +114,20 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     assert isinstance(model.table, GreyBox)
     known = {q: np.ones(len(values), dtype=bool) for q, values in centre.items()}
     return Prior(model.table.ship.name, centre, roots, known)
+
+
+def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
+    """A reference ship at the target's scale."""
+    ship = blank.particulars
+    if reference == AUTO:
+        reference, _ = select_reference(ship.completed())
+    return converted_model(reference, ship, blank.steering, blank.service_shaft_speed)
+
+
+def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
+    """A reference ship's turning circles at the target's scale; arguments as in `reference_prior`."""
+    turns = virtual_trials(_at_target(reference, blank))[len(ZIGZAGS) :]
+    return [Trial(t.t[::2], {c: v[::2] for c, v in t.channels.items()}, name=t.name) for t in turns]
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:

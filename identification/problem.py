@@ -79,6 +79,10 @@ def pose(
         that do not suffice.
     """
     everything = _held_out(trials, hold_out)
+    if not isinstance(steering, SteeringGear | None):
+        raise InputError(
+            f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
+        )
     used = [repaired(trial) if repair else trial for trial in _used(everything)]
     table, similarity = _table(structure, reference_model, particulars, used)
     check_trials(used, table)
@@ -111,8 +115,18 @@ def _blank(
     )
 
 
+def _check_list(trials: Any) -> None:
+    """Refuse what is not a list of trials."""
+    wrong = [trials] if isinstance(trials, Trial | str) else [t for t in trials if not isinstance(t, Trial)]
+    if wrong:
+        raise InputError(
+            f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
+        )
+
+
 def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
     """The trials, those named marked to validate only."""
+    _check_list(trials)
     known = [trial.name for trial in trials]
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:

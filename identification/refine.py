@@ -19,6 +19,7 @@ from scipy.optimize import least_squares
 
 from identification.guard import reasons_unstable
 from identification.guarded_fit import GuardedFit
+from identification.prior import reference_turns
 from identification.samples import Samples
 from identification.segments import BLOCK, Segment, Shooter, Shooting, about_mean, compared_channels, cut
 from identification.uncertainty import newey_west
@@ -59,6 +60,11 @@ class Refinement:
         Further trials that the refinement alone sees, such as turns of a reference ship.
     extra_weight : float
         Of their squared residuals, relative to those of the trials.
+    anchor : str or ShipModel, optional
+        A reference ship whose turning circles, at the target's scale, join the extra trials: what holds the
+        steady turn, which lies outside all zigzags. "auto" for the shipped one most like the target.
+    anchor_weight : float
+        Of the squared residuals of those turns.
     """
 
     segment_lengths: float = 3.4
@@ -68,18 +74,22 @@ class Refinement:
     rudder_offsets: bool = False
     extra_trials: Sequence[Trial] = ()
     extra_weight: float = 1.0
+    anchor: str | ShipModel | None = None
+    anchor_weight: float = 1e-3
 
     def __post_init__(self) -> None:
         check_number(self.segment_lengths, "segment_lengths", above=0.0, hint="in ship lengths")
         check_choice(self.segment_start, STARTS, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
         check_number(self.extra_weight, "extra_weight", above=0.0)
+        check_number(self.anchor_weight, "anchor_weight", above=0.0)
 
     def plain(self) -> dict[str, Any]:
         """The settings for the provenance, extra trials by name and hash."""
         extra = [{"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials]
-        names = [item.name for item in fields(self) if item.name != "extra_trials"]
-        return {name: getattr(self, name) for name in names} | {"extra_trials": extra}
+        names = [item.name for item in fields(self) if item.name not in ("extra_trials", "anchor")]
+        anchor = self.anchor.name if isinstance(self.anchor, ShipModel) else self.anchor
+        return {name: getattr(self, name) for name in names} | {"extra_trials": extra, "anchor": anchor}
 
 
 def split_settings(settings: Mapping[str, Any]) -> tuple[Refinement, dict[str, Any]]:
@@ -189,6 +199,7 @@ class _Problem:
             )
         self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
         self.sizes = np.concatenate([_term_sizes(samples, q) for q in blank.table.equations])
+        turns = [] if settings.anchor is None else reference_turns(settings.anchor, blank)
         channels = compared_channels(blank, [*trials, *settings.extra_trials])
         for trial in settings.extra_trials:
             missing = [c for c in blank.table.required_channels if c not in trial]
@@ -199,16 +210,21 @@ class _Problem:
                 )
         lengths, staggered = settings.segment_lengths, settings.staggered
         own = cut(trials, blank, channels, lengths, staggered)
-        extra = cut(settings.extra_trials, blank, channels, lengths, staggered)
-        count = len(trials)
         self.own = len(own)
-        self.segments = own + [
-            replace(segment, trial=count + segment.trial, weight=settings.extra_weight) for segment in extra
-        ]
+        self.segments, count = own, len(trials)
+        for further, weight in (
+            (settings.extra_trials, settings.extra_weight),
+            (turns, settings.anchor_weight),
+        ):
+            extra = cut(further, blank, channels, lengths, staggered)
+            self.segments = self.segments + [
+                replace(segment, trial=count + segment.trial, weight=weight) for segment in extra
+            ]
+            count += len(further)
         free, offsets = settings.segment_start == "free", settings.rudder_offsets
         self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
         values = np.concatenate([start.machines[q].coef_ for q in blank.table.equations])
-        self.first = np.concatenate([values / self.sizes, np.zeros(count if offsets else 0)])
+        self.first = np.concatenate([values / self.sizes, np.zeros(len(trials) if offsets else 0)])
 
     def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
         return self.shooter.shoot(parameters, segments, scales, len(self.trials))

@@ -36,7 +36,8 @@ class IdentificationResult:
     model : ShipModel
         With covariance, envelope and provenance.
     stable : bool
-        Whether the model passed every simulation of the guard; if not, its predictions are not to be used.
+        Whether the model passed every simulation of the guard and sails every recorded trial, those held out
+        too; if not, its predictions are not to be used. Its file says the same.
     metrics : dict
         For each trial by its name the errors of the open-loop prediction and the manoeuvre's indices.
     diagnostics : dict of str to EquationDiagnostics

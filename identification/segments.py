@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification import preprocess
-from identification.rudder import rebuild, straight
+from identification.rudder import Rudder, rebuild, straight
 from identification.samples import between_gaps
 from shipgym.kernels import layout
 from shipgym.models import ShipModel
@@ -97,11 +97,11 @@ def cut(
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
-            states = _states(piece, smooth)
+            states, rudder = _states(piece, smooth), _rudder(piece, model)
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
                 segments += [
-                    _segment(piece, index, rows, states, channels, model, travel)
+                    _segment(piece, index, rows, states, channels, rudder, travel)
                     for rows in map(slice, edges[:-1], edges[1:] + 1)
                 ]
     return segments
@@ -126,19 +126,22 @@ def _states(trial: Trial, smooth: Callable[[Floats, Floats], Floats]) -> Floats:
     return states
 
 
+def _rudder(trial: Trial, model: ShipModel) -> Rudder:
+    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in model.table.equations))
+    delta = trial["delta"]
+    return straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
+
+
 def _segment(
     trial: Trial,
     index: int,
     rows: slice,
     states: Floats,
     channels: Sequence[str],
-    model: ShipModel,
+    rudder: Rudder,
     travel: float,
 ) -> Segment:
     t = trial.t[rows]
-    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in model.table.equations))
-    delta = trial["delta"]
-    rudder = straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
     steps = np.maximum(np.ceil(np.diff(t) / (LONGEST_STEP * travel) - 1e-9), 1).astype(int)
     parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], steps, strict=True)]
     inside = rudder.corners[(rudder.corners > t[0]) & (rudder.corners < t[-1])]
@@ -205,6 +208,7 @@ class Shooter:
         self.free = self.columns if free else []
         self.offsets = offsets
         self.sail = model.kernel("segments").sail
+        self.column = model.ship_column()
         ship = model.particulars
         units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
         units["p"] = units["r"]
@@ -274,7 +278,7 @@ class Shooter:
         """Simulated channels, and their derivatives by coefficients, rudder offset and start."""
         n_terms, n_free = len(parameters), len(self.free)
         n_moves = n_terms + 1 + n_free
-        column = self.model.ship_column()
+        column = self.column.copy()
         column[layout.row(layout.COEFFICIENTS) :] = parameters * self.sizes
         first = layout.row(layout.COEFFICIENTS)
         slopes = np.empty((len(segment.measured), len(self.channels), n_moves))

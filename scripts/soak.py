@@ -1,80 +1,161 @@
 """Sail for a long time with random, extreme and adversarial actions and look for anything that breaks.
 
     python scripts/soak.py                      10^8 steps
-    python scripts/soak.py --steps 1000000      fewer
+    python scripts/soak.py --steps 10000000     fewer
 
-Fails if an observation leaves its space, a reward or a state is not a number, or memory grows.
+Every id, with every shipped model that fits it, in calm water and in seas, with both ways of autoreset. Fails
+if an observation leaves its space, a reward, an info or a state is not a number, or memory grows.
 """
 
 from __future__ import annotations
 
 import resource
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
+import gymnasium
 import numpy as np
 import typer
 from numpy.typing import NDArray
 from rich.progress import Progress
 
 import shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine, episode_keys
-from shipgym.envs.course_keeping_task import OBSERVATION_HIGH, OBSERVATION_LOW, CourseKeepingTask
+from shipgym.envs.registration import TASKS, VARIANTS
 
-LANES = 1024
-CHECK_EVERY = 500
-
-
-def adversary(observations: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Steer away from the set-point as hard as the ship can."""
-    return np.where(observations[:, :1] >= 0.0, -1.0, 1.0).astype(np.float32)
-
-
-def actions(kind: str, observations: NDArray[np.float32], random: np.random.Generator) -> NDArray[np.float32]:
-    """Actions of one kind for all lanes."""
-    if kind == "random":
-        return random.uniform(-1.0, 1.0, (LANES, 1)).astype(np.float32)
-    if kind == "extreme":
-        return random.choice(np.array([-1e30, -1.0, 0.0, 1.0, 1e30], dtype=np.float32), (LANES, 1))
-    return adversary(observations)
+ROWS = 256
+CHECK_EVERY = 50  # steps between looks at infos and states
+WARM = 20  # steps after which memory must not grow
+MOST_GROWTH = 50.0  # MiB
+KINDS = ("random", "extreme", "adversarial")
+WILD = {"CourseKeeping": {"max_heading_error_deg": 180.0}, "PathFollowing": {"ground": 40.0}}
+SEAS: dict[str, Any] = {"sea": ["calm", "moderate", "rough"], "noise": 2.0, "measurement": "filtered"}
 
 
-def sail(model: str, kind: str, steps: int, advance: Callable[[int], None]) -> None:
-    """Fly one kind of actions on one model, with episodes that begin anew where they end."""
-    task = CourseKeepingTask(max_heading_error_deg=180.0, max_envelope_distance=1e3)
-    engine = CourseKeepingEngine(shipgym.load_model(model), LANES, task)
+@dataclass(frozen=True)
+class Run:
+    """One environment under one kind of actions."""
+
+    task: str
+    variant: str
+    model: str
+    kind: str
+
+    @property
+    def name(self) -> str:
+        """Its id, model and actions."""
+        return f"shipgym/{self.task}{self.variant}-v0, {self.model}, {self.kind}"
+
+    def make(self) -> Any:
+        """Its vector environment; wild ones are in seas and sail on where others stop."""
+        wild = self.kind != "extreme"
+        steps = {"episode_steps": 150} if self.kind == "random" else {}
+        options: dict[str, Any] = {"max_envelope_distance": 1e3, **WILD[self.task], **SEAS} if wild else {}
+        return gymnasium.make_vec(
+            f"shipgym/{self.task}{self.variant}-v0",
+            ROWS,
+            model=self.model,
+            autoreset_mode="SameStep" if wild else "NextStep",
+            **steps,
+            **options,
+        )
+
+
+def runs() -> Iterator[Run]:
+    """All of them: ids, the models that fit, kinds of actions."""
+    models = [shipgym.load_model(name) for name in shipgym.list_models()]
+    fit = {
+        "": [ship.name for ship in models],
+        "Discrete": [models[0].name],
+        "Shaft": [ship.name for ship in models if ship.service_shaft_speed > 0.0],
+        "Roll": [ship.name for ship in models if "phi" in ship.state_names],
+    }
+    for task in TASKS:
+        for variant in VARIANTS:
+            for model in fit[variant]:
+                for kind in KINDS:
+                    yield Run(task, variant, model, kind)
+
+
+def adversary(observations: NDArray[np.float32], space: gymnasium.Space[Any], step: int) -> Any:
+    """Steer away from the course as hard as the ship can, the shaft full ahead and astern by turns."""
+    starboard = observations[:, 0] < 0.0
+    if isinstance(space, gymnasium.spaces.MultiDiscrete):
+        return np.where(starboard, int(space.nvec[0]) - 1, 0)
+    actions = np.empty(space.shape or (), dtype=np.float32)
+    actions[:, 0] = np.where(starboard, 1.0, -1.0)
+    actions[:, 1:] = 1.0 if step // 100 % 2 else -1.0
+    return actions
+
+
+def extreme(space: gymnasium.Space[Any], random: np.random.Generator) -> Any:
+    """The largest actions that there are, and beyond."""
+    if isinstance(space, gymnasium.spaces.MultiDiscrete):
+        return random.choice([0, int(space.nvec[0]) - 1], space.shape)
+    return random.choice(np.array([-1e30, -1.0, 0.0, 1.0, 1e30], dtype=np.float32), space.shape)
+
+
+def check_shown(run: Run, env: Any, observations: Any, rewards: Any, infos: dict[str, Any]) -> None:
+    """Leave if an observation is not in its space or a reward is not a number."""
+    space = env.single_observation_space
+    shown = [observations, *infos.get("final_obs", np.empty(0))[infos.get("_final_obs", [])]]
+    if not all(np.all((space.low <= one) & (one <= space.high)) for one in shown):
+        sys.exit(f"{run.name}: an observation left its space")
+    if not np.all(np.isfinite(rewards)):
+        sys.exit(f"{run.name}: a reward is not a number")
+
+
+def check_inside(run: Run, env: Any, infos: dict[str, Any]) -> None:
+    """Leave if an info or a state is not a number."""
+    numbers = [value for key, value in infos.items() if not key.startswith(("_", "final"))]
+    if not all(np.all(np.isfinite(one)) for one in (*numbers, *env.physical_state().values())):
+        sys.exit(f"{run.name}: an info or a state is not a number")
+
+
+def sail(run: Run, steps: int, advance: Callable[[int], None]) -> tuple[int, float]:
+    """Take steps in all rows; number of episodes that ended, and growth of memory, MiB."""
+    env = run.make()
     random = np.random.default_rng(0)
-    keys, episodes = episode_keys(np.arange(LANES)), np.zeros(LANES, dtype=np.int64)
-    observations = engine.begin(keys)
-    for step in range(max(steps // LANES, 1)):
-        observations, rewards, terminated, truncated = engine.step(actions(kind, observations, random))
-        if not np.all(np.isfinite(rewards)):
-            sys.exit(f"{model}, {kind}: a reward is not a number at step {step}")
-        if np.any(observations < OBSERVATION_LOW) or np.any(observations > OBSERVATION_HIGH):
-            sys.exit(f"{model}, {kind}: an observation left its space at step {step}")
-        over = terminated | truncated
-        if over.any():
-            episodes += over
-            observations = engine.begin(keys, episodes, over)
+    env.action_space.seed(0)
+    observations, _ = env.reset(seed=0)
+    ended, before = 0, 0
+    for step in range(max(steps // ROWS, WARM + 1)):
+        if run.kind == "random":
+            actions = env.action_space.sample()
+        elif run.kind == "extreme":
+            actions = extreme(env.action_space, random)
+        else:
+            actions = adversary(observations, env.action_space, step)
+        observations, rewards, terminated, truncated, infos = env.step(actions)
+        ended += int(np.sum(terminated | truncated))
+        check_shown(run, env, observations, rewards, infos)
         if step % CHECK_EVERY == 0:
-            advance(LANES * CHECK_EVERY)
-    if not all(np.all(np.isfinite(values)) for values in engine.physical_state().values()):
-        sys.exit(f"{model}, {kind}: a state is not a number")
+            check_inside(run, env, infos)
+            advance(ROWS * CHECK_EVERY)
+        if step == WARM:
+            before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    env.close()
+    return ended, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
 
 
-def main(steps: int = typer.Option(10**8, help="Environment steps over all models and kinds.")) -> None:
-    """Sail every shipped model with every kind of actions."""
-    runs = [(model, kind) for model in shipgym.list_models() for kind in ("random", "extreme", "adversarial")]
+def main(
+    steps: int = typer.Option(10**8, help="Environment steps over all ids, models and actions."),
+) -> None:
+    """Sail every id with every shipped model that fits it and every kind of actions."""
+    every, ended, grown = list(runs()), 0, 0.0
     with Progress() as progress:
         bar = progress.add_task("sailing", total=steps)
-        sail(*runs[0], LANES * 1000, lambda _: None)
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        for model, kind in runs:
-            sail(model, kind, steps // len(runs), lambda done: progress.advance(bar, done))
-    grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
-    if grown > 50.0:
+        for run in every:
+            progress.update(bar, description=run.name)
+            episodes, growth = sail(run, steps // len(every), lambda done: progress.advance(bar, done))
+            ended, grown = ended + episodes, grown + growth
+    if grown > MOST_GROWTH:
         sys.exit(f"memory grew by {grown:.0f} MiB")
-    print(f"{steps:.3g} steps: nothing left its space, every number is one, memory grew by {grown:.1f} MiB")
+    print(
+        f"{steps:.3g} steps, {len(every)} runs, {ended} episodes: nothing left its space, every number is "
+        f"one, memory grew by {grown:.1f} MiB"
+    )
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from shipgym import manoeuvres, plots, towing_tank, weather
     from shipgym.envs.checker import check_vector_env
     from shipgym.envs.recording import RecordEpisode
+    from shipgym.envs.sb3 import ShipVecEnv
     from shipgym.episode import Episode
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
@@ -38,6 +39,7 @@ _HOME = {
     "RecordEpisode": "shipgym.envs.recording",
     "ShipFile": "shipgym.ship_file",
     "ShipModel": "shipgym.models",
+    "ShipVecEnv": "shipgym.envs.sb3",
     "SteeringGear": "shipgym.steering",
     "StraightLineStability": "shipgym.models.stability",
     "Trial": "shipgym.trial",
@@ -68,6 +70,7 @@ __all__ = [
     "RecordEpisode",
     "ShipFile",
     "ShipModel",
+    "ShipVecEnv",
     "SteeringGear",
     "StraightLineStability",
     "Trial",

@@ -18,6 +18,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
+FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the earth
 
 
 class PathPosition(NamedTuple):
@@ -219,6 +220,11 @@ def _waypoints(given: Any) -> Floats:
     if not np.all(np.isfinite(points)):
         row = int(np.argwhere(~np.isfinite(points))[0, 0])
         raise InputError(f"waypoints: row {row} is {points[row].tolist()}, expected finite numbers in m")
+    if np.abs(points).max() > FURTHEST:
+        row = int(np.argwhere(np.abs(points) > FURTHEST)[0, 0])
+        raise InputError(
+            f"waypoints: row {row} is {points[row].tolist()}, expected m within {FURTHEST:g} of the origin"
+        )
     repeated = np.flatnonzero(np.all(np.diff(points, axis=0) == 0.0, axis=1))
     if repeated.size:
         row = int(repeated[0]) + 1

@@ -92,9 +92,16 @@ def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, s
     error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
     lines = {
         "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
+        "heading": _bearing(state["psi"]),
+        "to steer": _bearing(state["set_point"]),
         "heading error": f"{degrees(error):+.1f} deg",
         "rudder": f"{degrees(state['delta']):+.1f} deg",
     }
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
     return {**lines, "reward": f"{engine.shown.outcomes[0, lane]:+.3f}"}
+
+
+def _bearing(angle: float) -> str:
+    """An angle as a compass shows it."""
+    return f"{round(degrees(angle) * 10.0) % 3600 / 10.0:05.1f} deg"

@@ -9,8 +9,9 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.envs.task import COMMON_INFO, Task
+from shipgym.errors import InputError
 from shipgym.models import ShipModel
 
 Floats = NDArray[np.float64]
@@ -57,10 +58,20 @@ class CourseKeepingTask(Task):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_number(self.course_change_deg, "course_change_deg", at_least=0.0, at_most=90.0)
-        check_number(self.change_interval_steps, "change_interval_steps", at_least=1)
+        check_whole(self.change_interval_steps, "change_interval_steps", at_least=1)
         check_number(self.max_heading_error_deg, "max_heading_error_deg", above=0.0, at_most=180.0)
-        for i, change in enumerate(self.course_changes_deg or ()):
+        if self.course_changes_deg is not None and np.ndim(self.course_changes_deg) != 1:
+            raise InputError(f"course_changes_deg: {self.course_changes_deg!r} found, expected a list")
+        if self.course_changes_deg is not None and len(self.course_changes_deg) == 0:
+            raise InputError(
+                "course_changes_deg: none found, expected one at least; for a course that stays give [0.0]"
+            )
+        for i, change in enumerate(self._changes):
             check_number(change, f"course_changes_deg: number {i}", at_least=-180.0, at_most=180.0)
+
+    @property
+    def _changes(self) -> Sequence[float]:
+        return () if self.course_changes_deg is None else self.course_changes_deg
 
     def own_settings(self, model: ShipModel) -> Sequence[float]:
         """Settings of the task's own kernel, in its order."""
@@ -69,7 +80,7 @@ class CourseKeepingTask(Task):
 
     def listed(self, model: ShipModel) -> Sequence[float]:
         """The listed course changes, rad."""
-        return [float(np.radians(change)) for change in self.course_changes_deg or ()]
+        return [float(np.radians(change)) for change in self._changes]
 
 
 def observation_scales(model: ShipModel) -> Floats:

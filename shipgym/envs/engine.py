@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -22,7 +23,6 @@ from shipgym.simulation.weather_column import weather_column
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
-STAY, NEXT_STEP, SAME_STEP = range(3)  # as in `shipgym.kernels.episodes`
 STEP_OUTCOME = 3  # reward, terminated, truncated come before what is in `info`
 
 
@@ -94,8 +94,8 @@ class Engine:
         self.windy = any(not sea.calm for _, sea in self.pool)
         self._kernel = self.model.kernel("episodes", self.windy, task.kernel)
         self._settings = task.settings(self.model)
+        self._team = _Team(-(-num_envs // layout.LANES), threads)
         self._allocate(fleet, drawn)
-        self._team = _Team(len(self._states), threads)
         self.reset(np.arange(num_envs))
 
     def _allocate(self, fleet: list[ShipModel], drawn: bool) -> None:
@@ -107,18 +107,22 @@ class Engine:
         self._ships = _ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
         self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
         self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
-        self._actions = np.zeros((2 if self.task.action == "rudder-shaft" else 1, self.num_envs), np.float32)
-        self._world = (
-            self._states, self._keys, self._settings, self._pool, self._ships, self._actions,
-        )  # fmt: skip
-        self.shown = self._nothing_shown()
-        self._last = self._nothing_shown()
+        self._least = np.array(self.task.least_commands(self.model), dtype=np.float32)[:, None]
+        self._actions = np.zeros((len(self._least), self.num_envs), np.float32)
+        self._n_shown = int(self._settings[rows.N_SHOWN])
+        self._n_outcomes = STEP_OUTCOME + len(self.task.info_names)
+        self.show_anew()
 
-    def _nothing_shown(self) -> Shown:
-        n_shown = int(self._settings[rows.N_SHOWN])
-        n_outcomes = STEP_OUTCOME + len(self.task.info_names)
-        observations = np.empty((self.num_envs, n_shown), dtype=np.float32)
-        return Shown(observations, np.empty((n_outcomes, self.num_envs)))
+    #: One control interval with the commands as they stand, shown in `shown`.
+    advance: Callable[[], None]
+
+    def show_anew(self) -> None:
+        """Let what comes next be shown in new arrays, so that the last ones may be kept."""
+        observations = np.empty((self.num_envs, self._n_shown), dtype=np.float32)
+        self.shown = Shown(observations, np.empty((self._n_outcomes, self.num_envs)))
+        self.advance = self._team.shared(self._kernel.step, (
+            self._states, self._keys, self._settings, self._ships, self._actions, *self.shown,
+        ))  # fmt: skip
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -153,16 +157,29 @@ class Engine:
         """
         which = np.zeros(self.num_envs, dtype=np.bool_)
         which[:] = mask
+        lanes = np.flatnonzero(which)
         for row, words in enumerate((keys, episodes)):
-            lanes = self._keys[:, row].reshape(-1)  # a copy
-            lanes[: self.num_envs][which] = np.broadcast_to(
-                np.asarray(words).astype(np.uint64), (self.num_envs,)
-            )[which]
-            self._keys[:, row] = lanes.reshape(-1, layout.LANES)
-        self._kernel.reset(
-            self._states, self._keys, self._settings, self._pool, self._ships, which, *self.shown
-        )
+            all_words = np.broadcast_to(np.asarray(words).astype(np.uint64), (self.num_envs,))
+            self._keys[lanes // layout.LANES, row, lanes % layout.LANES] = all_words[lanes]
+        self._begin(which, True)
         return self.observations
+
+    def begin_next(self, which: NDArray[np.bool_]) -> None:
+        """Begin the next episode in some lanes; rewards and flags stay those of the last step.
+
+        Parameters
+        ----------
+        which : bool array of shape (num_envs,)
+            The lanes.
+        """
+        lanes = np.flatnonzero(which)
+        self._keys[lanes // layout.LANES, 1, lanes % layout.LANES] += np.uint64(1)
+        self._begin(which, False)
+
+    def _begin(self, which: NDArray[np.bool_], all_anew: bool) -> None:
+        self._kernel.reset(
+            self._states, self._keys, self._settings, self._pool, self._ships, which, *self.shown, all_anew
+        )
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
@@ -196,7 +213,7 @@ class Engine:
             raise InputError(
                 f"actions: {array[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
             )
-        self._actions[:] = array.T
+        np.maximum(array.T, self._least, out=self._actions)
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """One control interval; a lane whose episode is over stays as it is and earns 0.
@@ -221,19 +238,6 @@ class Engine:
         self.advance()
         rewards, terminated, truncated = self.shown.outcomes[:STEP_OUTCOME]
         return self.observations, rewards.copy(), terminated > 0.0, truncated > 0.0
-
-    def advance(self, autoreset: int = STAY) -> None:
-        """One control interval with the commands as they stand, shown in the same arrays as the last."""
-        self._team.share(self._kernel.step, (*self._world, *self.shown, *self._last), autoreset)
-
-    def show_anew(self) -> None:
-        """Let what comes next be shown in new arrays, so that the last ones may be kept."""
-        self.shown = self._nothing_shown()
-
-    @property
-    def last_shown(self) -> Shown:
-        """What lanes whose episode ended in the last step showed then, if the next has begun; a view."""
-        return self._last
 
     @property
     def command(self) -> Observation:
@@ -310,15 +314,20 @@ class _Team:
         self._own, *self._others = list(pairwise(bounds))
         self._pool = ThreadPoolExecutor(len(self._others), "shipgym") if self._others else None
 
-    def share(self, step: Any, arguments: tuple[Any, ...], autoreset: int) -> None:
-        """Run a kernel that releases the interpreter on all tiles."""
+    def shared(self, step: Any, world: tuple[Any, ...]) -> Callable[[], None]:
+        """A kernel that releases the interpreter, to be run on all tiles."""
+        own = partial(step, *world, *self._own)
         if self._pool is None:
-            step(*arguments, *self._own, autoreset)
-            return
-        waiting = [self._pool.submit(step, *(*arguments, *bounds, autoreset)) for bounds in self._others]
-        step(*arguments, *self._own, autoreset)
-        for share in waiting:
-            share.result()
+            return own
+        submit, others = self._pool.submit, [partial(step, *world, *bounds) for bounds in self._others]
+
+        def run() -> None:
+            waiting = [submit(share) for share in others]
+            own()
+            for share in waiting:
+                share.result()
+
+        return run
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:

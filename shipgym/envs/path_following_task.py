@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.envs.task import COMMON_INFO, Observed, Task
 from shipgym.errors import InputError
 from shipgym.guidance import Path
@@ -65,8 +65,8 @@ class PathFollowingTask(Task):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_number(self.n_legs, "n_legs", at_least=1, at_most=100)
-        if len(tuple(self.leg_lengths)) != 2:
+        check_number(check_whole(self.n_legs, "n_legs", at_least=1), "n_legs", at_most=100)
+        if np.shape(self.leg_lengths) != (2,):
             raise InputError(f"leg_lengths: {self.leg_lengths!r} found, expected the least and the largest")
         check_number(self.leg_lengths[0], "leg_lengths: the least", above=0.0)
         check_number(self.leg_lengths[1], "leg_lengths: the largest", at_least=self.leg_lengths[0])

@@ -135,7 +135,6 @@ class _Recorded:
         self._parts: list[dict[str, float]] = []
         self._info = [_numbers(info)]
         self._outcome: dict[str, Any] = {}
-        self._rudder_actions = _are_rudders(env, ship)
         waypoints = getattr(ship, "waypoints", None)
         spec = env.spec
         self._facts: dict[str, Any] = {
@@ -161,7 +160,7 @@ class _Recorded:
         self.rewards.append(reward)
         self._states.append(state)
         self._actions.append(numbers)
-        self._commands.append(self._ordered(state, numbers))
+        self._commands.append({name: state[f"{name}_command"] for name in self._model.command_names})
         self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
         self._info.append(_numbers(info))
         said = next((info[key] for key in SUCCESS if key in info), None)
@@ -170,15 +169,6 @@ class _Recorded:
             "truncated": bool(truncated),
             "success": None if said is None else bool(said),
         }
-
-    def _ordered(self, state: Mapping[str, float], numbers: Floats) -> dict[str, float]:
-        """What was ordered in SI units: as the environment tells, or else as its actions say."""
-        told = {name: state[f"{name}_command"] for name in ("delta", "n") if f"{name}_command" in state}
-        if "delta" not in told and self._rudder_actions:
-            told["delta"] = float(np.clip(numbers[0], -1.0, 1.0)) * self._facts["rudder_limit"]
-        if "n" not in told and "n" in self._model.command_names and len(numbers) == 1:
-            told["n"] = self._model.service_shaft_speed
-        return told
 
     def episode(self) -> Episode:
         """All of it."""
@@ -192,17 +182,6 @@ class _Recorded:
             **self._facts,
             **self._outcome,
         )
-
-
-def _are_rudders(env: gymnasium.Env[Any, Any], ship: Any) -> bool:
-    """Whether an action is, without a wrapper in between that changes it, parts of the rudder limit."""
-    space = env.action_space
-    return (
-        isinstance(space, gymnasium.spaces.Box)
-        and space == ship.action_space
-        and space.low.reshape(-1)[0] == -1.0
-        and space.high.reshape(-1)[0] == 1.0
-    )
 
 
 def _numbers(info: Mapping[str, Any]) -> dict[str, float]:

@@ -23,12 +23,16 @@ SIZE = 600  # pixels of a side
 CHART_LENGTHS = 14.0  # ship lengths across the chart
 RENDER_MODES = ("human", "rgb_array")
 FRAMES_PER_SECOND = 30
+FINER = 2  # pixels drawn for one that is shown, so that edges are smooth
 
 WATER, GRID, INK, FAINT = (234, 241, 245), (213, 224, 231), (28, 40, 48), (104, 122, 134)
 PANEL, HULL, WAKE, RUDDER = (250, 252, 253), (42, 62, 80), (120, 160, 190), (200, 60, 40)
 PATH, CORRIDOR, ORDER, WIND, CURRENT = (
-    (60, 110, 70), (222, 236, 224), (60, 110, 70), (120, 90, 160), (30, 120, 170),
+    (60, 110, 70), (222, 236, 224), (200, 120, 10), (120, 90, 160), (0, 140, 150),
 )  # fmt: skip
+
+#: Colours of read-outs whose quantity is drawn too.
+LEGEND = {"heading": HULL, "to steer": ORDER, "rudder": RUDDER, "wind": WIND, "current": CURRENT}
 
 #: Outline of a ship from above: forward and to starboard, in lengths and beams.
 OUTLINE = np.array([[0.5, 0.0], [0.38, 0.36], [0.2, 0.5], [-0.42, 0.5], [-0.5, 0.36]])
@@ -106,9 +110,7 @@ class Renderer:
                 "pip install 'shipgym[render]'"
             ) from None
         self._pygame = pygame
-        pygame.font.init()
-        self._font = pygame.font.Font(None, 20)
-        self._small = pygame.font.Font(None, 16)
+        self._brush = _Brush(pygame)
         self._surface = pygame.Surface((SIZE, SIZE))
         self._window: Any = None
         self._clock: Any = None
@@ -125,7 +127,7 @@ class Renderer:
         uint8 array of shape (600, 600, 3)
         """
         chart = _Chart(scene)
-        self._surface.fill(WATER)
+        self._brush.fill(WATER)
         self._draw_grid(chart)
         self._draw_path(chart, scene)
         self._draw_wake(chart, scene)
@@ -134,6 +136,7 @@ class Renderer:
         self._draw_compass(scene, (SIZE - 70.0, 70.0), 52.0)
         self._draw_gauge(scene, (SIZE / 2.0, SIZE - 34.0), 180.0)
         self._draw_readouts(scene)
+        self._brush.show(self._surface)
         if self.mode == "human":
             self._show()
         pixels: Picture = np.transpose(self._pygame.surfarray.array3d(self._surface), (1, 0, 2))
@@ -159,84 +162,88 @@ class Renderer:
 
     def _draw_grid(self, chart: _Chart) -> None:
         for offset in chart.grid_lines(0):
-            self._pygame.draw.line(self._surface, GRID, (0, offset), (SIZE, offset))
+            self._brush.line(GRID, (0.0, offset), (SIZE, offset))
         for offset in chart.grid_lines(1):
-            self._pygame.draw.line(self._surface, GRID, (offset, 0), (offset, SIZE))
+            self._brush.line(GRID, (offset, 0.0), (offset, SIZE))
 
     def _draw_path(self, chart: _Chart, scene: Scene) -> None:
         if scene.waypoints is None:
             return
-        draw, points = self._pygame.draw, chart.pixels(scene.waypoints)
+        brush, points = self._brush, chart.pixels(scene.waypoints)
         if scene.corridor is not None:
             half = scene.corridor / chart.metres
             for start, end in pairwise(points):
-                draw.polygon(self._surface, CORRIDOR, _strip(start, end, half))
+                brush.polygon(CORRIDOR, _strip(start, end, half))
             for point in points:
-                draw.circle(self._surface, CORRIDOR, point.tolist(), half)
-        draw.lines(self._surface, PATH, False, points.tolist(), 2)
+                brush.circle(CORRIDOR, point, half)
+        brush.lines(PATH, points, 2)
         for point in points:
-            draw.circle(self._surface, PATH, point.tolist(), 5, 2)
+            brush.circle(WATER, point, 5)
+            brush.circle(PATH, point, 5, 2)
 
     def _draw_wake(self, chart: _Chart, scene: Scene) -> None:
         if len(scene.wake) > 1:
-            self._pygame.draw.lines(self._surface, WAKE, False, chart.pixels(scene.wake).tolist(), 2)
+            self._brush.lines(WAKE, chart.pixels(scene.wake), 2)
 
     def _draw_ship(self, chart: _Chart, scene: Scene) -> None:
-        draw = self._pygame.draw
+        brush = self._brush
         centre = np.array([scene.x, scene.y])
-        size = np.array([scene.length, scene.beam])
-        draw.polygon(
-            self._surface, HULL, chart.pixels(centre + _turned(HULL_OUTLINE * size, scene.heading)).tolist()
-        )
         if scene.course_order is not None:
             ahead = centre + 1.6 * scene.length * _direction(scene.course_order)
-            self._arrow(chart.pixels(centre), chart.pixels(ahead), ORDER)
+            brush.arrow(ORDER, chart.pixels(centre), chart.pixels(ahead))
         bow = centre + 1.1 * scene.length * _direction(scene.heading)
-        draw.line(self._surface, HULL, chart.pixels(centre).tolist(), chart.pixels(bow).tolist(), 1)
+        brush.line(HULL, chart.pixels(centre), chart.pixels(bow))
         stern = centre - 0.5 * scene.length * _direction(scene.heading)
         # a rudder to starboard puts its trailing edge to starboard of the stern
         blade = stern - 0.22 * scene.length * _direction(scene.heading - scene.rudder)
-        draw.line(self._surface, RUDDER, chart.pixels(stern).tolist(), chart.pixels(blade).tolist(), 3)
+        brush.line(RUDDER, chart.pixels(stern), chart.pixels(blade), 3)
+        outline = _turned(HULL_OUTLINE * [scene.length, scene.beam], scene.heading)
+        brush.polygon(HULL, chart.pixels(centre + outline))
 
     def _draw_scale(self, chart: _Chart) -> None:
         pixels = chart.spacing / chart.metres
         left, bottom = 14.0, SIZE - 18.0
-        self._pygame.draw.line(self._surface, INK, (left, bottom), (left + pixels, bottom), 2)
-        self._text(f"{chart.spacing:g} m", (left, bottom - 16.0), self._small, FAINT)
+        self._brush.line(INK, (left, bottom), (left + pixels, bottom), 2)
+        self._brush.text(f"{chart.spacing:g} m", (left, bottom - 16.0), FAINT, small=True)
 
     def _draw_compass(self, scene: Scene, centre: Point, radius: float) -> None:
-        draw = self._pygame.draw
-        draw.circle(self._surface, PANEL, centre, radius + 12.0)
-        draw.circle(self._surface, FAINT, centre, radius, 1)
+        brush = self._brush
+        brush.circle(PANEL, centre, radius + 12.0)
+        brush.circle(FAINT, centre, radius, 1)
         for angle in range(0, 360, 30):
             outer, inner = (_on_circle(centre, radius - inset, radians(angle)) for inset in (0.0, 5.0))
-            draw.line(self._surface, FAINT, outer, inner)
+            brush.line(FAINT, outer, inner)
         for name, angle in (("N", 0), ("E", 90), ("S", 180), ("W", 270)):
-            self._text(name, _on_circle(centre, radius - 13.0, radians(angle)), self._small, INK, "centre")
+            brush.text(name, _on_circle(centre, radius - 15.0, radians(angle)), INK, "centre", small=True)
+        needle = radius - 22.0  # leaves the letters free
+        brush.arrow(HULL, _on_circle(centre, 0.6 * needle, scene.heading + pi),
+                    _on_circle(centre, needle, scene.heading))  # fmt: skip
         if scene.course_order is not None:
-            self._arrow(centre, _on_circle(centre, radius, scene.course_order), ORDER)
-        self._arrow(centre, _on_circle(centre, radius - 4.0, scene.heading), HULL)
+            corners = ((-4.0, 0.0), (9.0, -0.09), (9.0, 0.09))
+            order = scene.course_order
+            brush.polygon(ORDER, [_on_circle(centre, radius + out, order + side) for out, side in corners])
         if scene.wind is not None:
             origin = scene.wind[1]
-            self._arrow(_on_circle(centre, radius + 11, origin), _on_circle(centre, 24.0, origin), WIND)
+            brush.arrow(WIND, _on_circle(centre, radius + 12.0, origin),
+                        _on_circle(centre, radius - 8.0, origin))  # fmt: skip
         if scene.current is not None:
-            tip = _on_circle(centre, radius + 11.0, scene.current[1])
-            self._arrow(_on_circle(centre, 24.0, scene.current[1]), tip, CURRENT)
+            towards = scene.current[1]
+            brush.arrow(CURRENT, _on_circle(centre, radius - 8.0, towards),
+                        _on_circle(centre, radius + 12.0, towards))  # fmt: skip
 
     def _draw_gauge(self, scene: Scene, centre: Point, width: float) -> None:
-        draw, (x, y) = self._pygame.draw, centre
-        box = (x - width / 2.0 - 28.0, y - 24.0, width + 56.0, 50.0)
-        draw.rect(self._surface, PANEL, box, border_radius=8)
-        draw.line(self._surface, FAINT, (x - width / 2.0, y), (x + width / 2.0, y))
+        brush, (x, y) = self._brush, centre
+        brush.panel(PANEL, (x - width / 2.0 - 28.0, y - 24.0, width + 56.0, 50.0))
+        brush.line(FAINT, (x - width / 2.0, y), (x + width / 2.0, y))
         for part in (-1.0, -0.5, 0.0, 0.5, 1.0):
             at = x + part * width / 2.0
-            draw.line(self._surface, FAINT, (at, y - 5.0), (at, y + 5.0))
+            brush.line(FAINT, (at, y - 5.0), (at, y + 5.0))
         tip = x + max(-1.0, min(1.0, scene.rudder / scene.rudder_limit)) * width / 2.0
-        draw.line(self._surface, RUDDER, (x, y), (tip, y), 5)
+        brush.line(RUDDER, (x, y), (tip, y), 5)
         limit = degrees(scene.rudder_limit)
-        self._text(f"port {limit:.0f}", (x - width / 2.0, y + 15.0), self._small, FAINT, "centre")
-        self._text(f"stbd {limit:.0f}", (x + width / 2.0, y + 15.0), self._small, FAINT, "centre")
-        self._text(f"rudder {degrees(scene.rudder):+.1f} deg", (x, y - 14.0), self._small, INK, "centre")
+        brush.text(f"port {limit:.0f}", (x - width / 2.0, y + 15.0), FAINT, "centre", small=True)
+        brush.text(f"stbd {limit:.0f}", (x + width / 2.0, y + 15.0), FAINT, "centre", small=True)
+        brush.text(f"rudder {degrees(scene.rudder):+.1f} deg", (x, y - 14.0), INK, "centre", small=True)
 
     def _draw_readouts(self, scene: Scene) -> None:
         lines = list(scene.readouts.items())
@@ -246,27 +253,63 @@ class Renderer:
             lines.append(("current", f"{scene.current[0]:.2f} m/s"))
         if not lines:
             return
-        box = (8.0, 8.0, 212.0, 12.0 + 19.0 * len(lines))
-        self._pygame.draw.rect(self._surface, PANEL, box, border_radius=8)
-        colours = {"wind": WIND, "current": CURRENT}
+        self._brush.panel(PANEL, (8.0, 8.0, 212.0, 12.0 + 19.0 * len(lines)))
         for k, (what, much) in enumerate(lines):
             height = 15.0 + 19.0 * k
-            self._text(what, (18.0, height), self._font, colours.get(what, FAINT))
-            self._text(much, (210.0, height), self._font, INK, "right")
+            self._brush.text(what, (18.0, height), LEGEND.get(what, FAINT))
+            self._brush.text(much, (210.0, height), INK, "right")
 
-    def _arrow(self, start: Any, end: Any, colour: Colour) -> None:
+
+class _Brush:
+    """Draws in pixels of the picture on a finer surface."""
+
+    def __init__(self, pygame: Any) -> None:
+        pygame.font.init()
+        self._pygame = pygame
+        self._surface = pygame.Surface((FINER * SIZE, FINER * SIZE))
+        self._fonts = {
+            small: pygame.font.Font(None, FINER * (16 if small else 20)) for small in (False, True)
+        }
+
+    def show(self, surface: Any) -> None:
+        """Bring the picture to its size."""
+        self._pygame.transform.smoothscale(self._surface, (SIZE, SIZE), surface)
+
+    def fill(self, colour: Colour) -> None:
+        self._surface.fill(colour)
+
+    def line(self, colour: Colour, start: Any, end: Any, width: int = 1) -> None:
+        self._pygame.draw.line(self._surface, colour, _fine(start), _fine(end), FINER * width)
+
+    def lines(self, colour: Colour, points: Any, width: int) -> None:
+        self._pygame.draw.lines(self._surface, colour, False, _fine(points), FINER * width)
+
+    def polygon(self, colour: Colour, points: Any) -> None:
+        self._pygame.draw.polygon(self._surface, colour, _fine(points))
+
+    def circle(self, colour: Colour, centre: Any, radius: float, width: int = 0) -> None:
+        self._pygame.draw.circle(self._surface, colour, _fine(centre), FINER * radius, FINER * width)
+
+    def panel(self, colour: Colour, box: Any) -> None:
+        self._pygame.draw.rect(self._surface, colour, _fine(box), border_radius=FINER * 8)
+
+    def arrow(self, colour: Colour, start: Any, end: Any) -> None:
         tail, tip = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         along = (tip - tail) / max(hypot(*(tip - tail)), 1e-9)
         across = np.array([-along[1], along[0]])
-        head = [tip, tip - 9.0 * along + 4.0 * across, tip - 9.0 * along - 4.0 * across]
-        self._pygame.draw.line(self._surface, colour, tail.tolist(), (tip - 5.0 * along).tolist(), 2)
-        self._pygame.draw.polygon(self._surface, colour, [point.tolist() for point in head])
+        self.line(colour, tail, tip - 5.0 * along, 2)
+        self.polygon(colour, [tip, tip - 9.0 * along + 4.0 * across, tip - 9.0 * along - 4.0 * across])
 
-    def _text(self, text: str, at: Point, font: Any, colour: Colour, anchor: str = "left") -> None:
-        drawn = font.render(text, True, colour)
+    def text(self, text: str, at: Point, colour: Colour, anchor: str = "left", small: bool = False) -> None:
+        drawn = self._fonts[small].render(text, True, colour)
         width, height = drawn.get_size()
         shift = {"left": (0.0, 0.0), "right": (width, 0.0), "centre": (width / 2.0, height / 2.0)}[anchor]
-        self._surface.blit(drawn, (at[0] - shift[0], at[1] - shift[1]))
+        self._surface.blit(drawn, (FINER * at[0] - shift[0], FINER * at[1] - shift[1]))
+
+
+def _fine(points: Any) -> Any:
+    """Pixels of the finer surface."""
+    return (FINER * np.asarray(points, dtype=float)).tolist()
 
 
 class _Chart:

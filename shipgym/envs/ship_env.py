@@ -38,6 +38,8 @@ def read_options(
     known = [*ENV_OPTIONS, *task_type.__dataclass_fields__, *Variety.names()]
     check_keys(options, known, "environment options")
     variety, rest = Variety.take_from(options)
+    if not isinstance(model, str | Path | ShipModel):
+        raise InputError(f"model: {model!r} found, expected a name, the path of a model file, or a ShipModel")
     ship = model if isinstance(model, ShipModel) else load_model(model)
     return ship, task_type.from_options(rest), variety
 
@@ -95,9 +97,12 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
-        self._seen, self._outcomes = self._engine.shown
+        self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
         self._command = self._engine.command[:, 0]
-        self._names, self._flags = self.task.info_names, sorted(self.task.flags)
+        self._least = self.task.least_commands(self.model)
+        self._discrete = self.task.action == "rudder-discrete"
+        self._names = self.task.info_names
+        self._flags = [(name, k) for k, name in enumerate(self._names) if name in self.task.flags]
         self._key = 0
         self._episode = -1
 
@@ -152,7 +157,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
             self._artist.begin(self._engine)
         if self.render_mode == "human":
             self.render()
-        return self._seen[0].copy(), self._info(self._outcomes[STEP_OUTCOME:, 0].tolist())
+        return self._seen.copy(), self._info(self._outcomes[STEP_OUTCOME:].tolist())
 
     def step(self, action: Any) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Hold a command over one control interval.
@@ -179,22 +184,22 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         """
         self._order(action)
         self._engine.advance()
-        reward, terminated, truncated, *rest = self._outcomes[:, 0].tolist()
+        reward, terminated, truncated, *rest = self._outcomes.tolist()
         if self._artist is not None:
             self._artist.note(self._engine)
-        if self.render_mode == "human":
-            self.render()
-        return self._seen[0].copy(), reward, terminated > 0.0, truncated > 0.0, self._info(rest)
+            if self.render_mode == "human":
+                self.render()
+        return self._seen.copy(), reward, terminated > 0.0, truncated > 0.0, self._info(rest)
 
     def _info(self, values: list[float]) -> dict[str, Any]:
         info: dict[str, Any] = dict(zip(self._names, values, strict=True))
-        for flag in self._flags:
-            info[flag] = info[flag] > 0.0
+        for flag, k in self._flags:
+            info[flag] = values[k] > 0.0
         return info
 
     def _order(self, action: Any) -> None:
         """Set the command, refusing what is none."""
-        if self.task.action == "rudder-discrete":
+        if self._discrete:
             self._command[0] = RUDDER_ORDERS[_one_order(action)]
             return
         array = action if isinstance(action, np.ndarray) else np.asarray(action, dtype=np.float32)
@@ -204,7 +209,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         for k, number in enumerate(array.tolist()):
             if not isfinite(number):
                 raise InputError(f"action: {number} found, expected numbers in [-1, 1]: parts of the limit")
-            self._command[k] = number
+            self._command[k] = max(number, self._least[k])
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""

@@ -12,7 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys, quoted
-from shipgym.envs.engine import NEXT_STEP, SAME_STEP, STAY, STEP_OUTCOME, Engine, episode_key, episode_keys
+from shipgym.envs.engine import STEP_OUTCOME, Engine, episode_key, episode_keys
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options, spaces
 from shipgym.envs.task import RUDDER_ORDERS, Task
 from shipgym.errors import InputError
@@ -24,11 +24,6 @@ Observation = NDArray[np.float32]
 Infos = dict[str, Any]
 
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
-KERNEL_MODES = {
-    AutoresetMode.DISABLED: STAY,
-    AutoresetMode.NEXT_STEP: NEXT_STEP,
-    AutoresetMode.SAME_STEP: SAME_STEP,
-}
 
 
 class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
@@ -82,9 +77,11 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
-        self._mode = KERNEL_MODES[mode]
+        self._mode = mode
+        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
         self._everyone = np.ones(self.num_envs, dtype=np.bool_)
         self._everyone.flags.writeable = False
+        self._masks = {f"_{name}": self._everyone for name in self.task.info_names}
         self._keys: NDArray[np.uint64] | None = None
 
     @property
@@ -127,6 +124,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
                 self._keys[row], episodes[row] = episode_keys(number), 0
         self._engine.show_anew()
         self._engine.begin(self._keys, episodes, mask)
+        self._ended[mask] = False
         for artist, begun in zip(self._artists, mask, strict=False):
             if begun:
                 artist.begin(self._engine)
@@ -180,16 +178,20 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         """
         self._engine.order(self._commands(actions))
         self._engine.show_anew()
-        self._engine.advance(self._mode)
+        self._engine.advance()
         observations, outcomes = self._engine.shown
         rewards, terminated, truncated = outcomes[0].copy(), outcomes[1] > 0.0, outcomes[2] > 0.0
+        ended, self._ended = self._ended, terminated | truncated
         infos = self._infos(outcomes, self._everyone)
-        if self._mode == SAME_STEP:
-            ended = terminated | truncated
-            if ended.any():
-                infos |= self._final(ended, *self._engine.last_shown)
+        if self._mode is AutoresetMode.SAME_STEP and self._ended.any():
+            final = self._final(self._ended)
+            self._engine.begin_next(self._ended)
+            infos = self._infos(outcomes, self._everyone) | final
+        elif self._mode is AutoresetMode.NEXT_STEP and ended.any():
+            self._engine.begin_next(ended)
+            infos = self._infos(outcomes, self._everyone)
         if self._artists:
-            self._note(outcomes)
+            self._note()
         return observations, rewards, terminated, truncated, infos
 
     def _commands(self, actions: Any) -> Any:
@@ -207,14 +209,15 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
 
     def _infos(self, outcomes: Floats, mask: Flags) -> Infos:
         """Rows of the outcome by name, with the mask of the rows that they are of."""
-        infos: Infos = {}
-        for name, row in zip(self.task.info_names, outcomes[STEP_OUTCOME:], strict=True):
-            infos[name] = row > 0.0 if name in self.task.flags else row
-            infos[f"_{name}"] = mask
+        infos: Infos = dict(zip(self.task.info_names, outcomes[STEP_OUTCOME:], strict=True))
+        for flag in self.task.flags:
+            infos[flag] = infos[flag] > 0.0
+        infos.update(self._masks if mask is self._everyone else dict.fromkeys(self._masks, mask))
         return infos
 
-    def _final(self, ended: Flags, observations: Observation, outcomes: Floats) -> Infos:
+    def _final(self, ended: Flags) -> Infos:
         """What episodes that ended showed last."""
+        observations, outcomes = self._engine.shown
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended):
             final_obs[row] = observations[row].copy()
@@ -224,7 +227,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
             "final_info": self._infos(kept, ended), "_final_info": ended,
         }  # fmt: skip
 
-    def _note(self, outcomes: Floats) -> None:
+    def _note(self) -> None:
         """Let the wakes grow, or begin where an episode did."""
         for row, artist in enumerate(self._artists):
             begun = self._engine.steps[row] == 0
@@ -233,6 +236,10 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
     def physical_state(self) -> dict[str, Floats]:
         """State, course to steer and weather by name, SI units, each of shape (num_envs,)."""
         return self._engine.physical_state()
+
+    def waypoints(self, row: int = 0) -> Floats | None:
+        """North and east of the path of a row's episode, m, shape (n, 2); None in course keeping."""
+        return self._engine.waypoints(row)
 
     def render(self) -> tuple[Any, ...] | None:
         """A picture of each row, uint8 arrays of shape (600, 600, 3); None without a render mode."""

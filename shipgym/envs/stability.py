@@ -27,7 +27,7 @@ def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -
     marked = [model.name for model in models if (model.provenance or {}).get("stable") is False]
     if not marked:
         return
-    found = f"model {marked[0]!r} was found unstable when it was identified: it runs away in hard turns"
+    found = f"model {marked[0]!r} was found unstable when it was identified: it runs away where ships do not"
     if not allow_unstable:
         raise InputError(
             f"{found}, expected a stable one; identify it from more trials or with the guard, or give "

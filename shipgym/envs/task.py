@@ -11,11 +11,12 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_choice, check_keys, check_number
+from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.kernels import voyage_rows as rows
 from shipgym.models import ShipModel
+from shipgym.simulation.orders import turns_astern
 from shipgym.simulation.sensors import SEA_TRIAL
 from shipgym.simulation.weather_column import as_weather
 from shipgym.weather.conditions import Weather
@@ -30,6 +31,7 @@ ROLL_SCALE = np.radians(30.0)  # heel that costs `roll_weight` a step, and is se
 ROLL_RATE_SCALE = 0.1  # rad/s, seen as 1
 INTEGRAL_ZONE = np.radians(10.0)  # the error is integrated only within this
 INTEGRAL_LENGTHS = 10.0  # the integral's scale: INTEGRAL_ZONE for so many ship lengths
+LONGEST_INTERVAL = 5.0  # ship lengths at service speed
 STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
@@ -83,7 +85,8 @@ class Task:
         How many times further out than the training data the model may be taken before the episode
         ends (see `Envelope.distance`).
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed.
+        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed. A
+        shaft whose propeller is known ahead only is stopped by an order astern.
     roll : bool
         Whether roll angle and rate are observed.
     roll_weight : float
@@ -120,7 +123,7 @@ class Task:
             raise InputError("sea: none found, expected at least one")
         if self.dt is not None:
             check_number(self.dt, "dt", above=0.0)
-        check_number(self.episode_steps, "episode_steps", at_least=1)
+        check_whole(self.episode_steps, "episode_steps", at_least=1)
         check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
         check_choice(self.action, ACTIONS, "action")
         check_choice(self.measurement, MEASUREMENTS, "measurement")
@@ -142,7 +145,7 @@ class Task:
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
         """The weathers of which each episode has one."""
-        several = [self.sea] if isinstance(self.sea, str | Weather) else list(self.sea)
+        several: Sequence[Any] = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
         return tuple(as_weather(one, "sea", None) for one in several)
 
     @property
@@ -171,7 +174,10 @@ class Task:
             Naming the argument.
         """
         model.check_depth(self.water_depth)
-        if "delta" not in model.command_names:
+        if self.dt is not None:
+            longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
+            check_number(self.dt, "dt", at_most=longest, hint=f"s: {LONGEST_INTERVAL:g} ship lengths")
+        if not getattr(model.dynamics, "has_rudder", True):
             raise InputError(f"model: {model.name!r} has no rudder, expected a ship that is steered by one")
         if self.roll and "phi" not in model.state_names:
             raise InputError(
@@ -197,6 +203,11 @@ class Task:
             Observed("heading_error_integral", -1.0, 1.0, integral, at[7]),
         )
         return steering + self.observed_of_task(model) + self._observed_extras(model)
+
+    def least_commands(self, model: ShipModel) -> tuple[float, ...]:
+        """Least command of each, parts of the limits: a shaft that may not turn astern is stopped instead."""
+        shaft = (-1.0 if turns_astern(model) else 0.0,) if self.action == "rudder-shaft" else ()
+        return (-1.0, *shaft)
 
     def observed_of_task(self, model: ShipModel) -> tuple[Observed, ...]:
         """What the task itself adds to what is observed."""

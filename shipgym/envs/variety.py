@@ -48,6 +48,8 @@ class Variety:
     def __post_init__(self) -> None:
         if self.model_uncertainty is not None:
             check_choice(self.model_uncertainty, ("posterior",), "model_uncertainty")
+        if isinstance(self.ensemble, str | Path | ShipModel):
+            raise InputError(f"ensemble: {self.ensemble!r} found, expected a list of models")
         for name in ("speed_range", "loading_range"):
             if (given := getattr(self, name)) is not None:
                 _check_range(given, name)

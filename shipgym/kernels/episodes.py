@@ -1,4 +1,4 @@
-"""Episodes of 64 ships at once: begin them, take a control interval, begin the next ones where they end.
+"""Episodes of 64 ships at once: begin them, take a control interval.
 
 The task is `task.py`, replaced by that of an environment when the kernels are compiled. What every step
 needs is vectorised over lanes; what comes seldom (a new set-point, the next leg, the end of an episode) is
@@ -24,7 +24,6 @@ from .voyage_rows import (
     COURSE,
     DT,
     END,
-    ENDED,
     HEADING_ERROR,
     INTEGRAL,
     INTEGRAL_LENGTHS,
@@ -47,15 +46,13 @@ from .voyage_rows import (
     SHOWN,
     SUBSTEPS,
     TASK_INFO,
-    TERMINATED,
-    TRUNCATED,
     WAVE_FILTERED,
 )
 from .weather import WEATHER
 from .weather_rows import P_WAVE, PHI_WAVE
 
 N_OUTCOME = (TASK_INFO - OUTCOME) // LANES + N_INFO
-STAY, NEXT_STEP, SAME_STEP = 0, 1, 2  # when the next episode begins: by hand, in the next or the same step
+N_STEP = 3  # of the outcome, what `step` answers: reward, terminated, truncated
 POOL_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
 LARGEST_ROLL, LARGEST_ROLL_RATE = 0.5235987755982988, 0.1  # rad, rad/s: scales of what is seen
 
@@ -166,14 +163,23 @@ def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, pool: Any,
         measure(state, keys, tile, settings, ship, lane)
 
 
+@rare
+def turn_due(state: Any, keys: Any, tile: int, settings: Any, ship: Any, lanes: int) -> None:
+    """Let the ships turn for which it is time."""
+    for lane in range(lanes):
+        if is_due(state, settings, ship, lane):
+            turn(state, lane, keys, tile, settings, ship)
+
+
 @kernel(
     "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float64[:, ::1], boolean[::1],"
-    " float32[:, ::1], float64[:, ::1])"
+    " float32[:, ::1], float64[:, ::1], boolean)"
 )
 def reset(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, which: Any, observations: Any, outcomes: Any
-) -> None:
-    """Begin an episode in the lanes of `which`, and show all.
+    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, which: Any, observations: Any,
+    outcomes: Any, all_anew: bool,
+) -> None:  # fmt: skip
+    """Begin an episode in the lanes of `which`.
 
     Parameters
     ----------
@@ -193,72 +199,37 @@ def reset(
         Taken by what autopilots see.
     outcomes : float64 array of shape (N_OUTCOME, n)
         Taken by reward, flags and info.
+    all_anew : bool
+        Whether everything is shown, or what the last step showed stays: its rewards and flags everywhere,
+        and all of it in tiles where no episode begins.
     """
     n = which.shape[0]
     for tile in range(states.shape[0]):
         state, ship, first = states[tile], ships[tile % ships.shape[0]], tile * LANES
         lanes = min(n - first, LANES)
+        begun = 0
         for lane in range(lanes):
             if which[first + lane]:
                 begin(state, lane, keys, tile, settings, pool, ship)
-        observe(state, settings, ship, lanes)
-        show(state, settings, observations, first, lanes)
-        hand_over(state, outcomes, 0, first, lanes)
-
-
-@rare
-def turn_due(state: Any, keys: Any, tile: int, settings: Any, ship: Any, lanes: int) -> None:
-    """Let the ships turn for which it is time."""
-    for lane in range(lanes):
-        if is_due(state, settings, ship, lane):
-            turn(state, lane, keys, tile, settings, ship)
-
-
-@rare
-def begin_next(state: Any, keys: Any, tile: int, settings: Any, pool: Any, ship: Any, lanes: int) -> None:
-    """Begin the next episode where the last was over before this step."""
-    for lane in range(lanes):
-        over = state[TERMINATED + lane] + state[TRUNCATED + lane] == 0.0
-        if state[ENDED + lane] != 0.0 and over:
-            keys[tile, 1, lane] += np.uint64(1)
-            begin(state, lane, keys, tile, settings, pool, ship)
-
-
-@rare
-def show_last(
-    state: Any, keys: Any, tile: int, settings: Any, pool: Any, ship: Any, lanes: int,
-    observations: Any, outcomes: Any, last_observations: Any, last_outcomes: Any,
-) -> None:  # fmt: skip
-    """Keep what ended episodes show last, and show how the next ones begin."""
-    first = tile * LANES
-    for lane in range(lanes):
-        if state[ENDED + lane] != 0.0:
-            for k in range(observations.shape[1]):
-                last_observations[first + lane, k] = observations[first + lane, k]
-            for k in range(N_OUTCOME):
-                last_outcomes[k, first + lane] = outcomes[k, first + lane]
-            keys[tile, 1, lane] += np.uint64(1)
-            begin(state, lane, keys, tile, settings, pool, ship)
-    observe(state, settings, ship, lanes)
-    show(state, settings, observations, first, lanes)
-    hand_over(state, outcomes, 3, first, lanes)  # reward and flags are those of the end
+                begun += 1
+        if all_anew or begun > 0:
+            observe(state, settings, ship, lanes)
+            show(state, settings, observations, first, lanes)
+            hand_over(state, outcomes, 0 if all_anew else N_STEP, first, lanes)
 
 
 @kernel(
-    "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float64[:, ::1],"
-    " float32[:, ::1], float32[:, ::1], float64[:, ::1], float32[:, ::1], float64[:, ::1],"
-    " int64, int64, int64)"
+    "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float32[:, ::1],"
+    " float32[:, ::1], float64[:, ::1], int64, int64)"
 )
 def step(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, actions: Any, observations: Any,
-    outcomes: Any, last_observations: Any, last_outcomes: Any, first_tile: int, end_tile: int, autoreset: int,
+    states: Any, keys: Any, settings: Any, ships: Any, actions: Any, observations: Any, outcomes: Any,
+    first_tile: int, end_tile: int,
 ) -> None:  # fmt: skip
     """One control interval of the tiles from `first_tile` up to `end_tile`.
 
-    A lane whose episode is over stays as it is and earns nothing, unless `autoreset` begins the next one: in
-    the step after its end (NEXT_STEP), or at once (SAME_STEP), with what it showed last in
-    `last_observations` and `last_outcomes`. `actions` holds rows of commands, of the rudder and, if there is
-    a second, of the shaft; for the others see `reset`.
+    A lane whose episode is over stays as it is and earns nothing. `actions` holds rows of commands, of the
+    rudder and, if there is a second, of the shaft; for the others see `reset`.
     """
     n = observations.shape[0]
     for tile in range(first_tile, end_tile):
@@ -267,20 +238,12 @@ def step(
         order(state, actions, first, lanes)
         voyage(state, keys[tile, 2], settings[DT], int(settings[SUBSTEPS]), ship, lanes)
         judge(state, settings, ship, lanes)
-        due, ended = 0, 0
+        due = 0
         for lane in range(lanes):
             due += 1 if is_due(state, settings, ship, lane) else 0
-            ended += 1 if state[ENDED + lane] != 0.0 else 0
         if due > 0:
             turn_due(state, keys, tile, settings, ship, lanes)
         measure_all(state, keys, tile, settings, ship, lanes)
-        if autoreset == NEXT_STEP and ended > 0:
-            begin_next(state, keys, tile, settings, pool, ship, lanes)
         observe(state, settings, ship, lanes)
         show(state, settings, observations, first, lanes)
         hand_over(state, outcomes, 0, first, lanes)
-        if autoreset == SAME_STEP and ended > 0:
-            show_last(
-                state, keys, tile, settings, pool, ship, lanes,
-                observations, outcomes, last_observations, last_outcomes,
-            )  # fmt: skip

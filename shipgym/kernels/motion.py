@@ -124,10 +124,8 @@ def runge_kutta(
     ----------
     state : tuple of 10 float
         x, y, psi, u, v, r, p, phi, delta, n.
-    command : float
-        Commanded rudder, rad.
-    n_command : float
-        Commanded shaft speed, 1/s.
+    command, n_command : float
+        Commanded rudder, rad, and shaft speed, 1/s.
     h : float
         Step, s.
     push : tuple of 6 float

@@ -220,15 +220,17 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
     for name, sail in courses.items():
         try:
             trial = sail()
-            heel = float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
-            if not heel < CAPSIZED:
-                yield (
-                    f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than "
-                    f"{np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose coefficient of phi "
-                    "rights the ship where it is negative; identify it from trials with more roll"
-                )
+            wrong, heel = "", float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
         except UnstableModelError as error:
-            yield f"{name}: {error}; identify it from trials with larger rudder angles, or with fewer terms"
+            wrong, heel = str(error), abs(error.state.get("phi", 0.0))
+        if not heel < CAPSIZED:
+            yield (
+                f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than "
+                f"{np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose coefficient of phi "
+                "rights the ship where it is negative; identify it from trials with more roll"
+            )
+        elif wrong:
+            yield f"{name}: {wrong}; identify it from trials with larger rudder angles, or with fewer terms"
 
 
 def _wrong_rudder(model: ShipModel) -> Iterator[str]:

@@ -33,7 +33,7 @@ def checked_orders(model: ShipModel, commands: ArrayLike) -> Floats:
             "with at least 2 steps"
         )
     check_units(model, orders)
-    if "n" in names and not _astern(model):
+    if "n" in names and not turns_astern(model):
         expected = f"a number >= 0: the equations of {model.name!r} hold for a shaft turning ahead only"
         _within(orders[:, names.index("n")], 0.0, np.inf, "shaft speed", expected, "commands")
     return orders
@@ -56,16 +56,19 @@ def check_units(model: ShipModel, orders: Floats, where: str = "commands") -> No
     if "n" in names:
         most = FASTEST_SHAFT * model.service_shaft_speed
         expected = (
-            f"1/s (not rpm) between {-most if _astern(model) else 0.0:.4g} and {most:.4g}; "
+            f"1/s (not rpm) between {-most if turns_astern(model) else 0.0:.4g} and {most:.4g}; "
             f"{model.service_shaft_speed:.4g} at service speed"
         )
         _within(orders[:, names.index("n")], -most, most, "shaft speed", expected, where)
 
 
-def _astern(model: ShipModel) -> bool:
+def turns_astern(model: ShipModel) -> bool:
     """Whether the shaft may turn astern: a table of terms is taken at its word."""
     dynamics = model.dynamics
-    return not isinstance(dynamics, Equations) or dynamics.astern
+    if isinstance(dynamics, Equations):
+        return dynamics.astern
+    reference = getattr(dynamics, "reference", None)
+    return reference is None or turns_astern(reference)
 
 
 def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:

@@ -173,3 +173,16 @@ def test_a_controller_that_gives_no_command_is_named(answer, message):
 def test_arguments_that_do_not_fit_are_refused(call, message):
     with pytest.raises(InputError, match=message):
         call()
+
+
+def test_a_model_found_unstable_is_flown_only_where_asked():
+    marked = replace(MARINER, provenance={"stable": False})
+    for sail in (fly, step_response):
+        with pytest.raises(InputError, match="found unstable when it was identified"):
+            sail(PILOT, marked, task=SHORT)
+        with pytest.warns(UserWarning, match="found unstable when it was identified"):
+            asked = sail(PILOT, marked, task=SHORT, allow_unstable=True)
+        plain = sail(PILOT, MARINER, task=SHORT)
+        np.testing.assert_array_equal(
+            *(found.cost if sail is fly else found.heading for found in (asked, plain))
+        )

@@ -71,7 +71,11 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
             ["--method", "rm-svm"],
             "with a reference_model: 'auto', a shipped model's name or a model file",
         ),
-        (OWN, ["--method", "rm-svm", "--reference-model", "tanker"], "expected structure 'grey-box'"),
+        (
+            OWN,
+            ["--method", "rm-svm", "--reference-model", "tanker", "--structure", "abkowitz"],
+            "expected structure 'grey-box'",
+        ),
         ('method = "rm-svm"\nreference_model = "tankr"', [], "Did you mean 'tanker'"),
         ('method = "rm-svm"\nreference_model = "auto"\nfolds = "luck"', [], "folds: 'luck' found"),
         ('structure = "gray-box"', [], "Did you mean 'grey-box'"),

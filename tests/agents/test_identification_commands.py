@@ -131,6 +131,12 @@ def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
     assert "reference_model" not in identification_settings(ShipFile.load(path), {"structure": "abkowitz"})
 
 
+def test_rm_svm_on_the_command_line_goes_before_the_structure_of_the_ship_file(demo):
+    ship, given = ShipFile.load(demo), {"method": "rm-svm", "reference_model": "tanker"}
+    assert identification_settings(ship, {**given, "structure": None})["structure"] == "grey-box"
+    assert identification_settings(ship, {**given, "structure": "norrbin"})["structure"] == "norrbin"
+
+
 @pytest.mark.parametrize("text", ["seed", "=3", "sede=3", "seed=three"])
 def test_an_option_written_wrongly_is_named(text):
     with pytest.raises(InputError, match="--set"):
@@ -150,6 +156,24 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
     told |= {"uncertainty": "bootstrap", "prior": "kijima", "prior_strength": 0.5}
     assert {name: found[name] for name in told} == told
     assert found["hold_out"] == [held]
+
+
+def test_the_whole_chain_takes_the_same_options(demo, tmp_path):
+    held = "zigzag_10_10.csv"
+    answer = shipgym(
+        "autopilot", demo, "--out", tmp_path / "out", "--draws", "3", "--structure", "linear-steering",
+        "--method", "abc-lssvr", "--objective", "training", "--hold-out", held, "--set", "seed=3",
+        "--set", "bounds=[1, 1e6]", "--json",
+    )  # fmt: skip
+    assert answer.exit_code == 0, answer.stderr
+    assert json.loads(answer.stdout)["trials"][held]["use"] == "validate"
+    told = load_model(tmp_path / "out" / "model.json").provenance
+    assert (told["method"], told["settings"]["objective"]) == ("abc-lssvr", "training")
+    assert max(found["C"] for found in told["search"].values()) <= 1e6
+    refused = shipgym("autopilot", demo, "--out", tmp_path / "no", "--set", "sede=3")
+    assert refused.exit_code == 2
+    assert "Did you mean 'seed'" in refused.stderr
+    assert not (tmp_path / "no").exists()
 
 
 def test_extra_trials_are_seen_by_the_refinement_alone(ship, demo):

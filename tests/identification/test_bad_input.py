@@ -119,6 +119,19 @@ def test_settings_that_do_not_fit(
     assert refusal(cao_zigzag, **arguments).startswith(message)
 
 
+def test_arguments_of_another_kind_are_named(cao_zigzag: Trial, mariner: ShipModel) -> None:
+    for trials, found in ((cao_zigzag, "Trial"), ("a.csv", "'a.csv'"), ([cao_zigzag, 3], "3")):
+        with pytest.raises(InputError, match=rf"trials: {found}.* found, expected a list of Trials"):
+            identify(trials, particulars=mariner.particulars)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="steering: 35 found, expected a SteeringGear"):
+        identify([cao_zigzag], particulars=mariner.particulars, steering=35)  # type: ignore[arg-type]
+
+
+def test_a_misspelt_option_is_told_with_the_one_meant(refusal: Callable[..., str], cao_zigzag: Trial) -> None:
+    assert refusal(cao_zigzag, preprocesing="rts").endswith("Did you mean 'preprocessing'?")
+    assert "Did you mean" not in refusal(cao_zigzag, epsilon=1.0)
+
+
 def test_trials_of_a_model_at_another_scale(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
     """The Mariner at a scale of 1 to 100 in Froude's time."""
     speed = {c: 0.1 * cao_zigzag[c] for c in ("u", "v")}

@@ -83,6 +83,27 @@ def test_a_fit_that_nothing_holds_is_marked(
     assert "NOT STABLE" in fit.summary()
 
 
+def test_a_model_that_runs_away_on_a_trial_held_out_is_marked(
+    cao_fit: IdentificationResult, cao_zigzag: Trial, mariner: ShipModel
+) -> None:
+    """Stable in every turn of the guard, and but not under a rudder twenty times too large."""
+    hard = Trial(
+        cao_zigzag.t,
+        {**cao_zigzag.channels, "delta": 20.0 * cao_zigzag["delta"]},
+        name="hard",
+        use="validate",
+    )
+    fit = identify([cao_zigzag, hard], particulars=mariner.particulars)
+    assert cao_fit.stable
+    assert fit.coefficients == cao_fit.coefficients
+    assert fit.predictions["hard"] is None
+    assert not fit.stable
+    assert fit.metrics["stable"] is False
+    assert fit.model.provenance is not None
+    assert (fit.model.provenance["stable"], fit.model.provenance["runs_away_on"]) == (False, ["hard"])
+    assert "NOT STABLE" in fit.summary()
+
+
 def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
     assert cao_fit.stable
     assert cao_fit.model.provenance is not None

@@ -147,6 +147,21 @@ def test_turns_given_to_the_refinement_alone_hold_the_turn(
     assert [trial["name"] for trial in report["extra_trials"]] == ["turn35.0", "turn-35.0"]
 
 
+def test_an_anchor_holds_the_turn_of_the_reference_ship(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
+    fit = identify(
+        zigzags, method="output-error", particulars=mariner.particulars, steering=mariner.steering,
+        anchor=mariner, anchor_weight=1.0, rudder_offsets=True,
+    )  # fmt: skip
+    turn = turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths
+    assert turn == pytest.approx(
+        turning_indices(turning_circle(mariner, 35)).tactical_diameter_lengths, rel=0.02
+    )
+    assert (fit.model.provenance or {})["refinement"]["anchor"] == mariner.name
+
+
 def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag: Trial) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
     start = replace(guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag]), stable=False)
@@ -162,6 +177,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
         ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
         ({"pull": -1.0}, "pull: -1"),
         ({"extra_weight": float("nan")}, "extra_weight: nan"),
+        ({"anchor_weight": 0.0}, "anchor_weight: 0"),
     ],
 )
 def test_wrong_settings_are_refused(settings: dict[str, object], message: str) -> None:

@@ -1,10 +1,25 @@
+import warnings
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
 from shipgym import InputError
-from shipgym.envs.rendering import HULL, PATH, RUDDER, SIZE, Renderer, Scene
+from shipgym.envs.rendering import (
+    CORRIDOR,
+    CURRENT,
+    HULL,
+    ORDER,
+    PATH,
+    RUDDER,
+    SIZE,
+    WAKE,
+    WIND,
+    Renderer,
+    Scene,
+)
+from shipgym.weather import Current, Weather, Wind
 
 LENGTH, BEAM = 160.0, 40.0
 SHIP = Scene(5000.0, -300.0, 0.0, 0.0, LENGTH, BEAM, np.radians(35.0), np.zeros((0, 2)))
@@ -55,3 +70,94 @@ def test_the_same_scene_gives_the_same_picture(renderer):
 def test_an_unknown_mode_is_refused():
     with pytest.raises(InputError, match="expected one of 'human', 'rgb_array'"):
         Renderer("ansi")
+
+
+COURSE_KEEPING, PATH_FOLLOWING = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+TROUBLED = Weather(current=Current(0.8, towards_deg=90.0), wind=Wind(9.0, from_deg=200.0))
+
+
+def make(name, **options):
+    return gymnasium.make(name, **{"model": "mariner", "render_mode": "rgb_array", **options})
+
+
+def sailed(env, steps=60):
+    env.reset(seed=1)
+    for _ in range(steps):
+        env.step(np.full(1, 0.1, dtype=np.float32))
+    return env.render()
+
+
+def shows(picture, colour):
+    return bool(np.all(picture == colour, axis=-1).any())
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "shown", "absent"),
+    [
+        (COURSE_KEEPING, {}, (HULL, ORDER, WAKE, RUDDER), (PATH, CORRIDOR, WIND, CURRENT)),
+        (COURSE_KEEPING, {"sea": "moderate"}, (HULL, ORDER, WIND), (PATH, CURRENT)),
+        (PATH_FOLLOWING, {}, (HULL, ORDER, PATH, CORRIDOR), (WIND, CURRENT)),
+        (PATH_FOLLOWING, {"sea": TROUBLED}, (HULL, PATH, WIND, CURRENT), ()),
+        (PATH_FOLLOWING, {"model": "kvlcc2"}, (HULL, PATH, CORRIDOR), (WIND,)),
+    ],
+)
+def test_environments_show_what_there_is(name, options, shown, absent):
+    picture = sailed(make(name, **options))
+    assert picture.shape == (SIZE, SIZE, 3)
+    assert picture.dtype == np.uint8
+    assert [shows(picture, colour) for colour in shown] == [True] * len(shown)
+    assert [shows(picture, colour) for colour in absent] == [False] * len(absent)
+
+
+def test_a_picture_follows_from_seed_and_actions_and_the_wake_begins_anew():
+    env = make(PATH_FOLLOWING)
+    first, again = sailed(env), sailed(env)
+    np.testing.assert_array_equal(first, again)
+    env.reset(seed=2)
+    assert not shows(env.render(), WAKE)
+
+
+def test_rendering_changes_nothing_of_the_voyage():
+    shown, blind = (make(COURSE_KEEPING, render_mode=mode) for mode in ("rgb_array", None))
+    for env in (shown, blind):
+        sailed(env)
+    assert shown.unwrapped.physical_state() == blind.unwrapped.physical_state()
+    assert blind.unwrapped.render() is None
+
+
+def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    env = make(PATH_FOLLOWING, render_mode="human")
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(np.zeros(1, dtype=np.float32))
+    assert env.render() is None
+    env.close()
+    env.close()
+
+
+def test_rows_of_a_vector_environment_have_their_own_pictures():
+    rows = gymnasium.make_vec(PATH_FOLLOWING, 3, model="mariner", render_mode="rgb_array")
+    rows.reset(seed=1)
+    single = make(PATH_FOLLOWING)
+    single.reset(seed=2)
+    for _ in range(20):
+        rows.step(np.full((3, 1), 0.1, dtype=np.float32))
+        single.step(np.full(1, 0.1, dtype=np.float32))
+    pictures = rows.render()
+    assert len(pictures) == 3
+    np.testing.assert_array_equal(pictures[1], single.render())
+    assert not np.array_equal(pictures[0], pictures[1])
+    assert gymnasium.make_vec(PATH_FOLLOWING, 1, model="mariner").render() is None
+
+
+def test_videos_are_recorded(tmp_path):
+    pytest.importorskip("moviepy", reason="RecordVideo writes its files with moviepy")
+    env = gymnasium.wrappers.RecordVideo(make(COURSE_KEEPING, episode_steps=5), str(tmp_path / "videos"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what moviepy imports
+        env.reset(seed=0)
+        for _ in range(5):
+            env.step(np.zeros(1, dtype=np.float32))
+        env.close()
+    assert [path.suffix for path in (tmp_path / "videos").iterdir()] == [".mp4"]

@@ -1,0 +1,53 @@
+"""How fast stable-baselines3's PPO learns on ShipVecEnv, and which part of the time is the environment's."""
+
+from __future__ import annotations
+
+import time
+from typing import Any, NamedTuple
+
+import torch
+from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env import VecNormalize
+
+from agents.learning_settings import PPO_SETTINGS, PPO_SHIPS
+from shipgym import ShipVecEnv
+
+
+class LearningSpeed(NamedTuple):
+    """Frames per second, and the part of the time spent in the environment."""
+
+    frames: float
+    share: float
+
+
+class Timed(ShipVecEnv):
+    """Knows how long its steps took, s."""
+
+    spent = 0.0
+
+    def step_wait(self) -> Any:
+        """One control interval."""
+        start = time.perf_counter()
+        outcome = super().step_wait()
+        self.spent += time.perf_counter() - start
+        return outcome
+
+
+def ppo_speed(env_id: str, repeats: int = 3, threads: int = 2) -> LearningSpeed:
+    """The fastest of some rollouts with their updates, by the shipped settings."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(threads)
+    try:
+        env = Timed(env_id, PPO_SHIPS, seed=0)
+        scaled = VecNormalize(env, norm_obs=False, gamma=PPO_SETTINGS["gamma"])
+        agent = PPO("MlpPolicy", scaled, seed=0, **PPO_SETTINGS)
+        frames = PPO_SHIPS * PPO_SETTINGS["n_steps"]
+        measured = []
+        for _ in range(repeats):
+            env.spent, start = 0.0, time.perf_counter()
+            agent.learn(frames, reset_num_timesteps=False)
+            total = time.perf_counter() - start
+            measured.append(LearningSpeed(frames / total, env.spent / total))
+        return max(measured)
+    finally:
+        torch.set_num_threads(before)

@@ -1,0 +1,290 @@
+"""The native vector environment as stable-baselines3 has them.
+
+stable-baselines3 takes no vector environment of Gymnasium's; its own step single ones in turn.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+
+from shipgym.checks import check_choice
+from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
+from shipgym.errors import InputError
+
+try:
+    from stable_baselines3.common.monitor import Monitor
+    from stable_baselines3.common.vec_env import VecEnv
+except ImportError:
+    raise InputError(
+        "stable-baselines3 is not installed, ShipVecEnv needs it: pip install 'shipgym[rl]'"
+    ) from None
+
+Indices = None | int | Sequence[int]
+
+#: What all rows have in common, by the names of the single environment.
+SHARED = ("dt", "metadata", "model", "observation_names", "observation_scales", "render_mode", "spec", "task")
+
+
+class Row:
+    """What the single environment of one row would show; other attributes may be set by `set_attr`."""
+
+    def __init__(self, env: ShipVectorEnv, number: int) -> None:
+        self._env = env
+        self._number = number
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in SHARED:
+            raise AttributeError(f"a row of ShipVecEnv has no attribute {name!r}")
+        return getattr(self._env, name)
+
+    @property
+    def unwrapped(self) -> Row:
+        """The row itself."""
+        return self
+
+    @property
+    def observation_space(self) -> gymnasium.Space[Any]:
+        """Of one ship."""
+        return self._env.single_observation_space
+
+    @property
+    def action_space(self) -> gymnasium.Space[Any]:
+        """Of one ship."""
+        return self._env.single_action_space
+
+    @property
+    def waypoints(self) -> NDArray[np.float64] | None:
+        """North and east of this episode's path, m, shape (n, 2); None in course keeping."""
+        return self._env.waypoints(self._number)
+
+    def physical_state(self) -> dict[str, float]:
+        """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
+        return {name: float(values[self._number]) for name, values in self._env.physical_state().items()}
+
+    def render(self) -> Any:
+        """A picture, uint8 array of shape (600, 600, 3); None without a render mode."""
+        pictures = self._env.render()
+        return None if pictures is None else pictures[self._number]
+
+
+FIXED = {*SHARED, *(name for name in vars(Row) if not name.startswith("_"))}
+
+
+class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+    """Ships under a task as a vector environment of stable-baselines3; step by step its DummyVecEnv of them.
+
+    The list of infos is the same in every step, and its dictionaries are empty but for episodes that ended:
+    those hold what the single environment's `info` does, `terminal_observation`, `TimeLimit.truncated`,
+    `episode` as stable-baselines3's Monitor writes it (return `r`, length `l`, time `t`) and, where paths
+    are followed, `is_success`. Who keeps infos beyond the next step has to copy the list.
+
+    Parameters
+    ----------
+    env : str or ShipVectorEnv
+        An environment's id, or a native vector environment with the autoreset mode SAME_STEP.
+    num_envs : int, optional
+        Number of ships; by default 1, or that of the given environment.
+    seed : int, optional
+        Row i has the seed `seed + i`, as if `seed` was called.
+    info_names : sequence of str
+        Entries of `info` that every step gives for every ship; at the price of time.
+    **options
+        Of the environment, `threads` among them.
+
+    Raises
+    ------
+    InputError
+        For an environment that is not native, an unknown keyword or a value out of its range, or options
+        beside an environment that is made already.
+    """
+
+    def __init__(
+        self,
+        env: str | ShipVectorEnv,
+        num_envs: int | None = None,
+        *,
+        seed: int | None = None,
+        info_names: Sequence[str] = (),
+        **options: Any,
+    ) -> None:
+        self.vector_env = _native(env, num_envs, options)
+        n = self.vector_env.num_envs
+        self._rows = [Row(self.vector_env, number) for number in range(n)]
+        super().__init__(n, self.vector_env.single_observation_space, self.vector_env.single_action_space)
+        self.metadata: dict[str, Any] = dict(self.vector_env.metadata)
+        self.spec = self.vector_env.spec
+        self.info_names = tuple(info_names)
+        for name in self.info_names:
+            check_choice(name, self.vector_env.task.info_names, "info_names")
+        self._infos: list[dict[str, Any]] = [{} for _ in range(n)]
+        self._touched: list[int] = []  # rows whose dictionary is to be emptied
+        self._returns, self._lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
+        self._actions: Any = None
+        self._started = time.time()
+        if seed is not None:
+            self.seed(seed)
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in each row: with the seeds of `seed`, once, or else the next.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, n_observations)
+
+        Raises
+        ------
+        InputError
+            If there are options: as the single environments, these know none.
+        """
+        options = [given for given in self._options if given]
+        self._reset_options()
+        if options:
+            raise InputError(f"options: {options[0]!r} found, expected none; name them when it is made")
+        observations, infos = self.vector_env.reset(seed=None if None in self._seeds else self._seeds)
+        self._reset_seeds()
+        self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
+        self._infos = [{} for _ in range(self.num_envs)]
+        self._returns[:], self._lengths[:], self._touched = 0.0, 0, []
+        return observations
+
+    def step_async(self, actions: Any) -> None:
+        """Take the actions of the next `step_wait`, of shape (num_envs, n_commands) or (num_envs,)."""
+        self._actions = actions
+
+    def step_wait(
+        self,
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+        """One control interval; where an episode ends the next begins.
+
+        Returns
+        -------
+        observations : float32 array of shape (num_envs, n_observations)
+            Of the new episode where the last one ended.
+        rewards : float32 array of shape (num_envs,)
+        dones : bool array of shape (num_envs,)
+        infos : list of dict
+            The same list in each step.
+
+        Raises
+        ------
+        InputError
+            If an action is not a number or their shape is another.
+        """
+        observations, rewards, terminated, truncated, infos = self.vector_env.step(self._actions)
+        self._returns += rewards
+        self._lengths += 1
+        for row in self._touched:
+            self._infos[row] = {}
+        dones = terminated | truncated
+        self._touched = np.flatnonzero(dones).tolist() if dones.any() else []
+        if self.info_names:
+            self._give_infos(infos)
+        for row in self._touched:
+            self._infos[row] = self._last_info(row, infos, bool(truncated[row]))
+            self.reset_infos[row] = _info_of(infos, row)
+            self._returns[row], self._lengths[row] = 0.0, 0
+        return observations, rewards.astype(np.float32), dones, self._infos
+
+    def _give_infos(self, infos: Infos) -> None:
+        """New dictionaries of what is asked for in every step."""
+        columns = [infos[name].tolist() for name in self.info_names]
+        for row, values in enumerate(zip(*columns, strict=True)):
+            self._infos[row] = dict(zip(self.info_names, values, strict=True))
+
+    def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
+        """What is told at the end of an episode."""
+        info = _info_of(infos["final_info"], row)
+        if "success" in info:
+            info["is_success"] = info["success"]  # read by stable-baselines3's log
+        info["terminal_observation"] = infos["final_obs"][row]
+        info["TimeLimit.truncated"] = truncated
+        elapsed = round(time.time() - self._started, 6)
+        total, length = round(float(self._returns[row]), 6), int(self._lengths[row])
+        info["episode"] = {"r": total, "l": length, "t": elapsed}
+        return info
+
+    def close(self) -> None:
+        """Close the vector environment."""
+        self.vector_env.close()
+
+    def get_images(self) -> Sequence[Any]:
+        """A picture of each row; None without a render mode."""
+        return self.vector_env.render() or [None] * self.num_envs
+
+    def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
+        """An attribute of the single environments of some rows (see `Row`), or what `set_attr` set."""
+        return [getattr(row, attr_name) for row in self._chosen(indices)]
+
+    def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
+        """Keep a value for some rows by a name of the user's own.
+
+        Raises
+        ------
+        InputError
+            For what is fixed when the environments are made.
+        """
+        if attr_name in FIXED:
+            raise InputError(
+                f"set_attr: {attr_name!r} is fixed when the ships are made, expected a name of your own; "
+                "make a new ShipVecEnv with another argument"
+            )
+        for row in self._chosen(indices):
+            setattr(row, attr_name, value)
+
+    def env_method(
+        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+    ) -> list[Any]:
+        """What a method of the single environments of some rows returns (see `Row`)."""
+        return [getattr(row, method_name)(*method_args, **method_kwargs) for row in self._chosen(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None) -> list[bool]:
+        """Whether the rows do what a wrapper does: Monitor's episode statistics, yes; nothing else."""
+        return [wrapper_class is Monitor for _ in self._chosen(indices)]
+
+    def _chosen(self, indices: Indices) -> list[Row]:
+        return [self._rows[number] for number in self._get_indices(indices)]
+
+
+def _info_of(infos: Infos, row: int) -> dict[str, Any]:
+    """One row of Gymnasium's arrays, as the single environment's info."""
+    return {
+        name: values[row].item()
+        for name, values in infos.items()
+        if not name.startswith(("_", "final_"))
+    }  # fmt: skip
+
+
+def _native(env: str | ShipVectorEnv, num_envs: int | None, options: dict[str, Any]) -> ShipVectorEnv:
+    """The native vector environment by its id, or as given."""
+    if isinstance(env, str):
+        if "autoreset_mode" in options:
+            raise InputError(
+                "autoreset_mode: found, expected none; stable-baselines3 begins episodes in the same step"
+            )
+        n = 1 if num_envs is None else num_envs
+        made: Any = gymnasium.make_vec(env, num_envs=n, autoreset_mode=AutoresetMode.SAME_STEP, **options)
+    else:
+        made = env
+        if num_envs is not None or options:
+            raise InputError(
+                f"num_envs, options: {sorted(options) or num_envs} found beside an environment that is made "
+                "already; give them where it is made, or give its id"
+            )
+    if not isinstance(made, ShipVectorEnv):
+        raise InputError(
+            f"env: {made!r} found, expected the id of an environment of shipgym or what gymnasium.make_vec "
+            "makes of it; wrap with stable-baselines3's wrappers afterwards"
+        )
+    if made.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
+        raise InputError(
+            f"env: autoreset_mode {made.metadata['autoreset_mode'].name} found, expected SAME_STEP: "
+            "gymnasium.make_vec(..., autoreset_mode='SameStep')"
+        )
+    return made

@@ -1,0 +1,72 @@
+"""Course autopilots follow paths as they are: they steer by the heading error to the line of sight."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from agents import LQ, PID
+from shipgym import InputError, load_model
+
+
+def sailed(controller, model, n=64, **options):
+    """Shares of episodes with success, of those aground, and of the time within the corridor."""
+    env = gymnasium.make_vec(
+        "shipgym/PathFollowing-v0", num_envs=n, model=model, autoreset_mode="Disabled", **options
+    )
+    controller.check_fits(env.observation_names, env.observation_scales)
+    seen, _ = env.reset(seed=0)
+    steps = within = 0
+    over, success, grounded = np.zeros((3, n), dtype=np.bool_)
+    while not over.all():
+        seen, _, terminated, truncated, infos = env.step(controller.predict(seen)[0])
+        steps, within = steps + (~over).sum(), within + (infos["in_corridor"] & ~over).sum()
+        success |= infos["success"] & ~over
+        grounded |= infos["grounded"] & ~over
+        over |= terminated | truncated
+    return success.mean(), grounded.mean(), within / steps
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2", "container"])
+@pytest.mark.parametrize("design", [PID, LQ])
+def test_paths_in_calm_water_are_followed_to_their_end(name, design):
+    model = load_model(name)
+    success, grounded, within = sailed(design.from_model(model), model)
+    assert success == 1.0
+    assert grounded == 0.0
+    assert within > 0.98
+
+
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
+def test_most_paths_in_a_rough_sea_too(name):
+    model = load_model(name)
+    success, grounded, within = sailed(PID.from_model(model), model, sea="rough")
+    assert success >= 0.95
+    assert grounded == 0.0
+    assert within > 0.95
+
+
+def test_a_ship_left_to_herself_runs_aground():
+    class Nothing(PID):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            return np.zeros((len(observation), 1), np.float32), state
+
+    model = load_model("mariner")
+    success, grounded, _ = sailed(Nothing(**vars(PID.from_model(model))), model)
+    assert success < 0.05
+    assert grounded > 0.9
+
+
+def test_what_is_seen_beyond_does_not_matter_but_must_begin_as_designed_for():
+    model = load_model("mariner")
+    pid = PID.from_model(model)
+    random = np.random.default_rng(0)
+    seen = random.uniform(-1.0, 1.0, (5, 13))
+    np.testing.assert_array_equal(pid.predict(seen)[0], pid.predict(seen[:, :8])[0])
+    with pytest.raises(InputError, match=r"shape \(5, 7\) found"):
+        pid.predict(seen[:, :7])
+    names, scales = list(pid.observation_names), list(pid.observation_scales)
+    pid.check_fits([*names, "cross_track"], [*scales, 1.0])
+    with pytest.raises(InputError, match="observation 0 is 'cross_track', expected 'heading_error_sin'"):
+        pid.check_fits(["cross_track", *names], [1.0, *scales])
+    with pytest.raises(InputError, match="in one and not in the other: heading_error_integral"):
+        pid.check_fits(names[:7], scales[:7])

@@ -1,0 +1,59 @@
+"""Agents of stable-baselines3 learn on ShipVecEnv, in seconds, what doing nothing does not do."""
+
+import numpy as np
+import pytest
+import torch
+from stable_baselines3 import PPO, SAC
+from stable_baselines3.common.evaluation import evaluate_policy
+from stable_baselines3.common.vec_env import VecNormalize
+
+from agents.learning_settings import PPO_SETTINGS, SAC_SETTINGS, SAC_SHIPS
+from shipgym import ShipVecEnv
+
+COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+SHORT = {
+    COURSE: {"dt": 5.0, "episode_steps": 60, "change_interval_steps": 30},
+    PATH: {"dt": 5.0, "episode_steps": 60, "n_legs": 1, "leg_lengths": (6.0, 6.0), "ground": 2.0},
+}
+QUICK = {
+    **PPO_SETTINGS, "n_steps": 64, "batch_size": 512, "learning_rate": 2e-3, "gamma": 0.95,
+    "policy_kwargs": {"net_arch": [32]},
+}  # fmt: skip
+
+
+@pytest.fixture(autouse=True)
+def one_thread():
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+class Nothing:
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.zeros((len(observation), 1), np.float32), None
+
+
+def mean_return(agent, name):
+    env = ShipVecEnv(name, 32, seed=1000, **SHORT[name])
+    return evaluate_policy(agent, env, n_eval_episodes=32)[0]  # a warning if it had no statistics
+
+
+def learned(algorithm, name, ships, steps, settings):
+    env = VecNormalize(
+        ShipVecEnv(name, ships, seed=0, **SHORT[name]), norm_obs=False, gamma=settings["gamma"]
+    )
+    return algorithm("MlpPolicy", env, seed=0, **settings).learn(steps)
+
+
+@pytest.mark.parametrize("name", [COURSE, PATH])
+def test_ppo_learns(name):
+    agent = learned(PPO, name, 64, 8 * 4096, QUICK)
+    assert mean_return(agent, name) > 0.25 * mean_return(Nothing(), name)
+    assert max(info["l"] for info in agent.ep_info_buffer) <= 60
+    assert bool(agent.ep_success_buffer) == (name == PATH)  # what stable-baselines3 logs as success rate
+
+
+def test_sac_learns():
+    agent = learned(SAC, COURSE, SAC_SHIPS, 2560, SAC_SETTINGS)
+    assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)

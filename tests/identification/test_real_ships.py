@@ -1,0 +1,127 @@
+"""The study of measured ships: quick facts of its data and of how its page is written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.real_ships import CASES, Data, get_case
+from identification.real_ships.captive import FORCES, combined, held_out, least_squares, read, study
+from identification.real_ships.esso_osaka import LEAST_SPEED, under_way
+from identification.real_ships.hsva import RUNS, SHIP, TRIPLES
+from identification.real_ships.marin import MEASURED, full_scale
+from identification.real_ships.measures import turns, zigzag_errors
+from identification.real_ships.section import Section, marks, number, put, table
+from shipgym import InputError, ShipModel
+from shipgym.manoeuvres import zigzag
+from shipgym.models import load_model
+
+SHIPS = Path(__file__).parents[1] / "ships"
+MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"
+PAGE = Path(__file__).parents[2] / "docs" / "real_ships.md"
+
+measured = pytest.mark.skipif(
+    not MEASURED_RUNS.is_dir(), reason=f"the measured runs are not at {MEASURED_RUNS}"
+)
+
+
+@pytest.fixture
+def data() -> Data:
+    return Data(SHIPS, MEASURED_RUNS)
+
+
+def test_the_page_has_a_place_for_each_case_and_says_by_which_command() -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    for case in CASES:
+        first, last = marks(case)
+        assert page.count(first) == page.count(last) == 1
+        assert f"`python scripts/real_ships.py {case}`" in page
+        assert callable(get_case(case))
+
+
+def test_a_section_replaces_its_earlier_self_and_nothing_else() -> None:
+    page = "before\n" + "\n".join(marks("a")) + "\nafter\n"
+    once = put(page, "a", Section("Title", "old"))
+    assert put(once, "a", Section("Title", "new")) == once.replace("old", "new")
+    assert once.startswith("before\n")
+    assert once.endswith("\nafter\n")
+
+
+def test_tables_show_a_dash_where_there_is_no_number() -> None:
+    assert number(float("nan")) == number(None) == "-"
+    assert table(["a", "b"], [[number(1.25, 1), "x"]]).splitlines()[-1] == "| 1.2 | x |"
+
+
+def test_a_ship_predicts_its_own_zigzag(mariner: ShipModel) -> None:
+    errors = zigzag_errors(mariner, zigzag(mariner, 20, 20, dt=0.5))
+    assert np.all(errors < (1e-3, 1e-2, 0.05, 0.05))
+
+
+def test_the_bare_reference_turns_alike_at_any_scale() -> None:
+    """KVLCC2 at 7 m: advance 3.08, tactical diameter 3.12 ship lengths."""
+    starboard, port = turns(load_model("kvlcc2-l7"))
+    assert starboard is not None
+    assert port is not None
+    assert starboard.advance_lengths == pytest.approx(3.080, abs=0.005)
+    assert starboard.tactical_diameter_lengths == pytest.approx(3.118, abs=0.005)
+    assert MEASURED == (3.25, 3.34)
+
+
+def test_every_triple_leaves_three_runs_and_all_runs_are_predicted() -> None:
+    assert {len(set(triple)) for triple in TRIPLES} == {3}
+    assert all(any(name not in triple for triple in TRIPLES) for name in RUNS)
+
+
+@measured
+def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> None:
+    hsva, marin = data.ship(SHIP, 20), data.ship("kvlcc2_marin", 10)
+    from identification import identify
+
+    model = identify(
+        [hsva.runs["Z_20_05"], hsva.runs["Z_30_05"]], "steering5", particulars=hsva.particulars,
+        steering=hsva.steering,
+    ).model  # fmt: skip
+    at_full_scale = full_scale(model, marin)
+    small, large = turns(model)[0], turns(at_full_scale)[0]
+    assert small is not None
+    assert large is not None
+    assert large.advance_lengths == pytest.approx(small.advance_lengths, rel=0.02)
+
+
+@measured
+def test_ships_at_rest_are_cut_off(data: Data) -> None:
+    run = data.ship("esso_osaka_3m", 2).runs["zigzag_31-Jul-2020_13_04_24"]
+    moving = under_way(run)
+    assert run["u"][0] < 0.01
+    assert np.hypot(moving["u"][0], moving["v"][0]) > LEAST_SPEED
+
+
+@measured
+def test_captive_forces_reduce_to_few_terms_that_predict_drift_with_rudder() -> None:
+    tests = read(MEASURED_RUNS)
+    expected = {"X'": (0.98, 0.90), "Y'": (0.999, 0.998), "N'": (0.999, 0.999)}
+    for force in FORCES:
+        found = study(tests, force)
+        assert len(found.reduction.terms) <= 8
+        assert found.held_out["tls-svm, reduced"] > expected[force][0]
+        assert combined(tests, force, found.reduction.terms) > expected[force][1]
+    yaw = study(tests, "N'").reduction.coefficients
+    assert yaw["vn"] < 0.0 < yaw["dn"]  # Munk's moment; a rudder to starboard turns to starboard
+
+
+def test_missing_captive_tests_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        read(tmp_path)
+
+
+def test_what_is_held_out_is_not_fitted() -> None:
+    """Points on a line but for one far off it: nothing can tell that one from the others."""
+    x = np.linspace(1.0, 2.0, 10)
+    y = 3.0 * x
+    y[-1] += 5.0
+    folds = [np.array([i]) for i in range(10)]
+    residual = y[-1] - 3.0 * x[-1]
+    score = held_out(x[:, None], y, least_squares, folds)
+    assert (1.0 - score) * np.sum((y - y.mean()) ** 2) > residual**2 * 0.999

@@ -1,0 +1,213 @@
+"""What Gymnasium, stable-baselines3 and workers ask of an environment; wrong arguments and actions."""
+
+import math
+import warnings
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env as gymnasium_check_env
+from stable_baselines3.common.env_checker import check_env as sb3_check_env
+from stable_baselines3.common.vec_env import SubprocVecEnv
+
+import shipgym
+from shipgym import InputError
+from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.models import ShipModel
+from shipgym.weather import Current, Weather, Wind
+
+COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+IDS = [f"shipgym/{task}{variant}-v0" for task in TASKS for variant in VARIANTS]
+SEA = Weather(current=Current(0.5), wind=Wind(9.0))
+BY_KEYWORD = [
+    (COURSE, {"model": "mariner", "sea": "rough", "noise": 1.0, "measurement": "filtered"}),
+    (COURSE, {"model": "mariner", "course_changes_deg": [10.0, -5.0], "change_interval_steps": 20}),
+    (COURSE, {"model": "mariner", "speed_range": (0.5, 1.0), "loading_range": (0.8, 1.2)}),
+    (PATH, {"model": "mariner", "waypoints": [[0.0, 0.0], [2000.0, 500.0]], "sea": ["calm", SEA]}),
+    (PATH, {"model": "kvlcc2", "action": "rudder-shaft", "noise": 0.5}),
+]
+EVERY = [*((name, {}) for name in IDS), *BY_KEYWORD]
+NAMES = [f"{name.removeprefix('shipgym/')} {' '.join(options)}" for name, options in EVERY]
+
+
+@pytest.mark.parametrize(("name", "options"), EVERY, ids=NAMES)
+@pytest.mark.parametrize("check", [gymnasium_check_env, sb3_check_env], ids=["gymnasium", "sb3"])
+def test_every_id_and_variant_conforms_without_a_warning(check, name, options):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        env = gymnasium.make(name, **options)
+        check(env.unwrapped)
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_a_spec_travels_as_json(name):
+    env = gymnasium.make(name, episode_steps=50)
+    again = gymnasium.make(EnvSpec.from_json(env.spec.to_json()))
+    assert again.unwrapped.task == env.unwrapped.task
+    np.testing.assert_array_equal(again.reset(seed=3)[0], env.reset(seed=3)[0])
+
+
+def sailed(name, options):
+    """Three episodes by one seed: all that is shown."""
+    env = gymnasium.make(name, episode_steps=25, **options)
+    env.action_space.seed(7)
+    shown = []
+    for seed in (11, None, None):
+        observation, info = env.reset(seed=seed)
+        shown.append((observation.tolist(), 0.0, False, False, info))
+        while not (shown[-1][2] or shown[-1][3]):
+            observation, *rest = env.step(env.action_space.sample())
+            shown.append((observation.tolist(), *rest))
+    return shown
+
+
+@pytest.mark.parametrize(("name", "options"), BY_KEYWORD)
+def test_episodes_are_replayed_exactly_from_their_seed(name, options):
+    first = sailed(name, options)
+    assert first == sailed(name, options)
+    lengths = [k for k, shown in enumerate(first) if shown[2] or shown[3]]
+    assert len(lengths) == 3
+    assert len({str(first[k][:2]) for k in lengths}) == 3  # no episode is another again
+
+
+@pytest.mark.parametrize("context", ["spawn", "forkserver", "fork"])
+def test_workers_of_gymnasium(context):
+    env = gymnasium.make_vec(
+        f"shipgym:{PATH}", 1, "async", vector_kwargs={"context": context}, model="mariner", sea="moderate"
+    )
+    ours = gymnasium.make(PATH, model="mariner", sea="moderate")
+    np.testing.assert_array_equal(env.reset(seed=4)[0][0], ours.reset(seed=4)[0])
+    action = np.array([0.3], dtype=np.float32)
+    np.testing.assert_array_equal(env.step(action[None])[0][0], ours.step(action)[0])
+    env.close()
+
+
+def build():
+    return gymnasium.make(f"shipgym:{COURSE}", model="mariner")
+
+
+@pytest.mark.parametrize("start_method", ["forkserver", "fork"])
+def test_workers_of_stable_baselines3(start_method):
+    """Its `spawn` differs from `forkserver` in nothing of ours, and takes seconds to import."""
+    env = SubprocVecEnv([build], start_method=start_method)
+    env.seed(4)
+    ours = build()
+    np.testing.assert_array_equal(env.reset()[0], ours.reset(seed=4)[0])
+    action = np.array([0.3], dtype=np.float32)
+    np.testing.assert_array_equal(env.step(action[None])[0][0], ours.step(action)[0])
+    env.close()
+
+
+@pytest.mark.parametrize("name", [COURSE, PATH])
+@pytest.mark.parametrize(
+    ("action", "message"),
+    [
+        ([np.nan], "action: nan found"),
+        ([-np.inf], "action: -inf found"),
+        ([0.0, 0.0], r"action: shape \(2,\) found, expected \(1,\): the commanded rudder"),
+        (0.0, r"action: shape \(\) found"),
+        ([[0.0]], r"action: shape \(1, 1\) found"),
+    ],
+)
+def test_wrong_actions_are_refused_and_change_nothing(name, action, message):
+    env = gymnasium.make(name, model="mariner").unwrapped
+    env.reset(seed=0)
+    before = env.physical_state()
+    with pytest.raises(InputError, match=message):
+        env.step(np.array(action, dtype=np.float32))
+    assert env.physical_state() == before
+    rows = gymnasium.make_vec(name, 2, model="mariner")
+    rows.reset(seed=0)
+    with pytest.raises(InputError, match="actions: "):
+        rows.step(np.array([action, action], dtype=np.float32))
+
+
+def test_wrong_actions_of_rudder_and_shaft():
+    env = gymnasium.make(PATH, model="kvlcc2", action="rudder-shaft").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=r"shape \(1,\) found, expected \(2,\): .* and shaft speed"):
+        env.step(np.zeros(1, dtype=np.float32))
+    with pytest.raises(InputError, match="action: nan found"):
+        env.step(np.array([0.0, np.nan], dtype=np.float32))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"sae": "calm"}, "unknown key 'sae'. Did you mean 'sea'"),
+        ({"course_change": 10.0}, "Did you mean 'course_change_deg'"),
+        ({"sea": 3}, "sea: 3 found, expected a Weather of shipgym.weather or the name"),
+        ({"sea": []}, "sea: none found"),
+        ({"sea": ["calm", "rugh"]}, "sea: 'rugh' found.*Did you mean 'rough'"),
+        ({"action": "ruder"}, "action: 'ruder' found.*Did you mean 'rudder'"),
+        ({"action": "rudder-shaft"}, "action: 'rudder-shaft' found, but 'mariner' knows no shaft speed"),
+        ({"measurement": "filterd"}, "Did you mean 'filtered'"),
+        ({"noise": -0.1}, "noise: -0.1 found"),
+        ({"noise": math.nan}, "noise: nan found"),
+        ({"roll": True}, "roll: 'mariner' does not roll"),
+        ({"roll_weight": -1.0}, "roll_weight: -1 found"),
+        ({"envelope_weight": "much"}, "envelope_weight: 'much'"),
+        ({"water_depth": 30.0}, "water_depth: 30 m found, but 'mariner' is a deep-water model"),
+        ({"model": "tanker", "water_depth": 18.0}, "water_depth: 18 m found, expected more than the draught"),
+        ({"dt": 1e6}, r"dt: 1e\+06 found, expected a number <= 104"),
+        ({"dt": math.nan}, "dt: nan found"),
+        ({"episode_steps": 2.5}, "episode_steps: 2.5 found, expected a whole number"),
+        ({"change_interval_steps": 0}, "change_interval_steps: 0 found"),
+        ({"max_envelope_distance": 0.5}, "max_envelope_distance: 0.5 found"),
+        ({"course_change_deg": 120.0}, "course_change_deg: 120 found"),
+        ({"course_changes_deg": 20.0}, "course_changes_deg: 20.0 found, expected a list"),
+        ({"course_changes_deg": []}, "course_changes_deg: none found"),
+        ({"course_changes_deg": [0.0, math.inf]}, "course_changes_deg: number 1: inf found"),
+        ({"model": None}, "model: None found, expected a name"),
+        ({"model": "marinr"}, "Did you mean 'mariner'"),
+        ({"model_uncertainty": "prior"}, "model_uncertainty: 'prior' found"),
+        ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
+        ({"ensemble": "tanker"}, "ensemble: 'tanker' found, expected a list"),
+        ({"ensemble": ["tanker"]}, "ensemble: 'tanker' has other equations"),
+        ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5 found"),
+        ({"speed_range": (0.0, 0.5)}, "speed_range: the least: 0 found"),
+        ({"model": "kvlcc2", "loading_range": (0.8, 1.0)}, "loading_range: the equations of 'kvlcc2'"),
+        ({"render_mode": "ansi"}, "render_mode: 'ansi' found"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore:.*render_mode='ansi'")
+def test_wrong_options_are_named_when_an_environment_is_made(options, message):
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, **{"model": "mariner", **options})
+    with pytest.raises(InputError, match=message):
+        gymnasium.make_vec(COURSE, 2, **{"model": "mariner", **options})
+
+
+@pytest.mark.parametrize("count", [0, -1, 2.5, True])
+def test_a_count_that_is_none(count):
+    with pytest.raises(InputError, match=f"num_envs: {count} found, expected a whole number of at least 1"):
+        gymnasium.make_vec(PATH, count, model="mariner")
+
+
+def test_a_ship_without_a_rudder_is_refused(monkeypatch):
+    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(shipgym.models.structures.STRUCTURES))
+    shipgym.register_structure("drifting", {"v": "v, |v| v", "r": "v, r"})
+    mariner = shipgym.load_model("mariner")
+    drifting = ShipModel(
+        "drifting", "drifting", mariner.particulars, mariner.steering,
+        {"b_v": -0.05, "b_|v|v": 0.0, "c_v": 0.0, "c_r": -0.1},
+    )  # fmt: skip
+    for name in (COURSE, PATH):
+        with pytest.raises(InputError, match="model: 'drifting' has no rudder"):
+            gymnasium.make(name, model=drifting)
+
+
+def test_weather_needs_the_size_of_a_ship():
+    mariner = shipgym.load_model("mariner")
+    bare = replace(mariner, particulars=replace(mariner.particulars, beam=None, draught=None))
+    assert gymnasium.make(COURSE, model=bare).reset(seed=0)
+    with pytest.raises(InputError, match="weather without the particulars it needs: beam, draught"):
+        gymnasium.make(COURSE, model=bare, sea="moderate")
+
+
+def test_reset_says_what_is_wrong():
+    env = gymnasium.make(PATH, model="mariner").unwrapped
+    with pytest.raises(InputError, match=r"options: .*'wind'"):
+        env.reset(options={"wind": 3.0})

@@ -1,0 +1,181 @@
+"""ShipVecEnv: stable-baselines3's promises, and its DummyVecEnv of single environments step by step."""
+
+import gymnasium
+import numpy as np
+import pytest
+from stable_baselines3.common.monitor import Monitor
+from stable_baselines3.common.vec_env import DummyVecEnv, VecMonitor
+
+import shipgym
+from shipgym import InputError, ShipVecEnv
+
+COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
+LOST = {"max_heading_error_deg": 20.0}  # so that episodes end before their time
+MARINER = shipgym.load_model("mariner")
+
+
+def dummy(name, num_envs, info_keywords=(), **options):
+    def make():
+        return Monitor(gymnasium.make(name, model=MARINER, **options), info_keywords=info_keywords)
+
+    return DummyVecEnv([make] * num_envs)
+
+
+def ours(name, num_envs=3, **options):
+    return ShipVecEnv(name, num_envs, model=MARINER, **options)
+
+
+@pytest.mark.parametrize(
+    ("name", "options"),
+    [
+        (COURSE, {"episode_steps": 23, **LOST}),
+        (PATH, {"episode_steps": 39, "corridor": 0.4, "ground": 0.5}),
+        (PATH, {"episode_steps": 33, "n_legs": 1, "leg_lengths": (1.0, 2.0), "corridor": 3.0}),
+        (COURSE, {"episode_steps": 23, "action": "rudder-discrete", "sea": "rough", "noise": 1.0}),
+    ],
+    ids=["course", "ground", "arrival", "discrete"],
+)
+def test_it_is_a_dummy_vec_env_step_by_step(name, options):
+    n = 20 if options.get("sea") else 70  # more than a tile of the kernels
+    mine, theirs = ours(name, n, **options), dummy(name, n, **options)
+    assert mine.observation_space == theirs.observation_space
+    assert mine.action_space == theirs.action_space
+    mine.seed(11)
+    theirs.seed(11)
+    ends = {True: 0, False: 0}
+    random = np.random.default_rng(0)
+    sides = random.uniform(-1.0, 1.0, n)
+    np.testing.assert_array_equal(mine.reset(), theirs.reset())
+    assert mine.reset_infos == theirs.reset_infos
+    for _ in range(80):
+        actions = (sides * random.uniform(0.0, 1.0, n)).astype(np.float32)[:, None]
+        if name == COURSE and options.get("action"):
+            actions = random.integers(0, mine.action_space.n, n)
+        got, expected = mine.step(actions), theirs.step(actions)
+        for one, other in zip(got[:3], expected[:3], strict=True):
+            assert one.dtype == other.dtype
+            np.testing.assert_array_equal(one, other)
+        for done, info, full in zip(got[2], got[3], expected[3], strict=True):
+            truncated = info.get("TimeLimit.truncated", False)
+            assert truncated == full["TimeLimit.truncated"]
+            if done:
+                ends[truncated] += 1
+                _same_last_info(info, full)
+            else:
+                assert info == {}
+        assert mine.reset_infos == theirs.reset_infos
+    assert ends[True] + ends[False] > n
+    assert min(ends.values()) > 0 or options.get("action")
+
+
+def _same_last_info(info, full):
+    np.testing.assert_array_equal(info["terminal_observation"], full["terminal_observation"])
+    if "success" in full:
+        assert info["is_success"] == full["success"]
+    assert info["episode"]["l"] == full["episode"]["l"]
+    assert info["episode"]["r"] == pytest.approx(full["episode"]["r"], abs=2e-6)
+    assert info["episode"]["t"] >= 0.0
+    same = full.keys() - {"terminal_observation", "episode"}
+    assert info.keys() - same <= {"terminal_observation", "episode", "is_success"}
+    assert {key: info[key] for key in same} == {key: full[key] for key in same}
+
+
+def test_infos_are_reused_and_parts_of_them_given_on_request():
+    env = ours(COURSE, 4, info_names=["heading_error", "extrapolating"], episode_steps=3, seed=0)
+    env.reset()
+    plain = ours(COURSE, 4, episode_steps=3, seed=0)
+    plain.reset()
+    lists, shorts = [], []
+    for _ in range(4):
+        *_, infos = env.step(np.ones((4, 1), np.float32))
+        lists.append(plain.step(np.ones((4, 1), np.float32))[-1])
+        shorts.append([dict(info) for info in infos])
+    assert all(infos is lists[0] for infos in lists)
+    assert lists[0] == [{}] * 4
+    assert set(shorts[0][0]) == {"heading_error", "extrapolating"}
+    assert isinstance(shorts[0][0]["heading_error"], float)
+    assert isinstance(shorts[0][0]["extrapolating"], bool)
+    assert shorts[2][0]["episode"]["l"] == 3
+    assert set(shorts[3][0]) == {"heading_error", "extrapolating"}
+
+
+def test_statistics_are_those_of_vec_monitor():
+    env = ours(PATH, 3, episode_steps=5, seed=1)
+    assert env.env_is_wrapped(Monitor) == [True] * 3
+    assert env.env_is_wrapped(gymnasium.wrappers.TimeLimit, indices=[0]) == [False]
+    with pytest.warns(UserWarning, match="already wrapped"):
+        watched = VecMonitor(env, info_keywords=("success",))
+    watched.reset()
+    for _ in range(5):
+        *_, dones, infos = watched.step(np.zeros((3, 1), np.float32))
+    assert dones.all()
+    assert env._infos[0]["episode"]["r"] == pytest.approx(float(infos[0]["episode"]["r"]), rel=1e-6)
+    assert env._infos[0]["episode"]["l"] == infos[0]["episode"]["l"] == 5
+
+
+def test_attributes_and_methods_of_rows():
+    env, theirs = ours(PATH, 3, seed=4), dummy(PATH, 3)
+    theirs.seed(4)
+    for each in (env, theirs):
+        each.reset()
+        each.step(np.full((3, 1), 0.5, np.float32))
+    assert env.get_attr("dt") == theirs.get_attr("dt")
+    assert env.get_attr("observation_names", indices=1) == theirs.get_attr("observation_names", indices=1)
+    assert env.get_attr("unwrapped")[0].model is MARINER
+    np.testing.assert_array_equal(env.get_attr("waypoints"), theirs.get_attr("waypoints"))
+    assert env.env_method("physical_state", indices=[2]) == theirs.env_method("physical_state", indices=[2])
+    assert env.has_attr("task")
+    assert not env.has_attr("cargo")
+    env.set_attr("cargo", "grain", indices=[0, 2])
+    assert env.get_attr("cargo", indices=[0, 2]) == ["grain", "grain"]
+    assert not env.has_attr("cargo")
+    with pytest.raises(InputError, match="'model' is fixed"):
+        env.set_attr("model", MARINER)
+
+
+def test_seeds_fix_the_next_reset_only():
+    env = ours(PATH, 2)
+    assert env.seed(3) == [3, 4]
+    first, second = env.reset(), env.reset()
+    assert not np.array_equal(first, second)
+    env.seed(3)
+    np.testing.assert_array_equal(env.reset(), first)
+    np.testing.assert_array_equal(env.reset(), second)
+    np.testing.assert_array_equal(ours(PATH, 2, seed=3).reset(), first)
+
+
+def test_what_is_wrong_is_said():
+    native = gymnasium.make_vec(COURSE, num_envs=2, autoreset_mode="SameStep")
+    assert ShipVecEnv(native).num_envs == 2
+    for make, message in (
+        (lambda: ours("shipgym/CourseKeeping-v0", sae="calm"), "Did you mean 'sea'"),
+        (lambda: ours(COURSE, 0), "num_envs: 0 found"),
+        (lambda: ours(COURSE, info_names=["heading_eror"]), "Did you mean 'heading_error'"),
+        (lambda: ours(COURSE, autoreset_mode="Disabled"), "autoreset_mode: found, expected none"),
+        (lambda: ShipVecEnv(native, 2), "num_envs, options: 2 found"),
+        (lambda: ShipVecEnv(native, dt=1.0), "num_envs, options: .*dt"),
+        (lambda: ShipVecEnv(gymnasium.make_vec(COURSE, num_envs=2)), "autoreset_mode NEXT_STEP found"),
+        (lambda: ShipVecEnv(gymnasium.make(COURSE)), "expected the id of an environment of shipgym"),
+    ):
+        with pytest.raises(InputError, match=message):
+            make()
+    env = ours(COURSE, 2)
+    env.set_options({"depth": 3.0})
+    with pytest.raises(InputError, match=r"options: .*depth.* found, expected none"):
+        env.reset()
+    env.reset()
+    with pytest.raises(InputError, match="expected numbers"):
+        env.step(np.array([[0.0], [np.nan]]))
+
+
+def test_pictures_of_all_rows_in_one():
+    env = ours(PATH, 2, render_mode="rgb_array", seed=0)
+    env.reset()
+    env.step(np.zeros((2, 1), np.float32))
+    assert env.render_mode == "rgb_array"
+    assert env.metadata["render_fps"] == 30
+    picture = env.render()
+    assert picture.shape == (1200, 600, 3)
+    np.testing.assert_array_equal(picture[:600], env.env_method("render", indices=0)[0])
+    env.close()
+    assert list(ours(COURSE, 2).get_images()) == [None, None]
