@@ -14,7 +14,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.linear_loop import SIGNALS, length_time, rate_weight, sample_steering
+from agents.linear_loop import SIGNALS, SampledShip, length_time, rate_weight, sample_steering
 from agents.lq import LQ, lq_gain
 from agents.stateful import Flags, Stateful, heading_error
 from identification.recursive_kernels import scalar_updates
@@ -43,8 +43,10 @@ PAST_TARGETS = slice(PAST_TERMS.stop, PAST_TERMS.stop + (INNOVATIONS - 1) * N_EQ
 GAINS = slice(PAST_TARGETS.stop, PAST_TARGETS.stop + len(SIGNALS))
 NEUTRAL = slice(GAINS.stop, GAINS.stop + 2)  # rudder, sway
 LAST = slice(NEUTRAL.stop, NEUTRAL.stop + 4)  # sway, yaw rate, rudder, speed
-STEP = LAST.stop
-N_MEMORY = STEP + 1
+STEP, CHANGE, RESTLESS = LAST.stop, LAST.stop + 1, LAST.stop + 2  # steps; of the yaw rate; mean square
+N_MEMORY = RESTLESS + 1
+
+RESTLESS_LIMIT = 1.4  # times what the sensors' noise makes of the yaw rate's second difference
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -52,8 +54,9 @@ class AdaptiveLQ(Stateful):
     """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
 
     It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
-    be linear are not learned from. An estimate whose rudder effect is not believable, or for which no stable
-    loop is found, changes nothing.
+    be linear are not learned from, nor is anything while the yaw rate trembles more than noise explains: in
+    waves, unless they are filtered out. An estimate whose rudder effect is not believable, or whose gains
+    would leave it or the model unstable, changes nothing.
 
     Attributes
     ----------
@@ -135,6 +138,7 @@ class AdaptiveLQ(Stateful):
                 "speed": speed,
                 "sway_error": float(errors[0]),
                 "yaw_error": float(errors[1]),
+                "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
                 "gear_lag": model.steering.time_constant,
                 "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
                 "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
@@ -153,7 +157,7 @@ class AdaptiveLQ(Stateful):
         kept[begins] = self._fresh()
         speed = np.maximum(np.hypot(seen["surge"], seen["sway"]), 0.1 * self.design["speed"])
         now = np.stack([seen["sway"], seen["yaw_rate"], seen["rudder"], speed], axis=-1)
-        self._learn(kept, now, begins)
+        self._learn(kept, now, begins, self._at_rest(kept, now, begins))
         kept[:, LAST] = now
         kept[:, STEP] += 1.0
         for ship in np.flatnonzero(kept[:, STEP] % self.design["redesign_steps"] == 0.0):
@@ -180,6 +184,7 @@ class AdaptiveLQ(Stateful):
         memory[THETA] = (self.prior * SIZES / self.error_size[:, None]).ravel()
         memory[COVARIANCE] = np.stack([np.diag(self._doubt()[q]) for q in range(N_EQUATIONS)]).ravel()
         memory[GAINS] = [self.gains[signal] for signal in SIGNALS]
+        memory[RESTLESS] = 10.0 * self.design["restless_limit"] ** 2  # it must be seen to be calm
         memory[NEUTRAL] = self.neutral_rudder, self.neutral_sway
         return memory
 
@@ -189,14 +194,26 @@ class AdaptiveLQ(Stateful):
         doubt: Floats = np.maximum(size, 0.01) ** 2
         return doubt
 
-    def _learn(self, kept: Floats, now: Floats, begins: Flags) -> None:
+    def _at_rest(self, kept: Floats, now: Floats, begins: Flags) -> Flags:
+        """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
+        change = np.where(begins, 0.0, now[:, 1] - kept[:, LAST][:, 1])
+        trembling = (change - kept[:, CHANGE]) ** 2
+        share = 1.0 / self.design["redesign_steps"]
+        kept[:, RESTLESS] += share * (trembling - kept[:, RESTLESS])
+        kept[:, CHANGE] = change
+        at_rest: Flags = kept[:, RESTLESS] < self.design["restless_limit"] ** 2
+        return at_rest
+
+    def _learn(self, kept: Floats, now: Floats, begins: Flags, at_rest: Flags) -> None:
         """TMILS with the last interval's mean motion and accelerations; all ships side by side."""
         last, dt, length = kept[:, LAST], self.design["dt"], self.design["length"]
         sway, turn, rudder, speed = (0.5 * (last + now)).T
         speed = np.where(begins, now[:, 3], speed)
         terms = np.stack([sway / speed, turn * length / speed, rudder, np.ones_like(speed)], axis=-1)
         targets = (now - last)[:, :2] / dt * np.stack([length / speed**2, (length / speed) ** 2], axis=-1)
-        linear = (np.abs(terms[:, 0]) < LARGEST_SWAY) & (np.abs(terms[:, 1]) < LARGEST_TURN) & ~begins
+        linear = (
+            (np.abs(terms[:, 0]) < LARGEST_SWAY) & (np.abs(terms[:, 1]) < LARGEST_TURN) & ~begins & at_rest
+        )
         if not linear.any():
             return
         n = int(linear.sum())
@@ -258,20 +275,23 @@ class AdaptiveLQ(Stateful):
         share = prime[1, 2] / self.prior[1, 2]
         if not 1.0 / WIDEST < share < WIDEST:
             return
-        linear = prime * units(self.design["length"], self.design["speed"])
+        si = units(self.design["length"], self.design["speed"])
         try:
-            sway, rudder = np.linalg.solve(linear[:, [0, 2]], -linear[:, 3])
-            about = StraightRunning(self.design["speed"], sway, rudder)
-            ship = sample_steering(
-                linear[:, :2], linear[:, 2:3], self.design["gear_lag"], self.design["dt"], about
-            )
-            row = -lq_gain(ship, self.design["rate_weight_s2"], self.design["integral_time"])
+            sway, rudder = np.linalg.solve((prime * si)[:, [0, 2]], -(prime * si)[:, 3])
+            ships = [self._sampled(one * si) for one in (prime, self.prior)]
+            row = -lq_gain(ships[0], self.design["rate_weight_s2"], self.design["integral_time"])
         except (np.linalg.LinAlgError, ValueError):  # control raises them where no stable loop is found
             return
-        stable = np.abs(np.linalg.eigvals(ship.A + ship.B @ row[None])).max() < 1.0
-        if not (stable and np.isfinite(row).all() and abs(rudder) < LARGEST_RUDDER):
+        poles = [np.abs(np.linalg.eigvals(ship.A + ship.B @ row[None])).max() for ship in ships]
+        if not (max(poles) < 1.0 and np.isfinite(row).all() and abs(rudder) < LARGEST_RUDDER):
             return
         kept[GAINS], kept[NEUTRAL] = row, (rudder, sway)
+
+    def _sampled(self, linear: Floats) -> SampledShip:
+        """The ship of linear coefficients in SI units."""
+        about = StraightRunning(self.design["speed"], 0.0, 0.0)
+        lag, dt = self.design["gear_lag"], self.design["dt"]
+        return sample_steering(linear[:, :2], linear[:, 2:3], lag, dt, about)
 
 
 def units(length: float, speed: float) -> Floats:

@@ -90,3 +90,11 @@ def test_a_ship_without_sway_is_refused():
     ship = nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering)
     with pytest.raises(InputError, match="has no sway, expected one with surge, sway and yaw"):
         AdaptiveLQ.from_model(ship)
+
+
+def test_waves_teach_it_little_that_is_wrong():
+    """First-order yawing is not steering: without a guard the gains run away (cost 700 in place of 27)."""
+    task, seeds = CourseKeepingTask(sea="moderate", noise=1.0), np.arange(16)
+    ours, theirs = (fly(kind.from_model(MARINER), MARINER, task, seeds) for kind in (AdaptiveLQ, LQ))
+    assert not ours.terminated.any()
+    assert ours.cost.mean() < 1.2 * theirs.cost.mean()

@@ -71,7 +71,7 @@ SCALES = list(DESIGNS["pid"].observation_scales)
     ("changes", "message"),
     [
         ({"format": 2}, "format 2 found, this version of shipgym reads format 1"),
-        ({"kind": "pdi"}, "kind: 'pdi' found, expected one of 'pid', 'lq', .*Did you mean 'pid'"),
+        ({"kind": "pdi"}, "kind: 'pdi' found, expected one of 'pid', .*Did you mean 'pid'"),
         ({"gains": None}, "field 'gains' is missing"),
         ({"gain": {}}, "unknown key 'gain'. Did you mean 'gains'"),
         ({"gains__proportional": None}, "gains: 'proportional' is missing"),
