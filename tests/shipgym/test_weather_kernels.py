@@ -311,7 +311,7 @@ def test_the_environment_shows_the_measured_and_judges_the_slow_heading(mariner)
     scale = mariner.particulars["speed"] / mariner.particulars["length"]
     np.testing.assert_allclose(observations[:, 2] * scale, state["r"] + state["r_wave"], atol=1e-7)
     cost = (state["set_point"] - state["psi"] + np.pi) % (2 * np.pi) - np.pi
-    np.testing.assert_allclose(-rough.reward_parts[:, 0], (cost / np.radians(30.0)) ** 2, rtol=1e-9)
+    np.testing.assert_allclose(-rough.info("reward_heading"), (cost / np.radians(30.0)) ** 2, rtol=1e-9)
 
 
 def test_the_sea_changes_no_task(mariner):
