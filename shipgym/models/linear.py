@@ -186,7 +186,8 @@ def _scales(model: ShipModel) -> Floats:
 def _rates(model: ShipModel, states: Floats) -> Floats:
     """Prime time derivatives of states (..., n_state), the rudder held and the shaft at service speed."""
     commands = np.broadcast_to(model.service_command, (*states.shape[:-1], len(model.command_names))).copy()
-    commands[..., 0] = states[..., model.state_names.index("delta")]
+    rudder = states[..., model.state_names.index("delta")]
+    commands[..., 0] = np.clip(rudder, -0.5 * np.pi, 0.5 * np.pi)  # a search may go beyond any rudder
     time = model.particulars["length"] / model.particulars["speed"]
     return np.asarray(model.derivatives(states, commands) * time / _scales(model))
 
