@@ -7,7 +7,7 @@ from typing import Any
 from .compiling import kernel
 from .layout import RUDDER_LIMIT
 from .motion import clip
-from .trajectories import advance, felt, follow, lost, stored
+from .passage import advance, felt, follow, lost, stored
 
 
 @kernel(
@@ -30,7 +30,7 @@ def steer_rate(
     """From the state in row 0 with a proportional-integral helmsman who holds the yaw rate at `rate`.
 
     `commands` receives the rudder angle held from each sample on; `memory` holds the integral part of the
-    helmsman's rudder and is changed; for `sky` and `words` see `trajectories`. Returns the last row at which
+    helmsman's rudder and is changed; for `sky` and `words` see `passage`. Returns the last row at which
     the ship had not yet run away.
     """
     state = stored(out, 0)

@@ -101,7 +101,7 @@ def zigzag(
     states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
     commands = np.empty(n_steps + 1)
     first = -angle if port_first else angle
-    reached, turns = passage.kernel("trajectories").zigzag(
+    reached, turns = passage.kernel("zigzag").zigzag(
         states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside",
         passage.sky, passage.words, passage.ship,
     )  # fmt: skip

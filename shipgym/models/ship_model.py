@@ -178,7 +178,7 @@ class ShipModel:
         flat = np.array(np.broadcast_to(states, (*shape, states.shape[-1]))).reshape(-1, states.shape[-1])
         flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1])).reshape(len(flat), -1)
         out = np.empty((len(flat), layout.N_STATE))
-        self.kernel("trajectories").derivatives(
+        self.kernel("derivatives").derivatives(
             self.kernel_states(flat),
             two_commands(flat_commands),
             np.array(np.broadcast_to(depth, shape)).reshape(-1),

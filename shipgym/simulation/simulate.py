@@ -79,7 +79,7 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     states[0] = model.kernel_states(_settled(model, np.array([first]), n[:1]))[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
-    reached = model.kernel("trajectories").open_loop(
+    reached = model.kernel("open_loop").open_loop(
         states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
     )
     if reached < len(t) - 1:
