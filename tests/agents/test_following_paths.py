@@ -36,7 +36,7 @@ def test_paths_in_calm_water_are_followed_to_their_end(name, design):
     assert within > 0.98
 
 
-@pytest.mark.parametrize("name", ["mariner"])
+@pytest.mark.parametrize("name", ["mariner", "kvlcc2"])
 def test_most_paths_in_a_rough_sea_too(name):
     model = load_model(name)
     success, grounded, within = sailed(PID.from_model(model), model, sea="rough")

@@ -194,7 +194,7 @@ def test_song_s_regressors_predict_the_rolling_container_ship() -> None:
     assert any("heel" in problem for problem in shipgym.check_ship_model(capsizing).problems)
 
 
-@pytest.mark.parametrize("name", ["nomoto2", "cubic"])
+@pytest.mark.parametrize("name", ["nomoto", "nomoto2", "cubic"])
 def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
     ship = ship_of(name, own(name))
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)
