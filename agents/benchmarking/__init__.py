@@ -1,0 +1,1 @@
+"""The benchmark: suites of tasks, flights of all contestants, their metrics, statistics and result files."""

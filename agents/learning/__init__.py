@@ -1,0 +1,1 @@
+"""Learned autopilots: settings, training, tuning, and their policies as files."""
