@@ -85,20 +85,12 @@ def save(agent: LearnedPolicy | Shielded, path: Path) -> None:
         raise InputError(f"{path}: training and env_options: {error}; expected what JSON can hold") from None
     weights = None
     if tensors:
-        written = _safetensors().save(tensors)
+        from safetensors.numpy import save as as_bytes
+
+        written: bytes = as_bytes(tensors)
         write_bytes(written, _weights_path(path))
         weights = {"sha256": hashlib.sha256(written).hexdigest()}
     write_json({**content, "weights": weights}, path)
-
-
-def _safetensors() -> Any:
-    try:
-        import safetensors.numpy
-    except ImportError:
-        raise InputError(
-            "safetensors is not installed, the weights of learned policies need it: pip install safetensors"
-        ) from None
-    return safetensors.numpy
 
 
 def _weights_path(path: Path) -> Path:
@@ -191,9 +183,10 @@ def _read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
             f"{path}: SHA-256 {found[:12]}... found in {len(content)} bytes, expected {sha256[:12]}..., "
             f"which is the field weights.sha256 of {json_path}: cut short, or of another policy; {REMEDY}"
         )
-    reader = _safetensors()
+    from safetensors.numpy import load
+
     try:
-        tensors: Tensors = reader.load(content)
+        tensors: Tensors = load(content)
     except Exception as error:  # safetensors' own errors and those of the types it does not know
         raise InputError(f"{path}: not a safetensors file ({error}); {REMEDY}") from None
     return tensors
