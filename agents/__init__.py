@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from agents.adaptive_lq import AdaptiveLQ
+    from agents.benchmarking.results import BenchmarkResult, load_results
+    from agents.benchmarking.run import benchmark
     from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
@@ -33,15 +35,18 @@ _HOME = {
     "MarginSpread": "agents.robustness",
     "PID": "agents.pid",
     "AdaptiveLQ": "agents.adaptive_lq",
+    "BenchmarkResult": "agents.benchmarking.results",
     "Controller": "agents.controller",
     "FilteredPID": "agents.filtered_pid",
     "Flights": "agents.flight",
     "Policy": "agents.controller",
     "ScheduledLQ": "agents.scheduled_lq",
     "StepResponses": "agents.flight",
+    "benchmark": "agents.benchmarking.run",
     "check_controller": "agents.checker",
     "fly": "agents.flight",
     "load_agent": "agents.controller_file",
+    "load_results": "agents.benchmarking.results",
     "margin_spread": "agents.robustness",
     "step_response": "agents.flight",
 }
@@ -53,6 +58,7 @@ __all__ = [
     "PID",
     "AdaptiveLQ",
     "AdaptiveLineOfSight",
+    "BenchmarkResult",
     "Controller",
     "FilteredPID",
     "Flights",
@@ -62,9 +68,11 @@ __all__ = [
     "Policy",
     "ScheduledLQ",
     "StepResponses",
+    "benchmark",
     "check_controller",
     "fly",
     "load_agent",
+    "load_results",
     "margin_spread",
     "step_response",
 ]

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
     HoldOut,
@@ -67,6 +68,7 @@ def shipgym_command(
 app.command("identify")(identify_command)
 app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")

@@ -207,13 +207,15 @@ def _factory(text: str) -> Any:
     try:
         found = getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
-        raise InputError(f"controllers: '{text}' cannot be imported ({error}); expected module:function") from None
+        raise InputError(
+            f"controllers: '{text}' cannot be imported ({error}); expected module:function"
+        ) from None
     _check_object(found, text)
     return found
 
 
 def _matches(pattern: str) -> list[Path]:
-    return [Path(path) for path in sorted(glob.glob(pattern)) if Path(path).is_file()]
+    return [Path(path) for path in sorted(glob.glob(pattern)) if Path(path).is_file()]  # noqa: PTH207 - whole paths
 
 
 def _files(text: str, task: BenchmarkTask) -> list[Path]:
@@ -286,7 +288,9 @@ def designed(kind: str, task: BenchmarkTask, **options: Any) -> Policy:
         if not isinstance(task.task, PathFollowingTask):
             return designed("lq", task)
         return LAWS[kind].from_model(task.ship, task=task.task, **options)
-    return _designed(kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True))
+    return _designed(
+        kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True)
+    )
 
 
 @lru_cache(maxsize=256)

@@ -130,7 +130,11 @@ def commands(actions: Any, engine: Engine, sailing: Flags) -> tuple[NDArray[np.f
         return none, sailing.copy(), f"actions of shape {found.shape} found, expected {expected}"
     bad = sailing & ~np.isfinite(found).all(axis=1)
     found[bad | ~sailing] = 0.0
-    return found, bad, f"no finite number for {int(bad.sum())} of {int(sailing.sum())} ships" if bad.any() else ""
+    return (
+        found,
+        bad,
+        f"no finite number for {int(bad.sum())} of {int(sailing.sum())} ships" if bad.any() else "",
+    )
 
 
 def _shielded(controller: Any, state: Any, n: int) -> Floats:

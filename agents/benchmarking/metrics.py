@@ -11,6 +11,7 @@ Propellers and Propulsion, chapter 6 (propeller law: power goes with the cube of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -187,7 +188,7 @@ def course_changes(recording: Recording) -> dict[str, Floats]:
         error = wrapped(recording.set_point[: last + 1, episode] - recording.heading[: last + 1, episode])
         begins = [0, *(np.flatnonzero(np.diff(course[:-1]) != 0.0) + 1).tolist(), last]
         found = []
-        for begin, end in zip(begins[:-1], begins[1:], strict=True):
+        for begin, end in pairwise(begins):
             if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
                 changed = course[end] != course[begin]  # the error at `end` is that against the next course
                 stretch = error[begin : end + (not changed)]
@@ -232,7 +233,9 @@ def fuel_per_distance(recording: Recording) -> Floats:
     shaft = recording.series["n"] / recording.service_shaft if recording.service_shaft > 0.0 else 1.0
     spent = (np.where(recording.sailing, shaft, 0.0) ** 3).sum(axis=0) * recording.dt
     if isinstance(recording.task, PathFollowingTask):
-        way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(axis=0, initial=0.0)
+        way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(
+            axis=0, initial=0.0
+        )
     else:
         error = recording.series["heading_error"]
         along = recording.series["u"] * np.cos(error) + recording.series["v"] * np.sin(error)

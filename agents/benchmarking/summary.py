@@ -83,7 +83,10 @@ def summary_of(
     }
     n_episodes = next((cost.shape[1] for cost in costs.values()), 1)
     draws = Draws(len(tasks), n_episodes)
-    by_task = {task.name: _of_task(task.name, k, names, flown, costs, draws, reference) for k, task in enumerate(tasks)}
+    by_task = {
+        task.name: _of_task(task.name, k, names, flown, costs, draws, reference)
+        for k, task in enumerate(tasks)
+    }
     return {
         "tasks": by_task,
         "reference": {task: {"pid": pid, "oracle": oracle} for task, (pid, oracle) in reference.items()},
@@ -121,7 +124,9 @@ def _of_task(
             "failed": int(sum(np.nansum(run["episodes"].get("failed", 0.0)) for run in runs)),
             "failure": next((run["failure"] for run in runs if run["failure"]), ""),
             "policy_sha256": [run["policy_sha256"] for run in runs],
-            "microseconds_per_action": finite(1e6 * float(np.mean([run["seconds_per_action"] for run in runs]))),
+            "microseconds_per_action": finite(
+                1e6 * float(np.mean([run["seconds_per_action"] for run in runs]))
+            ),
             "metrics": _figures([run["episodes"] for run in runs]),
         }
     return found
@@ -160,7 +165,9 @@ def _ranking(
     for who, name in enumerate(names):
         flown = [k for k in range(len(tasks)) if (name, k) in costs]
         scored = [
-            k for k in flown if tasks[k].name in reference and np.isfinite(score(0.0, *reference[tasks[k].name]))
+            k
+            for k in flown
+            if tasks[k].name in reference and np.isfinite(score(0.0, *reference[tasks[k].name]))
         ]
         aggregate = dict(NOTHING)
         if scored:
