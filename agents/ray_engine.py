@@ -68,10 +68,11 @@ def on_ray(
 def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
     """Ray, connected; what was started here is ended here."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it would ask the network
-    os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "8")  # seconds to wait for a cluster, read on import
     os.environ.setdefault(
         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0"
     )  # as ray will have it, without its warning
+    if address is not None:
+        os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "8")  # seconds for a cluster; read on import
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -84,7 +85,7 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
             yield ray
             return
         if address is None:
-            where: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False}
+            where: dict[str, Any] = {"address": "local", "num_cpus": workers, "include_dashboard": False}
         else:
             check_answers(address)
             where = {"address": address}
@@ -92,6 +93,8 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
             with environment(PYTHONPATH=os.pathsep.join(filter(None, sys.path)), **ONE_THREAD):
                 ray.init(**where, log_to_driver=False, configure_logging=False)
         except Exception as error:
+            if address is None:
+                raise InputError(f"engine: 'ray' found, but it does not start here: {error}") from None
             raise InputError(
                 f"address: '{address}' found, but ray refuses: {error}; a cluster with a token (`ray "
                 f"get-auth-token`) wants RAY_AUTH_MODE=token and the same token here"
