@@ -20,14 +20,17 @@ if TYPE_CHECKING:
     from agents.lqg import LQG
     from agents.mpc import MPC
     from agents.pid import PID
+    from agents.policy import LearnedPolicy
     from agents.robustness import MarginSpread, margin_spread
     from agents.scheduled_lq import ScheduledLQ
+    from agents.shield import Shielded, interventions
 
 _HOME = {
     "AdaptiveLineOfSight": "agents.los_autopilot",
     "IntegralLineOfSight": "agents.los_autopilot",
     "LQ": "agents.lq",
     "LQG": "agents.lqg",
+    "LearnedPolicy": "agents.policy",
     "LineOfSight": "agents.los_autopilot",
     "MPC": "agents.mpc",
     "MarginSpread": "agents.robustness",
@@ -38,9 +41,11 @@ _HOME = {
     "Flights": "agents.flight",
     "Policy": "agents.controller",
     "ScheduledLQ": "agents.scheduled_lq",
+    "Shielded": "agents.shield",
     "StepResponses": "agents.flight",
     "check_controller": "agents.checker",
     "fly": "agents.flight",
+    "interventions": "agents.shield",
     "load_agent": "agents.controller_file",
     "margin_spread": "agents.robustness",
     "step_response": "agents.flight",
@@ -57,13 +62,16 @@ __all__ = [
     "FilteredPID",
     "Flights",
     "IntegralLineOfSight",
+    "LearnedPolicy",
     "LineOfSight",
     "MarginSpread",
     "Policy",
     "ScheduledLQ",
+    "Shielded",
     "StepResponses",
     "check_controller",
     "fly",
+    "interventions",
     "load_agent",
     "margin_spread",
     "step_response",
