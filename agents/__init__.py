@@ -22,14 +22,17 @@ if TYPE_CHECKING:
     from agents.lqg import LQG
     from agents.mpc import MPC
     from agents.pid import PID
+    from agents.policy import LearnedPolicy
     from agents.robustness import MarginSpread, margin_spread
     from agents.scheduled_lq import ScheduledLQ
+    from agents.shield import Shielded, interventions
 
 _HOME = {
     "AdaptiveLineOfSight": "agents.los_autopilot",
     "IntegralLineOfSight": "agents.los_autopilot",
     "LQ": "agents.lq",
     "LQG": "agents.lqg",
+    "LearnedPolicy": "agents.policy",
     "LineOfSight": "agents.los_autopilot",
     "MPC": "agents.mpc",
     "MarginSpread": "agents.robustness",
@@ -41,10 +44,12 @@ _HOME = {
     "Flights": "agents.flight",
     "Policy": "agents.controller",
     "ScheduledLQ": "agents.scheduled_lq",
+    "Shielded": "agents.shield",
     "StepResponses": "agents.flight",
     "benchmark": "agents.benchmarking.run",
     "check_controller": "agents.checker",
     "fly": "agents.flight",
+    "interventions": "agents.shield",
     "load_agent": "agents.controller_file",
     "load_results": "agents.benchmarking.results",
     "margin_spread": "agents.robustness",
@@ -63,14 +68,17 @@ __all__ = [
     "FilteredPID",
     "Flights",
     "IntegralLineOfSight",
+    "LearnedPolicy",
     "LineOfSight",
     "MarginSpread",
     "Policy",
     "ScheduledLQ",
+    "Shielded",
     "StepResponses",
     "benchmark",
     "check_controller",
     "fly",
+    "interventions",
     "load_agent",
     "load_results",
     "margin_spread",

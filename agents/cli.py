@@ -34,6 +34,7 @@ from agents.command import (
     fail,
 )
 from agents.identification_commands import advise_command, identify_command, reduce_command
+from agents.policy_commands import export_command
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult
@@ -68,6 +69,7 @@ def shipgym_command(
 app.command("identify")(identify_command)
 app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
+app.command("export")(export_command)
 app.command("benchmark")(benchmark_command)
 
 

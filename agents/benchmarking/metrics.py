@@ -41,14 +41,15 @@ class Recording:
     dt : float
         Control interval, s.
     service_speed, service_shaft : float
-        m/s; 1/s, 0 where the ship knows none.
+        m/s; 1/s, 0 of a ship whose shaft has no motion of its own.
     sailing : bool array of shape (n_steps, n)
         Whether the interval counts.
     parts : array of shape (n_steps, n, n_parts)
         Cost of the interval, in the order of `task.reward_parts`.
     series : dict of str to array of shape (n_steps, n)
         At the end of each interval: `heading_error` (rad, before the set-point changes), `extrapolating`,
-        `u`, `v` (m/s), `n` (1/s), `shielded`, and those of `task.info_names` that path following adds.
+        `shielded`; in course keeping `u`, `v` (m/s); `n` (1/s) of a ship with a shaft; on a path those of
+        `task.info_names` that path following adds.
     rudder, set_point, heading : array of shape (n_steps + 1, n)
         From the beginning on, rad.
     lost : bool array of shape (n,)
@@ -152,15 +153,17 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
     -------
     array of shape (n,)
     """
-    low, high = angle[0].copy(), angle[0].copy()  # since the last turn
-    way, number = np.zeros_like(low), np.zeros_like(low)  # -1, 0 or 1
+    low, high = angle[0], angle[0]  # since the last turn
+    way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
+    number: Floats = np.zeros(angle.shape[1])
     for now, going in zip(angle[1:], counts, strict=True):
         up, down = going & (now > low + dead_band), going & (now < high - dead_band)
         up, down = up & (way <= 0.0), down & (way >= 0.0)
-        number += (up | down) & (way != 0.0)
+        number = number + ((up | down) & (way != 0.0))
         way = np.where(up, 1.0, np.where(down, -1.0, way))
-        low = np.where(going & ~down, np.where(up, now, np.minimum(low, now)), np.where(down, now, low))
-        high = np.where(going & ~up, np.where(down, now, np.maximum(high, now)), np.where(up, now, high))
+        turned, goes_on = up | down, np.where(going, now, low)
+        low = np.where(turned, now, np.minimum(low, goes_on))
+        high = np.where(turned, now, np.maximum(high, np.where(going, now, high)))
     return number
 
 

@@ -179,7 +179,8 @@ def score(cost: ArrayLike, pid: ArrayLike, oracle: ArrayLike) -> Floats:
     zero = np.asarray(pid, dtype=np.float64)
     way, made = zero - np.asarray(oracle, dtype=np.float64), zero - np.asarray(cost, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(way > 0.0, made / way, np.nan)
+        share: Floats = np.where(way > 0.0, made / way, np.nan)
+    return share
 
 
 def aggregate_score(
@@ -254,8 +255,8 @@ def improvement(
 
 def _wins(one: Floats, other: Floats) -> Floats:
     """Whether run i of one costs less than run k of the other in each episode, shape (i, k, n_episodes)."""
-    less, same = one[:, None] < other[None], one[:, None] == other[None]
-    return less + 0.5 * same
+    wins: Floats = (one[:, None] < other[None]) + 0.5 * (one[:, None] == other[None])
+    return wins
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
