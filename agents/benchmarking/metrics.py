@@ -79,7 +79,7 @@ class Recording:
 
     def mean(self, values: Floats) -> Floats:
         """Mean over the intervals of each episode, shape (n,); NaN for one without any."""
-        return ratio(np.where(self.sailing, values, 0.0).sum(axis=0), self.steps)
+        return ratio(total(np.where(self.sailing, values, 0.0)), self.steps)
 
 
 def worst_step_cost(task: Task) -> float:
@@ -112,7 +112,7 @@ def metrics(recording: Recording) -> dict[str, Floats]:
         duration_s : time sailed.
     """
     task, steps = recording.task, recording.steps
-    sums = recording.parts.sum(axis=0)
+    sums = total(recording.parts)
     found = {f"cost_{part.removeprefix('reward_')}": sums[:, k] for k, part in enumerate(task.reward_parts)}
     left = task.episode_steps - steps
     found["cost_end"] = found["cost_end"] + np.where(recording.failed, left * worst_step_cost(task), 0.0)
@@ -120,10 +120,10 @@ def metrics(recording: Recording) -> dict[str, Floats]:
     turned = np.abs(np.diff(recording.rudder, axis=0)) * recording.sailing
     shielded = recording.series["shielded"] * recording.sailing
     return {
-        "cost": np.sum(list(found.values()), axis=0),
+        "cost": sum(found.values(), start=np.zeros_like(steps)),
         **found,
         "heading_rmse_deg": np.degrees(np.sqrt(recording.mean(recording.series["heading_error"] ** 2))),
-        "rudder_travel_deg_min": ratio(np.degrees(turned.sum(axis=0)), minutes),
+        "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
         "rudder_reversals_min": ratio(reversals(recording.rudder, recording.sailing), minutes),
         **course_changes(recording),
         **_on_a_path(recording),
@@ -234,7 +234,7 @@ def fuel_per_distance(recording: Recording) -> Floats:
         NaN where no way was made good.
     """
     shaft = recording.series["n"] / recording.service_shaft if recording.service_shaft > 0.0 else 1.0
-    spent = (np.where(recording.sailing, shaft, 0.0) ** 3).sum(axis=0) * recording.dt
+    spent = total(np.where(recording.sailing, shaft, 0.0) ** 3) * recording.dt
     if isinstance(recording.task, PathFollowingTask):
         way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(
             axis=0, initial=0.0
@@ -242,7 +242,7 @@ def fuel_per_distance(recording: Recording) -> Floats:
     else:
         error = recording.series["heading_error"]
         along = recording.series["u"] * np.cos(error) + recording.series["v"] * np.sin(error)
-        way = np.where(recording.sailing, along, 0.0).sum(axis=0) * recording.dt
+        way = total(np.where(recording.sailing, along, 0.0)) * recording.dt
     return ratio(spent * recording.service_speed, np.maximum(way, 0.0))
 
 
@@ -261,6 +261,12 @@ def _on_a_path(recording: Recording) -> dict[str, Floats]:
         "grounded": ((series["grounded"] > 0.0) & sailing).any(axis=0).astype(np.float64),
         "success": ((series["success"] > 0.0) & sailing).any(axis=0).astype(np.float64),
     }
+
+
+def total(values: Floats) -> Floats:
+    """Sum over the first axis, always in its order: it does not depend on how many episodes there are."""
+    sums: Floats = np.cumsum(values, axis=0)
+    return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
 
 def ratio(above: Floats, below: Floats) -> Floats:
