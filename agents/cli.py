@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
     HoldOut,
@@ -71,6 +72,7 @@ app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")
