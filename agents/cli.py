@@ -14,6 +14,8 @@ import typer
 from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
+    Address,
+    EngineName,
     HoldOut,
     Json,
     Method,
@@ -30,6 +32,7 @@ from agents.command import (
     Structure,
     Uncertainty,
     Weight,
+    Workers,
     answered,
     fail,
 )
@@ -152,6 +155,9 @@ def autopilot_command(
     rank: Rank = None,
     weight: Weight = None,
     options: Set = None,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
     as_json: Json = False,
 ) -> None:
     """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
@@ -161,6 +167,7 @@ def autopilot_command(
     """
     from agents.autopilot import build_autopilot
     from agents.identifying import given_options
+    from agents.monte_carlo import Engine
     from agents.terminal import progress_bars
 
     given = {
@@ -171,7 +178,10 @@ def autopilot_command(
     }  # fmt: skip
     chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
-        result = build_autopilot(ship, out, draws=draws, seed=seed, options=chosen, progress=progress)
+        result = build_autopilot(
+            ship, out, draws=draws, seed=seed, options=chosen, progress=progress,
+            where=Engine(engine, workers, address),
+        )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
 
 
