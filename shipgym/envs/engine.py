@@ -191,6 +191,48 @@ class Engine:
         """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
         return self.outcome(rows.STEPS)
 
+    def copy_lanes(self, source: Engine, lanes: ArrayLike) -> None:
+        """Make each lane the copy of one of another engine: same ship, same episode, same future.
+
+        Gusts, noise and what is asked are functions of the episode's seed and of the step, so copies that are
+        steered alike go on bit for bit like the original.
+
+        Parameters
+        ----------
+        source : Engine
+            Of the same task, ships and variety; may be this one.
+        lanes : array-like of int, shape (num_envs,)
+            Which lane of `source` each lane becomes.
+
+        Raises
+        ------
+        InputError
+            If the engines differ in more than the number of lanes, or there is no such lane.
+        """
+        which = np.asarray(lanes)
+        if which.shape != (self.num_envs,):
+            raise InputError(f"lanes: shape {which.shape} found, expected ({self.num_envs},)")
+        if which.min() < 0 or which.max() >= source.num_envs:
+            raise InputError(
+                f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
+            )
+        same_rows = self._states.shape[1] == source._states.shape[1]
+        if not same_rows or not np.array_equal(self._settings, source._settings, equal_nan=True):
+            raise InputError("source: an engine of another task found, expected one of the same")
+        ships = (self._ships, source._ships)
+        if min(len(tiles) for tiles in ships) == 1:
+            ...
+        there, here = divmod(which, layout.LANES), divmod(np.arange(self.num_envs), layout.LANES)
+        for own, other in ((self._states, source._states), (self._keys, source._keys)):
+            _lanes_of(own)[here[0], :, here[1]] = _lanes_of(other)[there[0], :, there[1]]
+        self.shown.observations[:] = source.shown.observations[which]
+        self.shown.outcomes[:] = source.shown.outcomes[:, which]
+
+    def keep_course(self) -> None:
+        """x."""
+        from shipgym.kernels.course_keeping import NEXT_CHANGE
+        self._states[:, NEXT_CHANGE:NEXT_CHANGE+layout.LANES] = np.inf
+
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step.
 
@@ -312,6 +354,11 @@ class Engine:
             return None
         tile, lane = divmod(lane, layout.LANES)
         return self._states[tile, rows.END :].reshape(count // 2, 2, layout.LANES)[:, :, lane].copy()
+
+
+def _lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
+    return tiles.reshape(len(tiles), -1, layout.LANES)
 
 
 class _Team:
