@@ -137,12 +137,13 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
+    if "kind" in content:
+        kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
+        if kind in POLICIES:
+            raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(HOMES)}")
     check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
-    kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
-    if kind in POLICIES:
-        raise InputError(f"{where}: kind: '{kind}' found, expected a classical controller: {quoted(HOMES)}")
-    home, name = HOMES[kind]
+    home, name = HOMES[content["kind"]]
     design: type[Controller] = getattr(import_module(home), name)
     has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
     expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
