@@ -14,14 +14,15 @@ parallel); Bertsekas 2019, Reinforcement Learning and Optimal Control, 2.4 (roll
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controller import Policy
+from agents.controller import Controller, Policy
 from agents.lq import LQ
+from agents.pid import PID
 from shipgym.checks import check_number, check_whole
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
@@ -29,13 +30,12 @@ from shipgym.envs.task import Task
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.guidance import wrapped
-from shipgym.kernels import layout
+from shipgym.kernels import course_keeping, layout
 from shipgym.kernels import voyage_rows as rows
 from shipgym.models import ShipModel
 
 Floats = NDArray[np.float64]
 
-N_STEERING = rows.N_STEERING
 LEAST_SCALE = 0.1  # candidates differ by this part of the spread to all of it: coarse and fine ones at once
 LEARNING = 0.8  # share of the elites in the new mean and spread
 LEAST_SPREAD = 0.002  # parts of the rudder limit
@@ -71,10 +71,10 @@ class OracleSettings:
 
     candidates: int = 64
     elites: int = 8
-    iterations: int = 4
-    horizon_steps: int = 120
-    plan_steps: int = 80
-    knot_steps: int = 5
+    iterations: int = 3
+    horizon_steps: int = 160
+    plan_steps: int = 120
+    knot_steps: int = 10
     replan_steps: int = 20
     passes: int = 2
     spread: float = 0.3
@@ -148,9 +148,11 @@ def fly_oracle(
         raise InputError(f"action: '{task.action}' found, expected 'rudder': the oracle steers by it alone")
     asked = settings or OracleSettings()
     numbers = np.atleast_1d(np.asarray(seeds))
-    holder = LQ.from_model(model, dt=task.interval(model))
+    holder = _holder(start, model, task)
     flights = [
-        _Search(model, task, numbers[first : first + asked.group], holder, asked, variety).fly(start or holder)
+        _Search(model, task, numbers[first : first + asked.group], holder, asked, variety).fly(
+            start or holder
+        )
         for first in range(0, len(numbers), asked.group)
     ]
     joined = (np.concatenate([getattr(one, item.name) for one in flights]) for item in fields(OracleFlight))
@@ -161,7 +163,7 @@ class _Search:
     """A group of episodes and the copies on which their candidates are tried."""
 
     def __init__(
-        self, model: ShipModel, task: Task, seeds: NDArray[Any], holder: LQ, settings: OracleSettings,
+        self, model: ShipModel, task: Task, seeds: NDArray[Any], holder: Controller, settings: OracleSettings,
         variety: Variety | None,
     ) -> None:  # fmt: skip
         self.task, self.seeds, self.holder, self.settings = task, seeds, holder, settings
@@ -170,6 +172,7 @@ class _Search:
         self.model, self.variety = model, variety
         self._sizes: dict[int, Engine] = {}
         self._changes_course = isinstance(task, CourseKeepingTask)
+        self._ordered = np.zeros((self.n, task.episode_steps), dtype=np.bool_)  # a new course at this step
 
     def fly(self, start: Policy) -> OracleFlight:
         """Start from an autopilot's sequence and improve it in passes."""
@@ -177,7 +180,7 @@ class _Search:
         best = OracleFlight(costs.copy(), costs, actions)
         self._keep_better(best, added, *self._sailed(np.zeros_like(added)))
         for number in range(self.settings.passes):
-            self._keep_better(best, added, *self._pass(added.copy(), number))
+            self._keep_better(best, added, *self._pass(added, number))
         return best
 
     def _keep_better(
@@ -187,6 +190,22 @@ class _Search:
         better = costs < best.costs
         added[better] = plan[better]
         best.costs[better], best.actions[better] = costs[better], actions[better]
+
+    def _flown_by(self, policy: Policy) -> tuple[Floats, Floats, NDArray[np.float32]]:
+        """Cost of an autopilot, what it adds to the holder's rudder, and its rudder."""
+        costs, added, actions = self._nothing_yet()
+        seen, state, starts = self.ships.reset(self.seeds), None, np.ones(self.n, dtype=np.bool_)
+        course = np.full(self.n, np.nan)
+        for step in range(self.task.episode_steps):
+            self._ordered[:, step] = course != self.ships.outcome(rows.COURSE)
+            course = self.ships.outcome(rows.COURSE)
+            action, state = policy.predict(seen, state, starts, True)
+            actions[:, step] = action[:, 0]
+            added[:, step] = action[:, 0] - self._held(self.ships)
+            seen, rewards, _, _ = self.ships.step(action)
+            costs -= rewards
+            starts = np.zeros(self.n, dtype=np.bool_)
+        return costs, added, actions
 
     def _sailed(self, added: Floats) -> tuple[Floats, Floats, NDArray[np.float32]]:
         """Cost, plan and rudder of a plan that is kept to."""
@@ -198,44 +217,36 @@ class _Search:
             costs -= self.ships.shown.outcomes[0]
         return costs, added, actions
 
-    def _flown_by(self, policy: Policy) -> tuple[Floats, Floats, NDArray[np.float32]]:
-        """Cost of an autopilot, what it adds to the holder's rudder, and its rudder."""
-        costs, added, actions = self._nothing_yet()
-        seen, state, starts = self.ships.reset(self.seeds), None, np.ones(self.n, dtype=np.bool_)
-        for step in range(self.task.episode_steps):
-            action, state = policy.predict(seen, state, starts, True)
-            actions[:, step] = action[:, 0]
-            added[:, step] = action[:, 0] - self._held(self.ships)
-            seen, rewards, terminated, truncated = self.ships.step(action)
-            costs -= rewards
-            starts = np.zeros(self.n, dtype=np.bool_)
-        return costs, added, actions
-
     def _nothing_yet(self) -> tuple[Floats, Floats, NDArray[np.float32]]:
         shape = (self.n, self.task.episode_steps)
         return np.zeros(self.n), np.zeros(shape), np.zeros(shape, dtype=np.float32)
 
-    def _pass(self, added: Floats, number: int) -> tuple[Floats, Floats, NDArray[np.float32]]:
-        """Go through the episodes once, planning anew as they go on; the plan is changed in place."""
-        costs, _, actions = self._nothing_yet()
+    def _pass(self, last: Floats, number: int) -> tuple[Floats, Floats, NDArray[np.float32]]:
+        """Go through the episodes once, planning anew as they go on; begins with the `last` plan."""
+        costs, added, actions = self._nothing_yet()
         self.ships.reset(self.seeds)
-        wait = self.settings.replan_steps
-        course, next_plan = self.ships.outcome(rows.COURSE), np.zeros(self.n, dtype=np.int64)
+        next_plan = np.zeros(self.n, dtype=np.int64)
         for step in range(self.task.episode_steps):
-            if self._changes_course:
-                ordered = course != self.ships.outcome(rows.COURSE)
-                course[ordered] = self.ships.outcome(rows.COURSE)[ordered]
-                next_plan[ordered] = step
-                if number == 0:
-                    added[ordered, step:] = 0.0
+            for lane in np.flatnonzero(self._ordered[:, step]) if self._changes_course or step == 0 else ():
+                added[lane, step:] = 0.0
+                end = self._next_order(lane, step)
+                added[lane, step:end] = last[lane, step:end]
+                next_plan[lane] = step
             due = np.flatnonzero((next_plan <= step) & (self.ships.outcome(rows.ENDED) == 0.0))
             if len(due):
                 self._plan(added, due, step, number)
-                next_plan[due] = step + wait
+                next_plan[due] = step + self.settings.replan_steps
             self._steer(self.ships, added[:, step])
             actions[:, step] = self.ships.command[0]
             costs -= self.ships.shown.outcomes[0]
         return costs, added, actions
+
+    def _next_order(self, lane: int, step: int) -> int:
+        """Step of the next course change, beyond which there is no plan yet."""
+        if not self._changes_course:
+            return self.task.episode_steps
+        later = np.flatnonzero(self._ordered[lane, step + 1 :])
+        return step + 1 + int(later[0]) if len(later) else self.task.episode_steps
 
     def _plan(self, added: Floats, which: NDArray[np.int64], step: int, number: int) -> None:
         """Improve the plan of some episodes from a step on by the cross-entropy method."""
@@ -273,7 +284,7 @@ class _Search:
         copies = self._copies(len(which))
         copies.copy_lanes(self.ships, np.repeat(which, knots.shape[1]))
         if self._changes_course:
-            copies.keep_course()
+            copies.write(course_keeping.NEXT_CHANGE, np.inf)
         changes = (knots @ shape).reshape(copies.num_envs, -1)
         costs = np.zeros(copies.num_envs)
         last = min(step + self.settings.horizon_steps, self.task.episode_steps)
@@ -299,16 +310,25 @@ class _Search:
 
     def _held(self, engine: Engine) -> Floats:
         """The holder's rudder for the true state, parts of the limit, shape (num_envs,)."""
-        error = wrapped(engine.outcome(rows.COURSE) - engine.outcome(layout.PSI))
-        if True:
-            g, h = self.holder.gains, self.holder
-            order = h.neutral_rudder + g["heading_error"] * error
-            order += g["sway"] * (engine.outcome(layout.V) - h.neutral_sway)
-            order += g["yaw_rate"] * engine.outcome(layout.R)
-            order += g["rudder"] * (engine.outcome(layout.DELTA) - h.neutral_rudder)
-            order += g["heading_error_integral"] * engine.outcome(rows.INTEGRAL)
-        limit = h.observation_scales[h.observation_names.index("rudder")]
+        holder = self.holder
+        deviations = {
+            "heading_error": wrapped(engine.outcome(rows.COURSE) - engine.outcome(layout.PSI)),
+            "yaw_rate": engine.outcome(layout.R),
+            "sway": engine.outcome(layout.V) - holder.neutral_sway,
+            "rudder": engine.outcome(layout.DELTA) - holder.neutral_rudder,
+            "heading_error_integral": engine.outcome(rows.INTEGRAL),
+        }
+        order = np.full(engine.num_envs, holder.neutral_rudder)
+        for gain, (signal, sign) in holder.feedback.items():
+            order += sign * holder.gains[gain] * deviations[signal]
+        limit = holder.observation_scales[holder.observation_names.index("rudder")]
         return np.clip(order / limit, -1.0, 1.0)
+
+
+def _holder(start: Policy | None, model: ShipModel, task: Task) -> Controller:
+    """The start itself, or the autopilot it leads, if it is plain feedback; else LQ."""
+    inner = getattr(start, "autopilot", start)
+    return inner if isinstance(inner, PID | LQ) else LQ.from_model(model, dt=task.interval(model))
 
 
 def _drawn(random: np.random.Generator, candidates: int, n_knots: int) -> Floats:
