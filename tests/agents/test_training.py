@@ -159,6 +159,7 @@ def test_exploration_falls_to_what_is_asked():
 def test_rewards_are_divided_by_their_scale():
     plain, scaled = (make_ships(tiny(reward_scale=scale), None) for scale in (1.0, 50.0))
     for ships in (plain, scaled):
+        ships.seed(0)
         ships.reset()
         ships.step_async(np.ones((8, 1), np.float32))
     np.testing.assert_allclose(scaled.step_wait()[1], plain.step_wait()[1] / 50.0, rtol=1e-6)
