@@ -83,7 +83,7 @@ def test_what_was_flown_is_kept_and_not_flown_again(folder, copy, monkeypatch):
     parts.mkdir()
     for path in (folder / "parts").iterdir():
         (parts / path.name).write_bytes(path.read_bytes())
-    with pytest.raises(InputError, match="holds results already.*--resume"):
+    with pytest.raises(InputError, match=r"holds results already.*--resume"):
         benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
     flown = []
     monkeypatch.setattr(
@@ -137,7 +137,8 @@ def test_training_runs_of_one_contestant(tmp_path):
 
 def test_functions_of_ones_own(tmp_path, monkeypatch):
     (tmp_path / "my_autopilots.py").write_text(
-        "from agents import LQ\n\n\ndef gentle(task):\n    return LQ.from_model(task.ship, integral_lengths=50.0)\n"
+        "from agents import LQ\n\n\n"
+        "def gentle(task):\n    return LQ.from_model(task.ship, integral_lengths=50.0)\n"
     )
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", list(sys.path))
@@ -150,6 +151,40 @@ def test_functions_of_ones_own(tmp_path, monkeypatch):
         by_text.figures("gentle", "mariner-calm"), by_function.figures("gentle", "mariner-calm")
     )
     assert len(by_text.summary["contestants"]["gentle"]["files"]) == 1
+
+
+def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
+    kept = {
+        "tuned": {
+            "mariner-calm": {
+                "lq": {"options": {"integral_lengths": 80.0}, "cost": 24.0},
+                "pid": {"options": {"damping": 0.9}, "cost": 25.0},
+            }
+        },
+        "oracle": {"mariner-calm": [float(k) for k in range(100)]},
+        "reference": {"mariner-calm": {"pid": 30.0, "oracle": 0.5}},
+    }
+    for name, content in kept.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(content))
+    monkeypatch.setattr("agents.benchmarking.tuned.suite_file", lambda suite, what: tmp_path / f"{what}.json")
+    monkeypatch.setattr(
+        "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
+    )
+    result = benchmark("tuned-best,tuned-lq,tuned-mpc,oracle", tasks=TASKS, episodes=2)
+    own = benchmark(
+        {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}, tasks=TASKS, episodes=2
+    )
+    for name in ("tuned-best", "tuned-lq"):
+        np.testing.assert_array_equal(
+            result.figures(name, "mariner-calm"), own.figures("own", "mariner-calm"), err_msg=name
+        )
+    refused = result.summary["contestants"]["tuned-mpc"]["refused"]["mariner-calm"]
+    assert "no tuned settings of 'mpc'" in refused
+    found = result.summary["tasks"]["mariner-calm"]
+    assert found["oracle"]["score"]["value"] == 1.0  # its first two costs are 0 and 1
+    cost = found["tuned-lq"]["cost"]["value"]
+    assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
+    assert result.ranking == ["oracle", "tuned-best", "tuned-lq", "tuned-mpc"]
 
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():
