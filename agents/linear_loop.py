@@ -304,5 +304,5 @@ def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tu
 def _resolved(A: Floats, B: Floats, z: Complexes) -> Complexes:
     """(z I - A)^-1 B at all z, shape (n_z, ...) as B."""
     shifted = z[:, None, None] * np.eye(len(A)) - A
-    found: Complexes = np.linalg.solve(shifted, np.broadcast_to(B.astype(np.complex128), (len(z), *B.shape)))
-    return found
+    found = np.linalg.solve(shifted, np.broadcast_to(B.astype(np.complex128), (len(z), *B.shape)))
+    return found.astype(np.complex128)
