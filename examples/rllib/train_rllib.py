@@ -63,7 +63,7 @@ def main() -> None:
     for iteration in range(1, options.iterations + 1):
         found = algorithm.train()["env_runners"]
         episode = found.get("episode_return_mean")
-        told = "none over yet" if episode is None else f"{episode:.2f}"
+        told = "of no episode" if episode is None or np.isnan(episode) else f"{episode:.2f}"
         print(
             f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f} steps, mean return {told}",
             flush=True,
