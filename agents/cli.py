@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
     Address,
@@ -76,6 +77,7 @@ app.command("reduce")(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
 app.command("tune")(tune_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")
