@@ -198,9 +198,7 @@ class OffPolicySettings(Settings):
     WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {
         "buffer_size": 1, "learning_starts": 0, "train_freq": 1, "gradient_steps": 1,
     }  # fmt: skip
-    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {
-        "tau": {"above": 0.0, "at_most": 1.0}
-    }
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {"tau": {"above": 0.0, "at_most": 1.0}}
 
     def _check_rollout(self) -> None:
         if self.buffer_size < self.ships:
