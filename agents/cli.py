@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
     HoldOut,
@@ -33,6 +34,7 @@ from agents.command import (
     fail,
 )
 from agents.identification_commands import advise_command, identify_command, reduce_command
+from agents.policy_commands import export_command
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult
@@ -67,6 +69,8 @@ def shipgym_command(
 app.command("identify")(identify_command)
 app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
+app.command("export")(export_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")

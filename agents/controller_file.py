@@ -22,7 +22,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,6 +33,10 @@ from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel
 
+if TYPE_CHECKING:
+    from agents.policy import LearnedPolicy
+    from agents.shield import Shielded
+
 FORMAT = 1
 REMEDY = "design the controller again or take another copy"
 FIELDS = (
@@ -40,6 +44,7 @@ FIELDS = (
     "model", "margins", "design",
 )  # fmt: skip
 MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
+POLICIES = ("learned", "shielded")  # whose files are described in `agents.policy_file`
 HOMES = {
     "pid": ("agents.pid", "PID"),
     "pid-filtered": ("agents.filtered_pid", "FilteredPID"),
@@ -87,8 +92,8 @@ def controller_content(controller: Controller) -> dict[str, Any]:
     return content
 
 
-def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
-    """Read a controller file.
+def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller | LearnedPolicy | Shielded:
+    """Read the file of a controller, a learned policy or a shielded one; none needs torch.
 
     Parameters
     ----------
@@ -98,7 +103,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
 
     Returns
     -------
-    Controller
+    Controller, LearnedPolicy or Shielded
         Of the kind that was saved.
 
     Raises
@@ -107,20 +112,37 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
         Naming the file and the field at fault, or the difference to the model.
     """
     where = str(path)
-    controller = _controller(read_json(Path(path), "controller file", REMEDY), where)
+    content = read_json(Path(path), "controller file", REMEDY)
+    agent: Controller | LearnedPolicy | Shielded
+    if content.get("kind") in POLICIES:
+        from agents.policy_file import read_policy
+
+        agent = read_policy(content, Path(path))
+    else:
+        agent = read_controller(content, where)
     if model is not None:
-        controller.check_fits_model(model)
-    return controller
+        agent.check_fits_model(model)
+    return agent
 
 
-def _controller(content: Mapping[str, Any], where: str) -> Controller:
+def read_controller(content: Mapping[str, Any], where: str) -> Controller:
+    """A classical controller from what `controller_content` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if "format" in content and content["format"] != FORMAT:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
     check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
-    home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
+    kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
+    if kind in POLICIES:
+        raise InputError(f"{where}: kind: '{kind}' found, expected a classical controller: {quoted(HOMES)}")
+    home, name = HOMES[kind]
     design: type[Controller] = getattr(import_module(home), name)
     has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
     expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
@@ -131,7 +153,7 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
     _check_observations(content["observation_names"], design.observes, where)
     more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
     if design.has_autopilot:
-        more["autopilot"] = _controller(
+        more["autopilot"] = read_controller(
             check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
         )
     return design(

@@ -16,9 +16,12 @@ from agents.engines import ONE_THREAD, Done, JobFunction, died_too_often, do_job
 from shipgym.errors import InputError
 
 PATIENCE_S = 10.0
-#: What opens a connection of HTTP/2, with settings that change nothing; a server answers with its own.
-HTTP2_GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes(3) + b"\x04" + bytes(5)
-FRAME_HEAD, SETTINGS_FRAME = 9, 4
+# HTTP/2: a server of gRPC answers every call with status 200, what went wrong is in headers of its own
+GREETING = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+FRAME_HEAD, LARGEST_FRAME, FRAMES_READ = 9, 16384, 20
+HEADERS, SETTINGS, ALL_SENT = 1, 4, 5
+POST_HTTP, PATH, AUTHORITY, CONTENT_TYPE = b"\x83\x86", b"\x04", b"\x01", b"\x0f\x10"
+STATUS_200 = b"\x88"
 
 
 def on_ray(
@@ -68,6 +71,8 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
     os.environ.setdefault(
         "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0"
     )  # as ray will have it, without its warning
+    if address is not None:
+        os.environ.setdefault("RAY_NUM_REDIS_GET_RETRIES", "8")  # seconds for a cluster; read on import
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -80,7 +85,7 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
             yield ray
             return
         if address is None:
-            where: dict[str, Any] = {"num_cpus": workers, "include_dashboard": False}
+            where: dict[str, Any] = {"address": "local", "num_cpus": workers, "include_dashboard": False}
         else:
             check_answers(address)
             where = {"address": address}
@@ -88,8 +93,11 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
             with environment(PYTHONPATH=os.pathsep.join(filter(None, sys.path)), **ONE_THREAD):
                 ray.init(**where, log_to_driver=False, configure_logging=False)
         except Exception as error:
+            if address is None:
+                raise InputError(f"engine: 'ray' found, but it does not start here: {error}") from None
             raise InputError(
-                f"address: '{address}' found, but ray cannot be reached there: {error}"
+                f"address: '{address}' found, but ray refuses: {error}; a cluster with a token (`ray "
+                f"get-auth-token`) wants RAY_AUTH_MODE=token and the same token here"
             ) from None
     try:
         yield ray
@@ -122,7 +130,7 @@ def check_answers(address: str, patience_s: float = PATIENCE_S) -> None:
         )
     heard: list[bool | OSError] = []
     asking = threading.Thread(
-        target=lambda: heard.append(_greet(host.strip("[]"), int(port), patience_s)), daemon=True
+        target=lambda: heard.append(_ask(host.strip("[]"), int(port), patience_s)), daemon=True
     )
     asking.start()
     asking.join(patience_s)  # names are looked up and several addresses tried without a limit of their own
@@ -137,12 +145,36 @@ def check_answers(address: str, patience_s: float = PATIENCE_S) -> None:
         raise InputError(f"address: what answers at '{address}' is not ray; is it the right port?")
 
 
-def _greet(host: str, port: int, patience_s: float) -> bool | OSError:
-    """Whether a server of HTTP/2, the base of ray's protocol, answers there."""
+def _ask(host: str, port: int, patience_s: float) -> bool | OSError:
+    """Whether a server of gRPC, which ray speaks, answers there."""
     try:
         with socket.create_connection((host, port), timeout=patience_s) as connection:
-            connection.sendall(HTTP2_GREETING)
-            head = connection.recv(FRAME_HEAD, socket.MSG_WAITALL)
+            connection.sendall(_question())
+            for _ in range(FRAMES_READ):
+                head = connection.recv(FRAME_HEAD, socket.MSG_WAITALL)
+                if len(head) < FRAME_HEAD:
+                    break
+                content = connection.recv(min(int.from_bytes(head[:3]), LARGEST_FRAME), socket.MSG_WAITALL)
+                if head[3] == HEADERS:
+                    return STATUS_200 in content[:8]
     except OSError as error:
         return error
-    return len(head) == FRAME_HEAD and head[3] == SETTINGS_FRAME
+    return False
+
+
+def _question() -> bytes:
+    """A call in HTTP/2: greeting, settings that change nothing, headers (RFC 9113, section 6; RFC 7541)."""
+    headers = POST_HTTP + b"".join(
+        name + bytes([len(value)]) + value
+        for name, value in (
+            (PATH, b"/grpc.health.v1.Health/Check"),
+            (AUTHORITY, b"ray"),
+            (CONTENT_TYPE, b"application/grpc"),
+            (b"\x00\x02te", b"trailers"),
+        )
+    )
+    return GREETING + _frame(SETTINGS, 0, 0, b"") + _frame(HEADERS, ALL_SENT, 1, headers)
+
+
+def _frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
+    return len(content).to_bytes(3) + bytes([kind, flags]) + stream.to_bytes(4) + content

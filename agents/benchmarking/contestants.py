@@ -4,6 +4,8 @@ A contestant is named on the command line as
 
     pid                        a classical controller, designed for each task's ship with `from_model`
     tuned-pid                  the same with the settings that direct search found for each task of the suite
+    tuned-best                 of these the one that costs least in each task
+    oracle                     what a task leaves to gain: the costs that are kept with the suite
     ppo                        the pretrained agents of `agents/pretrained`
     runs/agent.json            a file of an agent or controller
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
@@ -207,13 +209,15 @@ def _factory(text: str) -> Any:
     try:
         found = getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
-        raise InputError(f"controllers: '{text}' cannot be imported ({error}); expected module:function") from None
+        raise InputError(
+            f"controllers: '{text}' cannot be imported ({error}); expected module:function"
+        ) from None
     _check_object(found, text)
     return found
 
 
 def _matches(pattern: str) -> list[Path]:
-    return [Path(path) for path in sorted(glob.glob(pattern)) if Path(path).is_file()]
+    return [Path(path) for path in sorted(glob.glob(pattern)) if Path(path).is_file()]  # noqa: PTH207 - whole paths
 
 
 def _files(text: str, task: BenchmarkTask) -> list[Path]:
@@ -242,6 +246,8 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if source in CLASSICAL:
         return [designed(source, task)]
     if source.startswith(TUNED):
+        from agents.benchmarking.tuned import tuned
+
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)
@@ -286,7 +292,9 @@ def designed(kind: str, task: BenchmarkTask, **options: Any) -> Policy:
         if not isinstance(task.task, PathFollowingTask):
             return designed("lq", task)
         return LAWS[kind].from_model(task.ship, task=task.task, **options)
-    return _designed(kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True))
+    return _designed(
+        kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True)
+    )
 
 
 @lru_cache(maxsize=256)
@@ -308,11 +316,6 @@ class _Ship:
 
     def __hash__(self) -> int:
         return hash(model_hash(self.model))
-
-
-def tuned(kind: str, task: BenchmarkTask, suite: str) -> Policy:
-    """A classical controller with the settings found by direct search."""
-    raise InputError(f"there are no tuned settings of suite '{suite}'")
 
 
 def file_hash(path: str | Path) -> str:

@@ -21,7 +21,9 @@ FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 COUNTS = ("interventions",)
 
 
-def joined(parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]]) -> Columns:
+def joined(
+    parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]],
+) -> Columns:
     """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from agents.benchmarking.metrics import Recording, metrics
 from agents.benchmarking.suite import BenchmarkTask
 from agents.controller import Policy
+from agents.shield import ShieldState, interventions
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.kernels import layout
@@ -101,7 +101,7 @@ def fly_task(
             if not log.sailing.any():
                 break
         observations, _, terminated, truncated = engine.step(command)
-        log.note(_shielded(controller, state, len(numbers)), terminated, truncated)
+        log.note(_shielded(state, len(numbers)), terminated, truncated)
         starts = np.zeros(len(numbers), dtype=np.bool_)
     recording = log.recording()
     return Flown(metrics(recording), numbers, failure, spent / max(asked, 1), recording)
@@ -130,15 +130,18 @@ def commands(actions: Any, engine: Engine, sailing: Flags) -> tuple[NDArray[np.f
         return none, sailing.copy(), f"actions of shape {found.shape} found, expected {expected}"
     bad = sailing & ~np.isfinite(found).all(axis=1)
     found[bad | ~sailing] = 0.0
-    return found, bad, f"no finite number for {int(bad.sum())} of {int(sailing.sum())} ships" if bad.any() else ""
+    return (
+        found,
+        bad,
+        f"no finite number for {int(bad.sum())} of {int(sailing.sum())} ships" if bad.any() else "",
+    )
 
 
-def _shielded(controller: Any, state: Any, n: int) -> Floats:
-    """Where a safety shield steers: controllers with one say so by a method `shielded(state)`."""
-    told = getattr(controller, "shielded", None)
-    if told is None or state is None:
+def _shielded(state: Any, n: int) -> Floats:
+    """Where a safety shield steers."""
+    if not isinstance(state, ShieldState):
         return np.zeros(n)
-    return np.asarray(told(state), dtype=np.float64).reshape(n)
+    return interventions(state).steering.astype(np.float64)
 
 
 class _Log:
@@ -146,13 +149,17 @@ class _Log:
 
     def __init__(self, engine: Engine) -> None:
         self.engine = engine
-        path = isinstance(engine.task, PathFollowingTask)
-        self.names = (*COMMON_SERIES, *(PATH_SERIES if path else ()))
+        self.path = isinstance(engine.task, PathFollowingTask)
+        self.names = (*COMMON_SERIES, *(PATH_SERIES if self.path else ()))
+        self.motions = {} if self.path else {"u": layout.U, "v": layout.V}
+        if "n" in engine.model.state_names:
+            self.motions["n"] = layout.N
         self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
         self.lost, self.failed = ~self.sailing, ~self.sailing
         self.counts: list[Flags] = []
         self.parts: list[Floats] = []
-        self.series: dict[str, list[Floats]] = {name: [] for name in (*self.names, "u", "v", "n", "shielded")}
+        self.infos: list[Floats] = []
+        self.series: dict[str, list[Floats]] = {name: [] for name in (*self.motions, "shielded")}
         self.rudder: list[Floats] = []
         self.set_point: list[Floats] = []
         self.heading: list[Floats] = []
@@ -173,36 +180,35 @@ class _Log:
         """Note what came of an interval."""
         engine = self.engine
         self.counts.append(self.sailing.copy())
-        self.parts.append(-engine.reward_parts * self.sailing[:, None])
-        for name in self.names:
-            self.series[name].append(engine.info(name).copy())
-        for name, row in (("u", layout.U), ("v", layout.V), ("n", layout.N)):
+        self.parts.append(engine.reward_parts)
+        self.infos.append(np.stack([engine.info(name) for name in self.names]))
+        for name, row in self.motions.items():
             self.series[name].append(engine.outcome(row))
         self.series["shielded"].append(shielded)
         self.begin()
-        arrived = engine.info("success") > 0.0 if "success" in self.series else False
-        self.lost |= self.sailing & terminated & ~np.asarray(arrived)
+        arrived = engine.info("success") > 0.0 if self.path else np.zeros_like(terminated)
+        self.lost |= self.sailing & terminated & ~arrived
         self.sailing = self.sailing & ~(terminated | truncated)
 
     def recording(self) -> Recording:
         """All that was gathered."""
         engine, n = self.engine, self.engine.num_envs
         steps = len(self.counts)
+        sailing = np.array(self.counts, dtype=np.bool_).reshape(steps, n)
+        shown = np.array(self.infos).reshape(steps, len(self.names), n)
+        infos = {name: shown[:, k] for k, name in enumerate(self.names)}
+        series = {name: np.array(values).reshape(steps, n) for name, values in self.series.items()}
         return Recording(
             task=engine.task,
             dt=engine.dt,
             service_speed=engine.model.particulars["speed"],
             service_shaft=engine.model.service_shaft_speed if "n" in engine.model.state_names else 0.0,
-            sailing=np.array(self.counts, dtype=np.bool_).reshape(steps, n),
-            parts=np.array(self.parts).reshape(steps, n, len(engine.task.reward_parts)),
-            series=_stacked(self.series, steps, n),
+            sailing=sailing,
+            parts=-np.array(self.parts).reshape(steps, n, len(engine.task.reward_parts)) * sailing[..., None],
+            series={**infos, **series},
             rudder=np.array(self.rudder),
             set_point=np.array(self.set_point),
             heading=np.array(self.heading),
             lost=self.lost,
             failed=self.failed,
         )
-
-
-def _stacked(series: Mapping[str, list[Floats]], steps: int, n: int) -> dict[str, Floats]:
-    return {name: np.array(values, dtype=np.float64).reshape(steps, n) for name, values in series.items()}

@@ -11,6 +11,7 @@ Propellers and Propulsion, chapter 6 (propeller law: power goes with the cube of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,14 +41,15 @@ class Recording:
     dt : float
         Control interval, s.
     service_speed, service_shaft : float
-        m/s; 1/s, 0 where the ship knows none.
+        m/s; 1/s, 0 of a ship whose shaft has no motion of its own.
     sailing : bool array of shape (n_steps, n)
         Whether the interval counts.
     parts : array of shape (n_steps, n, n_parts)
         Cost of the interval, in the order of `task.reward_parts`.
     series : dict of str to array of shape (n_steps, n)
         At the end of each interval: `heading_error` (rad, before the set-point changes), `extrapolating`,
-        `u`, `v` (m/s), `n` (1/s), `shielded`, and those of `task.info_names` that path following adds.
+        `shielded`; in course keeping `u`, `v` (m/s); `n` (1/s) of a ship with a shaft; on a path those of
+        `task.info_names` that path following adds.
     rudder, set_point, heading : array of shape (n_steps + 1, n)
         From the beginning on, rad.
     lost : bool array of shape (n,)
@@ -77,7 +79,7 @@ class Recording:
 
     def mean(self, values: Floats) -> Floats:
         """Mean over the intervals of each episode, shape (n,); NaN for one without any."""
-        return ratio(np.where(self.sailing, values, 0.0).sum(axis=0), self.steps)
+        return ratio(total(np.where(self.sailing, values, 0.0)), self.steps)
 
 
 def worst_step_cost(task: Task) -> float:
@@ -110,7 +112,7 @@ def metrics(recording: Recording) -> dict[str, Floats]:
         duration_s : time sailed.
     """
     task, steps = recording.task, recording.steps
-    sums = recording.parts.sum(axis=0)
+    sums = total(recording.parts)
     found = {f"cost_{part.removeprefix('reward_')}": sums[:, k] for k, part in enumerate(task.reward_parts)}
     left = task.episode_steps - steps
     found["cost_end"] = found["cost_end"] + np.where(recording.failed, left * worst_step_cost(task), 0.0)
@@ -118,10 +120,10 @@ def metrics(recording: Recording) -> dict[str, Floats]:
     turned = np.abs(np.diff(recording.rudder, axis=0)) * recording.sailing
     shielded = recording.series["shielded"] * recording.sailing
     return {
-        "cost": np.sum(list(found.values()), axis=0),
+        "cost": sum(found.values(), start=np.zeros_like(steps)),
         **found,
         "heading_rmse_deg": np.degrees(np.sqrt(recording.mean(recording.series["heading_error"] ** 2))),
-        "rudder_travel_deg_min": ratio(np.degrees(turned.sum(axis=0)), minutes),
+        "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
         "rudder_reversals_min": ratio(reversals(recording.rudder, recording.sailing), minutes),
         **course_changes(recording),
         **_on_a_path(recording),
@@ -151,15 +153,17 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
     -------
     array of shape (n,)
     """
-    low, high = angle[0].copy(), angle[0].copy()  # since the last turn
-    way, number = np.zeros_like(low), np.zeros_like(low)  # -1, 0 or 1
+    low, high = angle[0], angle[0]  # since the last turn
+    way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
+    number: Floats = np.zeros(angle.shape[1])
     for now, going in zip(angle[1:], counts, strict=True):
         up, down = going & (now > low + dead_band), going & (now < high - dead_band)
         up, down = up & (way <= 0.0), down & (way >= 0.0)
-        number += (up | down) & (way != 0.0)
+        number = number + ((up | down) & (way != 0.0))
         way = np.where(up, 1.0, np.where(down, -1.0, way))
-        low = np.where(going & ~down, np.where(up, now, np.minimum(low, now)), np.where(down, now, low))
-        high = np.where(going & ~up, np.where(down, now, np.maximum(high, now)), np.where(up, now, high))
+        turned, goes_on = up | down, np.where(going, now, low)
+        low = np.where(turned, now, np.minimum(low, goes_on))
+        high = np.where(turned, now, np.maximum(high, np.where(going, now, high)))
     return number
 
 
@@ -187,7 +191,7 @@ def course_changes(recording: Recording) -> dict[str, Floats]:
         error = wrapped(recording.set_point[: last + 1, episode] - recording.heading[: last + 1, episode])
         begins = [0, *(np.flatnonzero(np.diff(course[:-1]) != 0.0) + 1).tolist(), last]
         found = []
-        for begin, end in zip(begins[:-1], begins[1:], strict=True):
+        for begin, end in pairwise(begins):
             if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
                 changed = course[end] != course[begin]  # the error at `end` is that against the next course
                 stretch = error[begin : end + (not changed)]
@@ -230,13 +234,15 @@ def fuel_per_distance(recording: Recording) -> Floats:
         NaN where no way was made good.
     """
     shaft = recording.series["n"] / recording.service_shaft if recording.service_shaft > 0.0 else 1.0
-    spent = (np.where(recording.sailing, shaft, 0.0) ** 3).sum(axis=0) * recording.dt
+    spent = total(np.where(recording.sailing, shaft, 0.0) ** 3) * recording.dt
     if isinstance(recording.task, PathFollowingTask):
-        way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(axis=0, initial=0.0)
+        way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(
+            axis=0, initial=0.0
+        )
     else:
         error = recording.series["heading_error"]
         along = recording.series["u"] * np.cos(error) + recording.series["v"] * np.sin(error)
-        way = np.where(recording.sailing, along, 0.0).sum(axis=0) * recording.dt
+        way = total(np.where(recording.sailing, along, 0.0)) * recording.dt
     return ratio(spent * recording.service_speed, np.maximum(way, 0.0))
 
 
@@ -255,6 +261,12 @@ def _on_a_path(recording: Recording) -> dict[str, Floats]:
         "grounded": ((series["grounded"] > 0.0) & sailing).any(axis=0).astype(np.float64),
         "success": ((series["success"] > 0.0) & sailing).any(axis=0).astype(np.float64),
     }
+
+
+def total(values: Floats) -> Floats:
+    """Sum over the first axis, always in its order: it does not depend on how many episodes there are."""
+    sums: Floats = np.cumsum(values, axis=0)
+    return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
 
 def ratio(above: Floats, below: Floats) -> Floats:

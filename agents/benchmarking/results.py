@@ -135,9 +135,13 @@ def check_new(folder: Path, resume: bool) -> None:
     known = (RESULTS, EPISODES, PARTS)
     there = [entry.name for entry in folder.iterdir()]
     if not resume and any(name in known for name in there):
-        raise InputError(f"{folder}: holds results already; go on there with --resume (resume=True), or take another")
+        raise InputError(
+            f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
+        )
     if not any(name in known for name in there) and there:
-        raise InputError(f"{folder}: holds '{sorted(there)[0]}', which is no result of this; choose a new folder")
+        raise InputError(
+            f"{folder}: holds '{sorted(there)[0]}', which is no result of this; choose a new folder"
+        )
 
 
 def gathered(
@@ -240,7 +244,9 @@ def load_results(path: str | Path) -> BenchmarkResult:
     where = where / RESULTS if where.is_dir() else where
     content = read_json(where, "file of benchmark results", REMEDY)
     if content.get("kind") != KIND:
-        raise InputError(f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': no benchmark results")
+        raise InputError(
+            f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': no benchmark results"
+        )
     if content.get("format") != FORMAT:
         raise InputError(
             f"{where}: format {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
@@ -254,7 +260,9 @@ def load_results(path: str | Path) -> BenchmarkResult:
     about = check_table(content["episodes"], f"{where}: episodes")
     table = where.with_name(EPISODES)
     if about.get("sha256") != file_hash(table):
-        raise InputError(f"{table}: is not the one that {RESULTS} was written with, or is cut short; {REMEDY}")
+        raise InputError(
+            f"{table}: is not the one that {RESULTS} was written with, or is cut short; {REMEDY}"
+        )
     result = BenchmarkResult(dict(content), read_episodes(table))
     _check_agree(result, str(where))
     return result
@@ -269,13 +277,17 @@ def _check_agree(result: BenchmarkResult, where: str) -> None:
     pairs = {
         (str(one), str(task)) for one, task in zip(episodes["contestant"], episodes["task"], strict=True)
     }
-    told = {(one, task): found for task, by_name in result.summary["tasks"].items() for one, found in by_name.items()}
+    told = {
+        (one, task): found
+        for task, by_name in result.summary["tasks"].items()
+        for one, found in by_name.items()
+    }
     if pairs != set(told):
         raise InputError(f"{where}: contestants and tasks differ from those of {EPISODES}; {REMEDY}")
     for (one, task), found in told.items():
         rows = int(((episodes["contestant"] == one) & (episodes["task"] == task)).sum())
         if rows != found.get("runs", 0) * count:
             raise InputError(
-                f"{where}: {rows} episodes of '{one}' on '{task}' found, expected {found.get('runs')} runs of "
-                f"{count}; {REMEDY}"
+                f"{where}: {rows} episodes of '{one}' on '{task}' found, expected {found.get('runs')} runs "
+                f"of {count}; {REMEDY}"
             )

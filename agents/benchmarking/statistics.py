@@ -1,14 +1,14 @@
 """Statistics of scores: rliable's, with the episodes as a second source of chance.
 
-A score is the share of the way from the best constant-gain PID (0) to the oracle (1). Scores of one contestant
-are an array of shape (n_runs, n_tasks), runs being training runs of a learned agent; a controller that is not
-trained has one. Costs of episodes have the shape (n_runs, n_episodes).
+A score is the share of the way from the best constant-gain PID (0) to the oracle (1). Costs of episodes have
+the shape (n_runs, n_episodes), runs being training runs of a learned agent; a controller that is not trained
+has one.
 
-The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement. Everybody
-gets the same draws of episodes, because everybody flew the same ones: differences are paired.
+The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement.
+Everybody gets the same draws of episodes, because everybody flew the same ones: differences are paired.
 
-Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement Learning at the Edge of the
-Statistical Precipice, NeurIPS 34 (interquartile mean, stratified bootstrap, probability of improvement,
+Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement Learning at the Edge of
+the Statistical Precipice, NeurIPS 34 (interquartile mean, stratified bootstrap, probability of improvement,
 performance profiles); Efron & Tibshirani 1993, An Introduction to the Bootstrap, chapters 13 (percentile
 interval) and 8 (more than one source of chance).
 """
@@ -176,14 +176,19 @@ def score(cost: ArrayLike, pid: ArrayLike, oracle: ArrayLike) -> Floats:
 
     NaN where they do not differ, or the oracle is the worse.
     """
-    way = np.asarray(pid, dtype=np.float64) - oracle
-    made = np.asarray(pid, dtype=np.float64) - cost
+    zero = np.asarray(pid, dtype=np.float64)
+    way, made = zero - np.asarray(oracle, dtype=np.float64), zero - np.asarray(cost, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(way > 0.0, made / way, np.nan)
+        share: Floats = np.where(way > 0.0, made / way, np.nan)
+    return share
 
 
 def aggregate_score(
-    costs: Sequence[Floats], references: Sequence[tuple[float, float]], draws: Draws, tasks: Sequence[int], who: int
+    costs: Sequence[Floats],
+    references: Sequence[tuple[float, float]],
+    draws: Draws,
+    tasks: Sequence[int],
+    who: int,
 ) -> Interval:
     """Interquartile mean of the scores of all runs and tasks.
 
@@ -240,7 +245,8 @@ def improvement(
         values.append(wins.mean())
         per_draw = np.tensordot(draws.episodes[task], wins, axes=(1, 2))
         first, second = (
-            draws.runs(task, len(costs[task]), number) for costs, number in zip((one, other), who, strict=True)
+            draws.runs(task, len(costs[task]), number)
+            for costs, number in zip((one, other), who, strict=True)
         )
         rows = np.arange(draws.n_draws)[:, None, None]
         drawn += per_draw[rows, first[:, :, None], second[:, None, :]].mean(axis=(1, 2))
@@ -249,8 +255,8 @@ def improvement(
 
 def _wins(one: Floats, other: Floats) -> Floats:
     """Whether run i of one costs less than run k of the other in each episode, shape (i, k, n_episodes)."""
-    less, same = one[:, None] < other[None], one[:, None] == other[None]
-    return less + 0.5 * same
+    wins: Floats = (one[:, None] < other[None]) + 0.5 * (one[:, None] == other[None])
+    return wins
 
 
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
@@ -268,4 +274,5 @@ def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
     """
     ordered = np.sort(np.ravel(scores))
     below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
-    return 1.0 - below / len(ordered)
+    above: Floats = 1.0 - below / len(ordered)
+    return above

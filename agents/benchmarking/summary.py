@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from agents.benchmarking.statistics import (
     performance_profile,
     score,
 )
-from agents.benchmarking.suite import BenchmarkTask
+from agents.benchmarking.suite import BenchmarkTask, suite_file
 from shipgym.checks import check_number, check_table
 from shipgym.json_file import read_json
 
@@ -46,7 +44,7 @@ def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
     InputError
         Naming the field of the file at fault.
     """
-    path = Path(str(files("agents").joinpath("suites", f"{suite}-reference.json")))
+    path = suite_file(suite, "reference")
     if not path.exists():
         return {}
     found = {}
@@ -83,7 +81,10 @@ def summary_of(
     }
     n_episodes = next((cost.shape[1] for cost in costs.values()), 1)
     draws = Draws(len(tasks), n_episodes)
-    by_task = {task.name: _of_task(task.name, k, names, flown, costs, draws, reference) for k, task in enumerate(tasks)}
+    by_task = {
+        task.name: _of_task(task.name, k, names, flown, costs, draws, reference)
+        for k, task in enumerate(tasks)
+    }
     return {
         "tasks": by_task,
         "reference": {task: {"pid": pid, "oracle": oracle} for task, (pid, oracle) in reference.items()},
@@ -121,7 +122,9 @@ def _of_task(
             "failed": int(sum(np.nansum(run["episodes"].get("failed", 0.0)) for run in runs)),
             "failure": next((run["failure"] for run in runs if run["failure"]), ""),
             "policy_sha256": [run["policy_sha256"] for run in runs],
-            "microseconds_per_action": finite(1e6 * float(np.mean([run["seconds_per_action"] for run in runs]))),
+            "microseconds_per_action": finite(
+                1e6 * float(np.mean([run["seconds_per_action"] for run in runs]))
+            ),
             "metrics": _figures([run["episodes"] for run in runs]),
         }
     return found
@@ -160,7 +163,9 @@ def _ranking(
     for who, name in enumerate(names):
         flown = [k for k in range(len(tasks)) if (name, k) in costs]
         scored = [
-            k for k in flown if tasks[k].name in reference and np.isfinite(score(0.0, *reference[tasks[k].name]))
+            k
+            for k in flown
+            if tasks[k].name in reference and np.isfinite(score(0.0, *reference[tasks[k].name]))
         ]
         aggregate = dict(NOTHING)
         if scored:

@@ -106,7 +106,7 @@ def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
         coefficients=coefficients,
         covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
-        envelope=_envelope(fields.get("envelope"), f"{where}: envelope"),
+        envelope=read_envelope(fields.get("envelope"), f"{where}: envelope"),
         provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
         own_table=dynamics if isinstance(dynamics, Structure) else None,
         service_shaft_speed=check_number(
@@ -213,7 +213,14 @@ def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float
     return matrix
 
 
-def _envelope(value: Any, where: str) -> Envelope | None:
+def read_envelope(value: Any, where: str) -> Envelope | None:
+    """The envelope that `Envelope.to_dict` wrote; None for null.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if value is None:
         return None
     table = check_table(value, where)

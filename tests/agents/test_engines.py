@@ -6,7 +6,9 @@ import os
 import socket
 import subprocess
 import sys
+import threading
 import time
+from http.server import BaseHTTPRequestHandler, HTTPServer
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -188,6 +190,17 @@ def test_address_that_does_not_answer():
         silent.listen()
         with pytest.raises(InputError, match=r"no ray cluster answers .* \(no answer\)"):
             check_answers(f"ray://127.0.0.1:{port}", patience_s=0.2)
+
+
+def test_web_server_is_not_taken_for_ray():
+    class Page(BaseHTTPRequestHandler):
+        def log_message(self, *args):
+            """Say nothing."""
+
+    with HTTPServer(("127.0.0.1", 0), Page) as server:
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        with pytest.raises(InputError, match="is not ray; is it the right port"):
+            check_answers(f"127.0.0.1:{server.server_port}")
 
 
 def test_packing_keeps_types_shapes_and_bits():
