@@ -39,6 +39,7 @@ from agents.command import (
 from agents.identification_commands import advise_command, identify_command, reduce_command
 from agents.learning_commands import train_command
 from agents.policy_commands import export_command
+from agents.tuning_commands import tune_command
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult
@@ -75,6 +76,7 @@ app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
+app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)
 
 
@@ -155,6 +157,14 @@ def autopilot_command(
     rank: Rank = None,
     weight: Weight = None,
     options: Set = None,
+    agents: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+        ),
+    ] = None,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
@@ -179,7 +189,7 @@ def autopilot_command(
     chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
-            ship, out, draws=draws, seed=seed, options=chosen, progress=progress,
+            ship, out, draws=draws, seed=seed, options=chosen, agents=agents or (), progress=progress,
             where=Engine(engine, workers, address),
         )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
