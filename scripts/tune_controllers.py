@@ -4,7 +4,8 @@
     python scripts/tune_controllers.py --tasks mariner-calm --again
 
 Both files are written after every controller and task: killed at any moment, it goes on where it was. The
-oracle flies again where another controller has become the best, or more episodes are asked for. Where
+oracle flies again where another controller has become the best, or more episodes are asked for; its costs of
+all scored episodes are kept in a third file. Where
 the oracle flies fewer episodes than are scored, its cost is that of the best classical controller over all of
 them times the oracle's part of that controller's cost on those it flew.
 """
@@ -98,6 +99,10 @@ def refer(task: BenchmarkTask, asked: argparse.Namespace) -> None:
         "oracle_episodes": len(seeds),
     }
     write_json(found, path)
+    if len(seeds) == len(task.seeds):
+        kept = path.with_name(f"{asked.suite}-oracle.json")
+        all_costs = dict(read_json(kept, "file of the oracle's costs", "delete it")) if kept.exists() else {}
+        write_json({**all_costs, task.name: flight.costs.tolist()}, kept)
     print(f"{task.name:20s} {found[task.name]}   {time.process_time() - began:.0f} s", flush=True)
 
 
