@@ -21,7 +21,7 @@ from typing import Any
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from agents.job_text import KeptResults, job_text, pack, unpack
+from agents.job_text import KeptResults, job_text, pack, shortened, unpack
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
@@ -39,7 +39,11 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THRE
 
 
 class JobError(RuntimeError):
-    """A job that failed for another reason than wrong input, or whose worker died again and again."""
+    """A job that failed for another reason than wrong input."""
+
+
+class WorkerDiedError(JobError):
+    """A job whose worker died again and again."""
 
 
 def run_jobs(
@@ -90,9 +94,13 @@ def run_jobs(
         For wrong arguments; for a cluster that does not answer within 10 s; or, naming the job, if it
         says that its input is wrong.
     JobError
-        Naming the job, if it raises anything else or its worker dies more often than `retries`.
+        Naming the job, if it raises anything else.
+    WorkerDiedError
+        Naming the job, if its worker dies more often than `retries`.
     """
-    _check(function, engine, workers, address, retries)
+    check_engine(engine, workers, address)
+    check_whole(retries, "retries", at_least=0)
+    _check_function(function)
     texts = [job_text(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
@@ -143,23 +151,31 @@ def do_job(function: JobFunction, text: str) -> dict[str, Any]:
         return {"failed": f"{type(error).__name__}: {error}", "traceback": traceback.format_exc()}
 
 
-def died_too_often(text: str, retries: int) -> JobError:
+def died_too_often(text: str, retries: int) -> WorkerDiedError:
     """The error of a job whose worker dies whenever it is done."""
-    return JobError(
-        f"job {text}: its worker died {retries + 1} times. It was killed, perhaps for want of memory (try "
-        f"fewer workers), or the job crashes; a script that starts workers needs `if __name__ == '__main__':`"
+    return WorkerDiedError(
+        f"job {shortened(text)}: its worker died {retries + 1} times. It was killed, perhaps for want of "
+        f"memory (try fewer workers), or the job crashes; a script that starts workers needs "
+        f"`if __name__ == '__main__':`"
     )
 
 
-def _check(
-    function: JobFunction, engine: str, workers: int | None, address: str | None, retries: int
-) -> None:
+def check_engine(engine: str, workers: int | None, address: str | None) -> None:
+    """Refuse wrong arguments of `run_jobs`; whether a cluster answers is asked when it is needed.
+
+    Raises
+    ------
+    InputError
+        Naming the argument.
+    """
     check_choice(engine, ENGINES, "engine")
     if workers is not None:
         check_whole(workers, "workers", at_least=1, hint="or none for as many as there are cores")
-    check_whole(retries, "retries", at_least=0)
     if address is not None and engine != "ray":
         raise InputError(f"address: '{address}' found with engine '{engine}'; it is for engine 'ray'")
+
+
+def _check_function(function: JobFunction) -> None:
     name = getattr(function, "__qualname__", None)
     if name is None or "<" in name:
         raise InputError(
@@ -170,9 +186,9 @@ def _check(
 
 def _result(outcome: dict[str, Any], text: str, number: int) -> dict[str, Any]:
     if "wrong" in outcome:
-        raise InputError(f"job {number} {text}: {outcome['wrong']}")
+        raise InputError(f"job {number} {shortened(text)}: {outcome['wrong']}")
     if "failed" in outcome:
-        error = JobError(f"job {number} {text}: {outcome['failed']}")
+        error = JobError(f"job {number} {shortened(text)}: {outcome['failed']}")
         error.add_note(outcome["traceback"])
         raise error
     return outcome

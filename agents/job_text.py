@@ -21,10 +21,11 @@ from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
+LONGEST_IN_MESSAGE = 200
 
 
 def job_text(job: Any, where: str) -> str:
-    """A job in the one form in which equal jobs are equal texts.
+    """A job as text, its keys in the order in which they are.
 
     Raises
     ------
@@ -34,11 +35,16 @@ def job_text(job: Any, where: str) -> str:
     if not isinstance(job, Mapping):
         raise InputError(f"{where}: {job!r} found, expected a dict")
     try:
-        return json.dumps(job, sort_keys=True, allow_nan=False)
+        return json.dumps(job, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InputError(
             f"{where}: {job!r} found, expected a dict of numbers, texts, lists and dicts ({error})"
         ) from None
+
+
+def shortened(text: str) -> str:
+    """A job for a message."""
+    return text if len(text) <= LONGEST_IN_MESSAGE else f"{text[:LONGEST_IN_MESSAGE]} ..."
 
 
 def pack(value: Any) -> Any:

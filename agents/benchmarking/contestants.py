@@ -246,7 +246,7 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if source in CLASSICAL:
         return [designed(source, task)]
     if source.startswith(TUNED):
-        from agents.benchmarking.tuned import tuned
+        from agents.benchmarking.direct_search import tuned
 
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):

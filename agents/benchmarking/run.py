@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE, Contestant, contestants, policy_hash
 from agents.benchmarking.flying import fly_task
+from agents.benchmarking.oracle_costs import oracle_costs
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
 from agents.benchmarking.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
-from agents.benchmarking.tuned import oracle_costs
 from agents.engines import run_jobs
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError

@@ -34,7 +34,10 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name.endswith(".json"):
-        return load_agent(name, task.ship)
+        agent = load_agent(name, task.ship)
+        if not isinstance(agent, Controller):
+            raise InputError(f"base: {name} holds a learned policy, expected a classical controller")
+        return agent
     home, kind = HOMES[name]
     design = getattr(import_module(home), kind)
     known = inspect.signature(design.from_model).parameters

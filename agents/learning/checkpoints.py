@@ -13,11 +13,18 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.utils import recursive_getattr
+from stable_baselines3.common.save_util import recursive_getattr
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
 Memory = dict[str, Any]
-COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_last_obs", "_last_episode_starts", "_last_original_obs")
+COUNTERS = (
+    "num_timesteps",
+    "_n_updates",
+    "_episode_num",
+    "_last_obs",
+    "_last_episode_starts",
+    "_last_original_obs",
+)
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -48,7 +55,7 @@ def take(agent: Any) -> Memory:
 
 
 def put_back(agent: Any, memory: Memory) -> None:
-    """Let an agent that was made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`."""
+    """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`."""
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
@@ -110,7 +117,7 @@ def _put_replay_back(buffer: Any, memory: Memory | None) -> None:
 def _random_memory(agent: Any) -> Memory:
     return {
         "python": random.getstate(),
-        "numpy": np.random.get_state(),  # noqa: NPY002 - what stable-baselines3 draws from
+        "numpy": np.random.get_state(),
         "torch": torch.get_rng_state(),
         "actions": agent.action_space.np_random.bit_generator.state,
     }
@@ -118,6 +125,6 @@ def _random_memory(agent: Any) -> Memory:
 
 def _put_random_back(agent: Any, memory: Memory) -> None:
     random.setstate(memory["python"])
-    np.random.set_state(memory["numpy"])  # noqa: NPY002
+    np.random.set_state(memory["numpy"])
     torch.set_rng_state(memory["torch"])
     agent.action_space.np_random.bit_generator.state = memory["actions"]

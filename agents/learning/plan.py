@@ -68,7 +68,8 @@ class Plan:
         kind = ALGORITHMS[check_choice(self.algorithm, ALGORITHMS, "algorithm")]
         if type(self.settings) is not kind:
             raise InputError(
-                f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for {self.algorithm}"
+                f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for "
+                f"{self.algorithm}"
             )
         if check_whole(self.seed, "seed", at_least=0) > LARGEST_SEED:
             raise InputError(f"seed: {self.seed} found, expected 0 to {LARGEST_SEED}")
@@ -76,9 +77,18 @@ class Plan:
         if self.settings.ships > SEEDS_EACH:
             raise InputError(f"ships: {self.settings.ships} found, expected at most {SEEDS_EACH}")
         check_whole(self.threads, "threads", at_least=1)
-        if self.task.task.action == "rudder-discrete":
-            raise InputError("action: 'rudder-discrete' found, expected 'rudder' or 'rudder-shaft' to learn")
+        self._check_action()
         self.task.task.check_fits(self.task.ship)
+
+    def _check_action(self) -> None:
+        """Refuse commands that the algorithm, or the base, does not have."""
+        action, base = self.task.task.action, self.settings.base
+        if action == "rudder-discrete" and self.algorithm != "ppo":
+            raise InputError(f"action: '{action}' found, which {self.algorithm} does not learn; take ppo")
+        if action != "rudder" and base != "none":
+            raise InputError(
+                f"base: '{base}' found with action '{action}', expected 'none', or action 'rudder'"
+            )
 
     @property
     def training_seed(self) -> int:
@@ -180,7 +190,9 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
 def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     """Environment, model and options."""
     named = {"--env": given.environment, "--model": given.model, "--sea": given.sea}
-    beside = [name for name, value in named.items() if value is not None] + (["--option"] * bool(given.options))
+    beside = [name for name, value in named.items() if value is not None] + (
+        ["--option"] * bool(given.options)
+    )
     if given.task is not None:
         if beside:
             raise InputError(f"--task: found beside {beside[0]}, which the task says; leave one of them out")
@@ -209,7 +221,8 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
         for short, task in zip(ENVIRONMENTS, TASKS, strict=True)
         for variant, options in VARIANTS.items()
     }
-    known = {short: (short, {}) for short in ENVIRONMENTS} | ids
+    known: dict[str, tuple[str, dict[str, Any]]] = {short: (short, {}) for short in ENVIRONMENTS}
+    known |= ids
     return known[check_choice(name, known, "env")]
 
 

@@ -1,15 +1,15 @@
-"""Nested values with arrays in them as one safetensors file: numbers and names only, no code, written whole."""
+"""Nested values with arrays in them as one safetensors file: numbers and names, no code; written whole."""
 
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shipgym.errors import InputError
+from shipgym.whole_file import write_bytes
 
 Arrays = dict[str, Any]
 CONTENT = "content"  # entry of the file's metadata: what is not an array, as JSON
@@ -35,17 +35,7 @@ def write_values(value: Any, path: Path) -> None:
 
     arrays: Arrays = {}
     content = json.dumps(_packed(value, "", arrays))
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    try:
-        with draft.open("wb") as file:
-            file.write(save(arrays, {CONTENT: content}))
-            file.flush()
-            os.fsync(file.fileno())
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    finally:
-        draft.unlink(missing_ok=True)
+    write_bytes(save(arrays, {CONTENT: content}), path)
 
 
 def read_values(path: Path, what: str) -> Any:
@@ -75,16 +65,18 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):
-        arrays[name] = np.ascontiguousarray(value)
+        arrays[name] = np.array(value, order="C")
         return {"array": name}
     if isinstance(value, dict):
-        pairs = [[key, _packed(one, f"{name}.{key}" if name else str(key), arrays)] for key, one in value.items()]
+        pairs = [
+            [key, _packed(one, f"{name}.{key}" if name else str(key), arrays)] for key, one in value.items()
+        ]
         return {"dict": pairs}
     if isinstance(value, list | tuple):
         items = [_packed(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
         return {"tuple" if isinstance(value, tuple) else "list": items}
     if hasattr(value, "detach"):
-        arrays[name] = np.ascontiguousarray(value.detach().cpu().numpy())
+        arrays[name] = np.array(value.detach().cpu().numpy(), order="C")
         return {"tensor": name}
     raise TypeError(f"{name}: {type(value).__name__} cannot be written")
 

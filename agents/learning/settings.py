@@ -22,7 +22,8 @@ from shipgym.checks import check_choice, check_keys, check_number, check_table, 
 from shipgym.errors import InputError
 
 SCHEDULES = ("constant", "linear")
-ACTIVATIONS = ("relu", "tanh", "elu", "silu")
+RUNNING = "running"
+ACTIVATIONS = ("relu", "tanh")
 #: Classical controllers that a policy may add to, by name; a path that ends in .json is a controller's file.
 BASES = (
     "none", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos", "alos",
@@ -51,7 +52,7 @@ class Settings:
         Discount of a control interval.
     net_arch : tuple of int
         Widths of the hidden layers, of policy and value alike.
-    activation : {"relu", "tanh", "elu", "silu"}
+    activation : {"relu", "tanh"}
         Between the layers.
     history : int
         Observations that the policy is shown, the newest last.
@@ -59,8 +60,9 @@ class Settings:
         Controller that the policy adds to, one of `BASES` or a controller's file.
     authority : float
         Share of the action's range by which it may differ from the base; 1 without a base.
-    scale_rewards : bool
-        Whether rewards are divided by the running deviation of their discounted sum (VecNormalize).
+    reward_scale : float or "running"
+        What rewards are divided by before they are limited to [-10, 10]; "running" is the deviation of their
+        discounted sum so far.
     """
 
     total_steps: int
@@ -75,13 +77,13 @@ class Settings:
     history: int
     base: str
     authority: float
-    scale_rewards: bool
+    reward_scale: float | str
 
     #: Least value of whole numbers, and bounds of others.
-    WHOLE: ClassVar[Mapping[str, int]] = {
+    WHOLE: ClassVar[dict[str, int]] = {
         "total_steps": 1, "evaluate_every": 1, "ships": 1, "batch_size": 1, "history": 1,
     }  # fmt: skip
-    NUMBERS: ClassVar[Mapping[str, Mapping[str, float]]] = {
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = {
         "learning_rate": {"above": 0.0, "at_most": 1.0},
         "gamma": {"at_least": 0.0, "at_most": 1.0},
         "authority": {"above": 0.0, "at_most": 2.0},
@@ -95,14 +97,14 @@ class Settings:
             object.__setattr__(self, name, check_number(getattr(self, name), name, **bounds))
         for name, words in self.CHOICES.items():
             check_choice(getattr(self, name), words, name)
-        widths = self.net_arch
+        widths: Any = self.net_arch
         if isinstance(widths, str) or not isinstance(widths, Sequence):
             raise InputError(f"net_arch: {widths!r} found, expected widths of layers, such as [64, 64]")
         for width in widths:
             check_whole(width, "net_arch", at_least=1)
         object.__setattr__(self, "net_arch", tuple(widths))
-        if not isinstance(self.scale_rewards, bool):
-            raise InputError(f"scale_rewards: {self.scale_rewards!r} found, expected true or false")
+        if self.reward_scale != RUNNING:
+            check_number(self.reward_scale, "reward_scale", above=0.0, hint=f"or '{RUNNING}'")
         if not check_text(self.base, "base").endswith(".json"):
             check_choice(self.base, BASES, "base")
         if self.base == "none" and self.authority != 1.0:
@@ -150,8 +152,8 @@ class PPOSettings(Settings):
     max_grad_norm: float
     log_std_init: float
 
-    WHOLE: ClassVar[Mapping[str, int]] = Settings.WHOLE | {"n_steps": 1, "n_epochs": 1}
-    NUMBERS: ClassVar[Mapping[str, Mapping[str, float]]] = Settings.NUMBERS | {
+    WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {"n_steps": 1, "n_epochs": 1}
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {
         "gae_lambda": {"at_least": 0.0, "at_most": 1.0},
         "clip_range": {"above": 0.0},
         "ent_coef": {"at_least": 0.0},
@@ -164,7 +166,8 @@ class PPOSettings(Settings):
         samples = self.ships * self.n_steps
         if samples % self.batch_size or self.batch_size < 2:
             raise InputError(
-                f"batch_size: {self.batch_size} found, expected a divisor above 1 of ships x n_steps = {samples}"
+                f"batch_size: {self.batch_size} found, expected a divisor above 1 of ships x n_steps, "
+                f"{samples}"
             )
 
 
@@ -192,12 +195,10 @@ class OffPolicySettings(Settings):
     gradient_steps: int
     tau: float
 
-    WHOLE: ClassVar[Mapping[str, int]] = Settings.WHOLE | {
+    WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {
         "buffer_size": 1, "learning_starts": 0, "train_freq": 1, "gradient_steps": 1,
     }  # fmt: skip
-    NUMBERS: ClassVar[Mapping[str, Mapping[str, float]]] = Settings.NUMBERS | {
-        "tau": {"above": 0.0, "at_most": 1.0}
-    }
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {"tau": {"above": 0.0, "at_most": 1.0}}
 
     def _check_rollout(self) -> None:
         if self.buffer_size < self.ships:
@@ -242,8 +243,8 @@ class TD3Settings(OffPolicySettings):
     target_policy_noise: float
     target_noise_clip: float
 
-    WHOLE: ClassVar[Mapping[str, int]] = OffPolicySettings.WHOLE | {"policy_delay": 1}
-    NUMBERS: ClassVar[Mapping[str, Mapping[str, float]]] = OffPolicySettings.NUMBERS | {
+    WHOLE: ClassVar[dict[str, int]] = OffPolicySettings.WHOLE | {"policy_delay": 1}
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = OffPolicySettings.NUMBERS | {
         "action_noise": {"above": 0.0},
         "target_policy_noise": {"at_least": 0.0},
         "target_noise_clip": {"at_least": 0.0},
@@ -266,7 +267,7 @@ class TQCSettings(SACSettings):
     n_quantiles: int
     top_quantiles_to_drop: int
 
-    WHOLE: ClassVar[Mapping[str, int]] = SACSettings.WHOLE | {
+    WHOLE: ClassVar[dict[str, int]] = SACSettings.WHOLE | {
         "n_critics": 1, "n_quantiles": 1, "top_quantiles_to_drop": 0,
     }  # fmt: skip
 

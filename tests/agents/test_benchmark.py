@@ -156,9 +156,11 @@ def test_functions_of_ones_own(tmp_path, monkeypatch):
 def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
     kept = {
         "tuned": {
-            "mariner-calm": {
-                "lq": {"options": {"integral_lengths": 80.0}, "cost": 24.0},
-                "pid": {"options": {"damping": 0.9}, "cost": 25.0},
+            "tasks": {
+                "mariner-calm": {
+                    "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
+                    "pid": {"settings": {"damping": 0.9}, "cost": 25.0},
+                }
             }
         },
         "oracle": {"mariner-calm": [float(k) for k in range(100)]},
@@ -166,7 +168,10 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     }
     for name, content in kept.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
-    monkeypatch.setattr("agents.benchmarking.tuned.suite_file", lambda suite, what: tmp_path / f"{what}.json")
+    monkeypatch.setattr("agents.benchmarking.direct_search.tuned_file", lambda suite: tmp_path / "tuned.json")
+    monkeypatch.setattr(
+        "agents.benchmarking.oracle_costs.suite_file", lambda suite, what: tmp_path / f"{what}.json"
+    )
     monkeypatch.setattr(
         "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
     )
