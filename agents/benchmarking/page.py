@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
     from agents.autopilot import Progress
 
+PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
 
 TITLES = {

@@ -4,9 +4,11 @@ import base64
 import gzip
 import json
 import re
+import sys
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from agents import benchmark
 from agents.benchmarking.page import command, write_page
@@ -20,6 +22,7 @@ from agents.benchmarking.page_replays import (
     worst_of,
 )
 from agents.benchmarking.refly import Flight, refly
+from agents.cli import app
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.test_replay import DT, STEPS, episode
@@ -181,6 +184,29 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):
         write_page(result, tmp_path / "page.txt")
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_the_command_writes_the_page_where_plotly_is_there(tmp_path, monkeypatch, there):
+    if not there:
+        monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    out = tmp_path / "results"
+    words = [
+        "benchmark",
+        "--controllers",
+        "pid",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        "2",
+        "--workers",
+        "1",
+    ]
+    answer = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert answer.exit_code == 0, answer.stderr
+    assert (out / "results.json").exists()
+    assert (out / "index.html").exists() == there
+    assert ("there is no index.html: plotly is not installed" in answer.stderr) != there
+
+
 # --- in the browser
 
 
@@ -206,7 +232,8 @@ def opened(browser, page):
 
 def column(browser, table, number):
     return browser.run(
-        f"[...document.querySelectorAll('#{table} tbody tr')].map((row) => row.cells[{number}].dataset.key ?? '')"
+        f"[...document.querySelectorAll('#{table} tbody tr')]"
+        f".map((row) => row.cells[{number}].dataset.key ?? '')"
     )
 
 
