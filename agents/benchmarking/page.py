@@ -146,7 +146,8 @@ def _header(result: BenchmarkResult) -> Html:
         f"{about['seeds']['count']} episodes each, the same for all. "
         "Tables sort by a click on a head; figures may be zoomed."
     )
-    return Html(f"{header('shipgym benchmark', about['suite']['name'], lead)}{_warnings(result)}")
+    old = '<div class="note warn" id="old" hidden>Figures and replays need a browser of 2023 or later.</div>'
+    return Html(f"{header('shipgym benchmark', about['suite']['name'], lead)}{old}{_warnings(result)}")
 
 
 def _warnings(result: BenchmarkResult) -> Html:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from agents import benchmark
 from agents.benchmarking.page import command, write_page
+from agents.benchmarking.page_figures import COLOURS
 from agents.benchmarking.page_replays import (
     bests_of,
     differences,
@@ -312,6 +313,12 @@ def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
         " slider.dispatchEvent(new Event('input', { bubbles: true })); })()"
     )
     opened.wait(f"{where} !== '{begin}'")
+    chip = f"[...document.querySelectorAll('.chips button')].find((each) => each.dataset.name === '{other}')"
+    assert opened.run(f"{chip}.style.getPropertyValue('--run')") == COLOURS[result.ranking.index(other)]
+    assert (
+        opened.run(f"{frame}.querySelector('#legend li').style.getPropertyValue('--run')")
+        == (COLOURS[result.ranking.index(other)])
+    )
     legend = opened.run(f"{frame}.getElementById('legend').textContent")
     assert other in legend
     worst = worst_of(result, other, "mariner-current", 1)[0]
