@@ -33,6 +33,7 @@ from agents.command import (
     fail,
 )
 from agents.identification_commands import advise_command, identify_command, reduce_command
+from agents.learning_commands import train_command
 from agents.policy_commands import export_command
 
 if TYPE_CHECKING:
@@ -69,6 +70,7 @@ app.command("identify")(identify_command)
 app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
 app.command("export")(export_command)
+app.command("train")(train_command)
 
 
 @app.command("trials")

@@ -10,6 +10,7 @@ al. 2019, Residual reinforcement learning for robot control, ICRA.
 from __future__ import annotations
 
 import copy
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -119,6 +120,14 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         for row in ended:
             infos[row]["terminal_observation"] = last[row]
         return self._begin(observations, np.asarray(dones, dtype=np.bool_)), rewards, dones, infos
+
+    def memory(self) -> dict[str, Any]:
+        """All that it adds to what the steps to come depend on: history, the base's state and proposals."""
+        return copy.deepcopy({"past": self._past, "state": self._state, "proposed": self._proposed})
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        """Go on from what `memory` gave, in place of a `reset`."""
+        self._past[:], self._state, self._proposed = memory["past"], memory["state"], memory["proposed"]
 
     def _begin(self, observations: Floats, starts: Flags) -> Floats:
         """What the agent sees where some rows begin an episode."""

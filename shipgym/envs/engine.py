@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
@@ -238,6 +238,15 @@ class Engine:
         self.advance()
         rewards, terminated, truncated = self.shown.outcomes[:STEP_OUTCOME]
         return self.observations, rewards.copy(), terminated > 0.0, truncated > 0.0
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the steps to come depend on beside their commands, copies by name."""
+        return {"states": self._states.copy(), "keys": self._keys.copy(), "ships": self._ships.copy()}
+
+    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `memory` of the same engine, or of one made alike, gave."""
+        self._states[:], self._keys[:] = memory["states"], memory["keys"]
+        self._ships[:] = memory["ships"]
 
     @property
     def command(self) -> Observation:
