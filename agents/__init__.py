@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from agents.adaptive_lq import AdaptiveLQ
+    from agents.benchmarking.results import BenchmarkResult, load_results
+    from agents.benchmarking.run import benchmark
     from agents.checker import check_controller
     from agents.controller import Controller, Policy
     from agents.controller_file import load_agent
@@ -36,6 +38,7 @@ _HOME = {
     "MarginSpread": "agents.robustness",
     "PID": "agents.pid",
     "AdaptiveLQ": "agents.adaptive_lq",
+    "BenchmarkResult": "agents.benchmarking.results",
     "Controller": "agents.controller",
     "FilteredPID": "agents.filtered_pid",
     "Flights": "agents.flight",
@@ -43,10 +46,12 @@ _HOME = {
     "ScheduledLQ": "agents.scheduled_lq",
     "Shielded": "agents.shield",
     "StepResponses": "agents.flight",
+    "benchmark": "agents.benchmarking.run",
     "check_controller": "agents.checker",
     "fly": "agents.flight",
     "interventions": "agents.shield",
     "load_agent": "agents.controller_file",
+    "load_results": "agents.benchmarking.results",
     "margin_spread": "agents.robustness",
     "step_response": "agents.flight",
 }
@@ -58,6 +63,7 @@ __all__ = [
     "PID",
     "AdaptiveLQ",
     "AdaptiveLineOfSight",
+    "BenchmarkResult",
     "Controller",
     "FilteredPID",
     "Flights",
@@ -69,10 +75,12 @@ __all__ = [
     "ScheduledLQ",
     "Shielded",
     "StepResponses",
+    "benchmark",
     "check_controller",
     "fly",
     "interventions",
     "load_agent",
+    "load_results",
     "margin_spread",
     "step_response",
 ]

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verification
 from agents.identifying import identification_settings, identify_trials, trials_of
+from agents.monte_carlo import HERE, Engine, monte_carlo
 from agents.output import check_folder, whole_folder
-from agents.spread import manoeuvre_spread
 from identification.concerns import why_unstable
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel
-from shipgym.models.linear import is_course_stable, nomoto
+from shipgym.models.linear import nomoto
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
 
@@ -42,6 +42,7 @@ def build_autopilot(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
+    where: Engine = HERE,
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
@@ -62,6 +63,8 @@ def build_autopilot(
         Of `identify`, by name, trials by file; those not given are the ship file's.
     progress : callable, optional
         Called as the work goes on.
+    where : Engine
+        Where the models drawn are worked on; the results are the same.
 
     Returns
     -------
@@ -75,11 +78,14 @@ def build_autopilot(
     from agents.report import write_report
 
     folder = Path(out)
+    where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
-    result = examine(ship_file, draws=int(draws), seed=int(seed), options=options, progress=progress)
+    result = examine(
+        ship_file, draws=int(draws), seed=int(seed), options=options, progress=progress, where=where
+    )
     with whole_folder(folder, FILES) as draft:
         _tell(progress, "writing the report", 0, 1)
         write_json(result.metrics, draft / "metrics.json")
@@ -99,6 +105,7 @@ def examine(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     progress: Progress | None = None,
+    where: Engine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
     _tell(progress, "reading trials", 0, 1)
@@ -112,13 +119,19 @@ def examine(
     verification = None
     if instability is None:
         try:
-            verification = verify(identification.model, draws, seed, progress)
+            verification = verify(identification.model, draws, seed, progress, where)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     return AutopilotResult(ship, identification.trials, identification, instability, verification)
 
 
-def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = None) -> Verification:
+def verify(
+    model: ShipModel,
+    draws: int,
+    seed: int,
+    progress: Progress | None = None,
+    where: Engine = HERE,
+) -> Verification:
     """Design both autopilots on a model and fly them over models drawn from its covariance.
 
     Parameters
@@ -129,6 +142,8 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
         See `build_autopilot`.
     progress : callable, optional
         Called as the work goes on.
+    where : Engine
+        Where the draws are worked on; the results are the same.
 
     Returns
     -------
@@ -141,54 +156,59 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
     InputError
         If no autopilot can be designed on it.
     """
-    from agents.lq import LQ
-    from agents.pid import PID
+    from agents.flight import step_response
 
-    drawn = model.sample(draws, seed)
-    stage = "manoeuvres of the models drawn"
+    stage = "models drawn"
     _tell(progress, stage, 0, draws)
-    manoeuvres = manoeuvre_spread(model, drawn, lambda done: _tell(progress, stage, done, draws))
-    stable = [draw for draw, lost in zip(drawn, manoeuvres.unstable, strict=True) if not lost]
-    pilots, refused = [], {}
-    designs: tuple[Any, ...] = (PID, LQ)
-    for k, design in enumerate(designs):
-        _tell(progress, "flying the autopilots", k, len(designs))
-        try:
-            controller = design.from_model(model)
-        except InputError as error:  # this design does not suit the ship; another may
-            refused[design.kind] = str(error)
-            continue
-        pilots.append(_fly(controller, model, drawn, stable, seed))
-    if not pilots:
-        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
-    _tell(progress, "flying the autopilots", len(designs), len(designs))
+    controllers, refused = _designed(model)
+    found = monte_carlo(
+        controllers,
+        model,
+        draws,
+        seed,
+        where=where,
+        progress=lambda done: _tell(progress, stage, done, draws),
+    )
+    lost = found.manoeuvres.unstable
+    stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
+    pilots = []
+    for k, (controller, flights) in enumerate(zip(controllers, found.flights, strict=True)):
+        _tell(progress, "step responses", k, len(controllers))
+        pilots.append(Pilot(controller, flights, step_response(controller, [model, *stable], STEP_DEG)))
+    _tell(progress, "step responses", len(controllers), len(controllers))
     return Verification(
         draws=draws,
         seed=seed,
-        manoeuvres=manoeuvres,
-        course_unstable=np.array([not _holds_course(draw) for draw in drawn]),
+        manoeuvres=found.manoeuvres,
+        course_unstable=found.course_unstable,
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
         refused=refused,
     )
 
 
-def _fly(
-    controller: Controller, model: ShipModel, drawn: list[ShipModel], stable: list[ShipModel], seed: int
-) -> Pilot:
-    """Episodes on all models drawn, and the step response of the identified and the stable ones."""
-    from agents.flight import fly, step_response
+def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
+    """The autopilots, and why others could not be designed.
 
-    seeds = np.arange(len(drawn)) + seed  # the same episodes for every autopilot
-    step = step_response(controller, [model, *stable], STEP_DEG)
-    return Pilot(controller, fly(controller, drawn, seeds=seeds), step)
+    Raises
+    ------
+    InputError
+        If none could.
+    """
+    from agents.lq import LQ
+    from agents.pid import PID
 
-
-def _holds_course(model: ShipModel) -> bool:
-    try:
-        return is_course_stable(model)
-    except InputError:  # there is no straight course at all
-        return False
+    controllers: list[Controller] = []
+    refused: dict[str, str] = {}
+    designs: tuple[Any, ...] = (PID, LQ)
+    for design in designs:
+        try:
+            controllers.append(design.from_model(model))
+        except InputError as error:  # this design does not suit the ship; another may
+            refused[design.kind] = str(error)
+    if not controllers:
+        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
+    return controllers, refused
 
 
 def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:

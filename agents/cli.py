@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
+    Address,
+    EngineName,
     HoldOut,
     Json,
     Method,
@@ -29,6 +32,7 @@ from agents.command import (
     Structure,
     Uncertainty,
     Weight,
+    Workers,
     answered,
     fail,
 )
@@ -71,6 +75,7 @@ app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")
@@ -150,6 +155,9 @@ def autopilot_command(
     rank: Rank = None,
     weight: Weight = None,
     options: Set = None,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
     as_json: Json = False,
 ) -> None:
     """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
@@ -159,6 +167,7 @@ def autopilot_command(
     """
     from agents.autopilot import build_autopilot
     from agents.identifying import given_options
+    from agents.monte_carlo import Engine
     from agents.terminal import progress_bars
 
     given = {
@@ -169,7 +178,10 @@ def autopilot_command(
     }  # fmt: skip
     chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
-        result = build_autopilot(ship, out, draws=draws, seed=seed, options=chosen, progress=progress)
+        result = build_autopilot(
+            ship, out, draws=draws, seed=seed, options=chosen, progress=progress,
+            where=Engine(engine, workers, address),
+        )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
 
 

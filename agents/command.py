@@ -53,6 +53,13 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="OPTION=VALUE", help="Any option of the table [identify]; repeatable."),
 ]
+EngineName = Annotated[
+    str, typer.Option("--engine", help="Where jobs are done: local (this machine) or ray.")
+]
+Workers = Annotated[int, typer.Option(min=1, help="Jobs done at once; the results do not depend on it.")]
+Address = Annotated[
+    str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this machine.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
 
 

@@ -75,13 +75,20 @@ def load(path: Path) -> ShipModel:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
     try:
-        return _model(fields, str(path))
+        return read_model(fields, str(path))
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
-def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
+def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
+    """The model that `model_fields` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if "format" in fields and fields["format"] != FORMAT:
         raise InputError(
             f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
@@ -148,7 +155,7 @@ def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> Gre
         structure.equations,
         structure.normalisation,
         structure.quantity,
-        _model(reference, f"{where}.reference"),
+        read_model(reference, f"{where}.reference"),
         shaft,
     )
 

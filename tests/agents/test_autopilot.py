@@ -51,7 +51,7 @@ def test_the_saved_model_is_the_identified_one(chain):
 
 def test_progress_is_told_to_the_end(chain):
     stages = chain[2]
-    assert ("manoeuvres of the models drawn", 24, 24) in stages
+    assert ("models drawn", 24, 24) in stages
     assert stages[-1] == ("writing the report", 1, 1)
 
 
