@@ -1,8 +1,8 @@
-"""The whole chain: recorded trials in; a model, its certainty, two verified autopilots and a report out."""
+"""The whole chain: recorded trials in; a model, its certainty, verified autopilots and a report out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ from shipgym.ship_file import ShipFile
 
 if TYPE_CHECKING:
     from agents.controller import Controller
+    from agents.controller_file import Agent
 
 Floats = NDArray[np.float64]
 
@@ -41,6 +42,7 @@ def build_autopilot(
     draws: int = 200,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
     where: Engine = HERE,
 ) -> AutopilotResult:
@@ -61,6 +63,8 @@ def build_autopilot(
         Of the draws and of the episodes flown.
     options : mapping, optional
         Of `identify`, by name, trials by file; those not given are the ship file's.
+    agents : sequence of str or Path
+        Files of autopilots to fly beside PID and LQ, or names of pretrained ones (`load_agent`).
     progress : callable, optional
         Called as the work goes on.
     where : Engine
@@ -75,6 +79,7 @@ def build_autopilot(
     InputError
         For anything wrong with the files or arguments; nothing is written then.
     """
+    from agents.controller import Controller
     from agents.report import write_report
 
     folder = Path(out)
@@ -84,7 +89,13 @@ def build_autopilot(
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
     result = examine(
-        ship_file, draws=int(draws), seed=int(seed), options=options, progress=progress, where=where
+        ship_file,
+        draws=int(draws),
+        seed=int(seed),
+        options=options,
+        agents=agents,
+        progress=progress,
+        where=where,
     )
     with whole_folder(folder, FILES) as draft:
         _tell(progress, "writing the report", 0, 1)
@@ -92,7 +103,8 @@ def build_autopilot(
         if result.verification is not None:
             result.model.save(draft / "model.json")
             for pilot in result.verification.pilots:
-                pilot.controller.save(draft / f"{pilot.controller.name}.json")
+                if isinstance(pilot.controller, Controller):  # the others are files already
+                    pilot.controller.save(draft / f"{pilot.controller.name}.json")
         write_report(result, draft / "report.html")
         _tell(progress, "writing the report", 1, 1)
     return result
@@ -104,12 +116,16 @@ def examine(
     draws: int = 200,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
     where: Engine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
+    from agents.controller_file import load_agent
+
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
+    guests = [load_agent(agent) for agent in agents]
     trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
     _tell(progress, "reading trials", 1, 1)
     _tell(progress, "identifying", 0, 1)
@@ -118,8 +134,10 @@ def examine(
     instability = why_unstable(identification)
     verification = None
     if instability is None:
+        for guest in guests:
+            guest.check_fits_model(identification.model)
         try:
-            verification = verify(identification.model, draws, seed, progress, where)
+            verification = verify(identification.model, draws, seed, progress, where, guests)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     return AutopilotResult(ship, identification.trials, identification, instability, verification)
@@ -131,8 +149,9 @@ def verify(
     seed: int,
     progress: Progress | None = None,
     where: Engine = HERE,
+    guests: Sequence[Agent] = (),
 ) -> Verification:
-    """Design both autopilots on a model and fly them over models drawn from its covariance.
+    """Design PID and LQ on a model and fly them, and guests, over models drawn from its covariance.
 
     Parameters
     ----------
@@ -144,6 +163,8 @@ def verify(
         Called as the work goes on.
     where : Engine
         Where the draws are worked on; the results are the same.
+    guests : sequence of Controller, LearnedPolicy or Shielded
+        Further autopilots.
 
     Returns
     -------
@@ -156,7 +177,7 @@ def verify(
     InputError
         If no autopilot can be designed on it.
     """
-    from agents.flight import step_response
+    from agents.flight import fly, step_response
 
     stage = "models drawn"
     _tell(progress, stage, 0, draws)
@@ -169,13 +190,15 @@ def verify(
         where=where,
         progress=lambda done: _tell(progress, stage, done, draws),
     )
+    seeds = seed + np.arange(draws)
+    flights = [*found.flights, *(fly(guest, found.draws, seeds=seeds) for guest in guests)]
     lost = found.manoeuvres.unstable
     stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
-    pilots = []
-    for k, (controller, flights) in enumerate(zip(controllers, found.flights, strict=True)):
-        _tell(progress, "step responses", k, len(controllers))
-        pilots.append(Pilot(controller, flights, step_response(controller, [model, *stable], STEP_DEG)))
-    _tell(progress, "step responses", len(controllers), len(controllers))
+    pilots, flown = [], [*controllers, *guests]
+    for k, (controller, flight) in enumerate(zip(flown, flights, strict=True)):
+        _tell(progress, "step responses", k, len(flown))
+        pilots.append(Pilot(controller, flight, step_response(controller, [model, *stable], STEP_DEG)))
+    _tell(progress, "step responses", len(flown), len(flown))
     return Verification(
         draws=draws,
         seed=seed,

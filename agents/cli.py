@@ -155,6 +155,14 @@ def autopilot_command(
     rank: Rank = None,
     weight: Weight = None,
     options: Set = None,
+    agents: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+        ),
+    ] = None,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
@@ -179,7 +187,7 @@ def autopilot_command(
     chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
-            ship, out, draws=draws, seed=seed, options=chosen, progress=progress,
+            ship, out, draws=draws, seed=seed, options=chosen, agents=agents or (), progress=progress,
             where=Engine(engine, workers, address),
         )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)

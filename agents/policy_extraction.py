@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +22,8 @@ from shipgym.errors import InputError
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 #: Keywords of a vector environment that say how it runs, not what is asked.
 RUNNING = ("model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
+#: Wrappers that change observations.
+REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 N_COMPARED = 16
 AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
@@ -59,8 +62,11 @@ def _stack(env: Any) -> Iterator[Any]:
     """The environment and what it wraps, down to the ships."""
     while env is not None:
         yield env
-        inner = getattr(env, "vector_env", None)  # of ShipVecEnv
-        env = vars(env).get("venv", vars(env).get("env", inner))
+        held = vars(env)
+        inner = held.get("vector_env")  # of ShipVecEnv
+        if "envs" in held:  # of DummyVecEnv
+            inner = env.envs[0]
+        env = held.get("venv", held.get("env", inner))
 
 
 def _check_wrappers(stack: Sequence[Any]) -> None:
@@ -71,10 +77,10 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
                 "env: VecNormalize that scales observations found, expected VecNormalize(norm_obs=False): "
                 "the environments scale them already"
             )
-        if name in ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs"):
+        if name in REFUSED or isinstance(wrapper, gymnasium.ObservationWrapper | gymnasium.ActionWrapper):
             raise InputError(
-                f"env: wrapper {name} found, expected none that changes observations but ResidualVecEnv, "
-                f"whose history shows past ones"
+                f"env: wrapper {name} found, expected none that changes observations or actions but "
+                f"ResidualVecEnv, whose history shows past ones"
             )
 
 
@@ -94,8 +100,6 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
 
 def _environment(ships: Any) -> dict[str, Any]:
     """What is observed and commanded, and where."""
-    if not hasattr(ships, "observation_names") and hasattr(ships, "envs"):
-        ships = ships.envs[0].unwrapped  # DummyVecEnv
     if not hasattr(ships, "observation_names"):
         raise InputError(
             f"env: {type(ships).__name__} found, expected an environment of shipgym, such as ShipVecEnv"

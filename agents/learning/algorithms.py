@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
@@ -17,6 +18,8 @@ from agents.learning.residual import ResidualVecEnv
 from agents.learning.settings import RUNNING, PPOSettings, SACSettings, Settings, TD3Settings, TQCSettings
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
+from shipgym.kernels import layout
+from shipgym.kernels import voyage_rows as rows
 
 ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 #: Settings that go to the algorithms by their own names, and those that go by others.
@@ -33,9 +36,27 @@ _OWN: dict[type[Settings], tuple[str, ...]] = {
 }
 
 
+class StaggeredShips(ShipVecEnv):
+    """Ships whose first episodes are truncated one after another, evenly over the length of one.
+
+    Else all of them would begin at once, again and again, and a rollout show one part of episodes only.
+    """
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in each row, each of them of another age."""
+        observations: NDArray[np.float32] = super().reset()
+        memory = self.memory()
+        ages = memory["states"][:, rows.STEPS : rows.STEPS + layout.LANES]
+        lanes = np.arange(self.num_envs)
+        longest = self.vector_env.task.episode_steps
+        ages[lanes // layout.LANES, lanes % layout.LANES] += lanes * longest // self.num_envs
+        self.remember(memory)
+        return observations
+
+
 def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
     """The ships that a plan's agent learns from, as it sees and steers them."""
-    ships: VecEnv = ShipVecEnv(
+    ships: VecEnv = StaggeredShips(
         plan.task.env_id,
         plan.settings.ships,
         model=plan.task.ship,

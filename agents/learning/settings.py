@@ -83,7 +83,7 @@ class Settings:
     WHOLE: ClassVar[dict[str, int]] = {
         "total_steps": 1, "evaluate_every": 1, "ships": 1, "batch_size": 1, "history": 1,
     }  # fmt: skip
-    NUMBERS: ClassVar[dict[str, dict[str, float]]] = {
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = {
         "learning_rate": {"above": 0.0, "at_most": 1.0},
         "gamma": {"at_least": 0.0, "at_most": 1.0},
         "authority": {"above": 0.0, "at_most": 2.0},
@@ -97,7 +97,7 @@ class Settings:
             object.__setattr__(self, name, check_number(getattr(self, name), name, **bounds))
         for name, words in self.CHOICES.items():
             check_choice(getattr(self, name), words, name)
-        widths = self.net_arch
+        widths: Any = self.net_arch
         if isinstance(widths, str) or not isinstance(widths, Sequence):
             raise InputError(f"net_arch: {widths!r} found, expected widths of layers, such as [64, 64]")
         for width in widths:
@@ -153,7 +153,7 @@ class PPOSettings(Settings):
     log_std_init: float
 
     WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {"n_steps": 1, "n_epochs": 1}
-    NUMBERS: ClassVar[dict[str, dict[str, float]]] = Settings.NUMBERS | {
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {
         "gae_lambda": {"at_least": 0.0, "at_most": 1.0},
         "clip_range": {"above": 0.0},
         "ent_coef": {"at_least": 0.0},
@@ -198,9 +198,7 @@ class OffPolicySettings(Settings):
     WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {
         "buffer_size": 1, "learning_starts": 0, "train_freq": 1, "gradient_steps": 1,
     }  # fmt: skip
-    NUMBERS: ClassVar[dict[str, dict[str, float]]] = Settings.NUMBERS | {
-        "tau": {"above": 0.0, "at_most": 1.0}
-    }
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {"tau": {"above": 0.0, "at_most": 1.0}}
 
     def _check_rollout(self) -> None:
         if self.buffer_size < self.ships:
@@ -246,7 +244,7 @@ class TD3Settings(OffPolicySettings):
     target_noise_clip: float
 
     WHOLE: ClassVar[dict[str, int]] = OffPolicySettings.WHOLE | {"policy_delay": 1}
-    NUMBERS: ClassVar[dict[str, dict[str, float]]] = OffPolicySettings.NUMBERS | {
+    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = OffPolicySettings.NUMBERS | {
         "action_noise": {"above": 0.0},
         "target_policy_noise": {"at_least": 0.0},
         "target_noise_clip": {"at_least": 0.0},

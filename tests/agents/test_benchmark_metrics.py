@@ -53,7 +53,9 @@ def test_the_worst_step_is_what_the_kernels_charge_for_the_rest(task):
     flown = fly_task(steady(1.0), task, SEEDS[:2])  # hard over: she turns until control is lost, or aground
     end, steps = flown.episodes["cost_end"], flown.recording.steps
     assert flown.episodes["terminated"].all()
-    np.testing.assert_allclose(end, worst_step_cost(task.task) * (task.task.episode_steps - steps), rtol=1e-12)
+    np.testing.assert_allclose(
+        end, worst_step_cost(task.task) * (task.task.episode_steps - steps), rtol=1e-12
+    )
 
 
 def test_straight_running_needs_the_fuel_of_straight_running():
@@ -107,9 +109,9 @@ FAILURES = {
         (np.arange(len(seen)) == 1) & (call >= 50), np.nan, 0.0
     ).reshape(-1, 1),
     "another shape": lambda call, seen: np.zeros((len(seen), 1 if call < 50 else 2)),
-    "an error": lambda call, seen: np.zeros((len(seen), 1)) / (0 if call < 0 else 1)
-    if call < 50
-    else {}["missing"],
+    "an error": lambda call, seen: (
+        np.zeros((len(seen), 1)) / (0 if call < 0 else 1) if call < 50 else {}["missing"]
+    ),
     "no numbers": lambda call, seen: np.zeros((len(seen), 1)) if call < 50 else [["port"]] * len(seen),
 }
 
