@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.direct_search import tuned_best
+from agents.benchmarking.direct_search import tune, tuned_controller
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
@@ -36,6 +36,7 @@ Floats = NDArray[np.float64]
 LEARNERS = ("identified", "posterior", "reference")
 IDENTIFIED, REFERENCE, TUNED = "identified", "reference", "tuned"
 N_RUNS = 5
+CLASSICAL = ("pid", "lq", "lqg", "ilos")
 #: Tasks of the suite, and the identified model of their ship.
 CASES = {
     "mariner-sharp-turns": "mariner-tls-svm",
@@ -165,7 +166,7 @@ def transfer(
     folder = Path(out)
     jobs = [
         {
-            "case": case.task.name, "identified": case.identified, "learner": learner, "seed": seed,
+            **_identity(case), "learner": learner, "seed": seed,
             "settings": dict(settings or {}), "out": str(folder / f"{case.task.name}-{learner}-{seed}"),
         }
         for learner in learners
@@ -174,7 +175,11 @@ def transfer(
     files = run_jobs(learn, jobs, engine=engine, workers=workers, keep=folder / "jobs", progress=progress)
     from agents.controller_file import load_agent
 
-    found: dict[str, dict[str, Floats]] = {TUNED: _flown([tuned_best(case.learned_in(IDENTIFIED))], case)}
+    searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
+    settled = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
+    best = min(settled, key=lambda result: result["cost"])
+    controller = tuned_controller(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
+    found: dict[str, dict[str, Floats]] = {TUNED: _flown([controller], case)}
     for k, learner in enumerate(learners):
         runs = files[k * n_runs : (k + 1) * n_runs]
         found[learner] = _flown([load_agent(file) for file in runs], case)
@@ -187,12 +192,26 @@ def learn(job: dict[str, Any]) -> str:
     from agents.learning.settings import load_settings
     from agents.learning.training import train
 
-    case = TransferCase(load_suite().task(job["case"]), job["identified"])
+    case = _case(job)
     task = case.learned_in(job["learner"])
     settings = load_settings("ppo", task.environment, case.task.name, job["settings"])
     folder = Path(job["out"])
     train(Plan("ppo", task, settings, seed=job["seed"]), folder, resume=folder.exists())
     return str(folder / "agent.json")
+
+
+def tune_one(job: dict[str, Any]) -> dict[str, Any]:
+    """Direct search of one classical controller on the identified model."""
+    found = tune(job["kind"], _case(job).learned_in(IDENTIFIED))
+    return {"kind": job["kind"], "settings": found.settings, "cost": found.cost}
+
+
+def _identity(case: TransferCase) -> dict[str, str]:
+    return {"case": case.task.name, "identified": case.identified}
+
+
+def _case(job: Mapping[str, Any]) -> TransferCase:
+    return TransferCase(load_suite().task(job["case"]), job["identified"])
 
 
 def _flown(policies: Sequence[Policy], case: TransferCase) -> dict[str, Floats]:
