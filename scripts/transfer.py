@@ -1,7 +1,7 @@
 """Learn and tune on identified models, fly on the ships behind their trials.
 
-`python scripts/transfer.py [TASK ...] --out transfer/`: 5 training runs each, resumed where they were left. The
-measurements of KVLCC2 lie beside the checkout; without them she is not flown as measured.
+`python scripts/transfer.py [TASK ...] --out transfer/`: 5 training runs each, resumed where they were left.
+The measurements of KVLCC2 lie beside the checkout; without them she is not flown as measured.
 """
 
 from __future__ import annotations
@@ -34,7 +34,13 @@ def measured(data: Path) -> dict[str, ShipModel]:
 def table(result: Transfer) -> str:
     """Costs of one case as Markdown: contestants down, ships across."""
     ships = list(result.case.ships)
-    head = ["learned or tuned in", *(f"cost, {ship}" for ship in ships), "gain, identified", "gain, reference", "kept"]
+    head = [
+        "learned or tuned in",
+        *(f"cost, {ship}" for ship in ships),
+        "gain, identified",
+        "gain, reference",
+        "kept",
+    ]
     rows = [head, ["---"] * len(head)]
     for who in result.costs:
         costs = [result.cost(who, ship) for ship in ships]
@@ -52,13 +58,15 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "transfer")
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--runs", type=int, default=N_RUNS)
+    parser.add_argument("--total-steps", type=int, default=1_000_000, help="of each training run")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     for task in options.tasks or CASES:
         others = measured(options.data) if task.startswith("kvlcc2") else {}
         with progress_bars(True) as progress:
             result = transfer(
-                transfer_case(task, others), options.out, n_runs=options.runs, workers=options.workers,
+                transfer_case(task, others), options.out, n_runs=options.runs,
+                settings={"total_steps": options.total_steps}, workers=options.workers,
                 progress=lambda done, total, task=task: progress(task, done, total),
             )  # fmt: skip
         save_transfer(result, options.out / f"{task}.json")

@@ -1,14 +1,14 @@
-"""Transfer: autopilots learned and tuned on an identified model, flown on the ship that it was identified from.
+"""Transfer: autopilots learned and tuned on an identified model, flown on the ship behind its trials.
 
 A task of the suite is taken as it is but for the ship. Contestants know what can be known of her:
 
-    tuned          the classical controllers, settings found by direct search on the identified model
+    tuned          the best classical controller, settings found by direct search on the identified model
     identified     learned in the identified model
     posterior      learned in models drawn from its covariance, a new one each episode
     reference      learned in the ship behind the trials herself: what knowing her would have brought
 
-and all fly, in the same episodes, on the identified model, on the ship behind its trials and, where there is one, on
-a model of the same ship identified from measurements.
+and all fly, in the same episodes, on the identified model, on the ship behind its trials and, where there is
+one, on a model of the same ship identified from measurements.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Transfer:
         return self._paired(ship, contestant, lambda own, known: own / known - 1.0, REFERENCE)
 
     def gain(self, contestant: str, ship: str) -> Interval:
-        """How much less a contestant costs than the tuned classical one on the same ship, as a part of that."""
+        """How much less a contestant costs than the tuned classical one on the same ship, a part of that."""
         return self._paired(ship, contestant, lambda own, tuned: 1.0 - own / tuned, TUNED)
 
     def gain_kept(self, contestant: str, ship: str = REFERENCE) -> float:
@@ -111,15 +111,11 @@ class Transfer:
         there = self.gain(contestant, IDENTIFIED).value
         return self.gain(contestant, ship).value / there if there > 0.0 else np.nan
 
-    def _paired(
-        self, ship: str, contestant: str, compare: Callable[[Any, Any], Any], other: str
-    ) -> Interval:
+    def _paired(self, ship: str, contestant: str, compare: Callable[[Any, Any], Any], other: str) -> Interval:
         """A comparison of mean costs of two contestants in the same episodes."""
         own, against = self.costs[contestant][ship], self.costs[other][ship]
         draws = Draws(1, own.shape[1])
-        drawn = [
-            draws.means(costs, 0, who).mean(axis=1) for who, costs in enumerate((own, against))
-        ]
+        drawn = [draws.means(costs, 0, who).mean(axis=1) for who, costs in enumerate((own, against))]
         return interval(float(compare(own.mean(), against.mean())), compare(*drawn))
 
 
