@@ -7,7 +7,7 @@ The measurements of KVLCC2 lie beside the checkout; without them she is not flow
 from __future__ import annotations
 
 import argparse
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 from agents.benchmarking.transfer import CASES, N_RUNS, Transfer, save_transfer, transfer, transfer_case
@@ -62,12 +62,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     for task in options.tasks or CASES:
-        others = measured(options.data) if task.startswith("kvlcc2") else {}
-        with progress_bars(True) as progress:
+        with progress_bars(True) as bars:
+            tell = None if bars is None else partial(bars, task)
+            case = transfer_case(task, measured(options.data) if task.startswith("kvlcc2") else {})
             result = transfer(
-                transfer_case(task, others), options.out, n_runs=options.runs,
-                settings={"total_steps": options.total_steps}, workers=options.workers,
-                progress=lambda done, total, task=task: progress(task, done, total),
+                case, options.out, n_runs=options.runs, settings={"total_steps": options.total_steps},
+                workers=options.workers, progress=tell,
             )  # fmt: skip
         save_transfer(result, options.out / f"{task}.json")
         print(f"## {task}\n\n{table(result)}\n", flush=True)
