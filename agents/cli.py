@@ -39,6 +39,7 @@ from agents.command import (
 from agents.identification_commands import advise_command, identify_command, reduce_command
 from agents.learning_commands import train_command
 from agents.policy_commands import export_command
+from agents.tuning_commands import tune_command
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult
@@ -75,6 +76,7 @@ app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
+app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)
 
 

@@ -68,13 +68,14 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        from agents.engines import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
             command(*args, **kwargs)
         except InputError as error:
             fail(str(error), WRONG_INPUT)
-        except (ManoeuvreError, UnstableModelError) as error:
+        except (ManoeuvreError, UnstableModelError, WorkerDiedError) as error:
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)

@@ -39,7 +39,11 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THRE
 
 
 class JobError(RuntimeError):
-    """A job that failed for another reason than wrong input, or whose worker died again and again."""
+    """A job that failed for another reason than wrong input."""
+
+
+class WorkerDiedError(JobError):
+    """A job whose worker died again and again."""
 
 
 def run_jobs(
@@ -90,7 +94,9 @@ def run_jobs(
         For wrong arguments; for a cluster that does not answer within 10 s; or, naming the job, if it
         says that its input is wrong.
     JobError
-        Naming the job, if it raises anything else or its worker dies more often than `retries`.
+        Naming the job, if it raises anything else.
+    WorkerDiedError
+        Naming the job, if its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
     check_whole(retries, "retries", at_least=0)
@@ -145,9 +151,9 @@ def do_job(function: JobFunction, text: str) -> dict[str, Any]:
         return {"failed": f"{type(error).__name__}: {error}", "traceback": traceback.format_exc()}
 
 
-def died_too_often(text: str, retries: int) -> JobError:
+def died_too_often(text: str, retries: int) -> WorkerDiedError:
     """The error of a job whose worker dies whenever it is done."""
-    return JobError(
+    return WorkerDiedError(
         f"job {shortened(text)}: its worker died {retries + 1} times. It was killed, perhaps for want of "
         f"memory (try fewer workers), or the job crashes; a script that starts workers needs "
         f"`if __name__ == '__main__':`"

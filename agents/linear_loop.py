@@ -290,15 +290,19 @@ def _crossing(omega: Floats, size: Floats) -> float:
 
 def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tuple[Complexes, Complexes]:
     """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
-    import control
-
     z = np.exp(1j * omega * ship.dt)
-    n = len(SIGNALS)
-    motions = control.ss(ship.A, ship.B, np.eye(n), 0.0, ship.dt)(z)[:, 0]
+    motions = _resolved(ship.A, ship.B, z)[:, :, 0].T
     c = compensator
-    orders = control.ss(c.A, c.B, c.C, c.D, ship.dt)(z)[0] if len(c.A) else np.tile(c.D.T, len(z))
+    orders = (c.C @ _resolved(c.A, c.B, z) + c.D)[:, 0].T if len(c.A) else np.tile(c.D.T, len(z))
     of_rudder = orders[RUDDER] * motions[RUDDER]
     of_motions = (orders * motions).sum(axis=0) - of_rudder
     set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
     following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
     return -of_motions / (1.0 - of_rudder), following
+
+
+def _resolved(A: Floats, B: Floats, z: Complexes) -> Complexes:
+    """(z I - A)^-1 B at all z, shape (n_z, ...) as B."""
+    shifted = z[:, None, None] * np.eye(len(A)) - A
+    found = np.linalg.solve(shifted, np.broadcast_to(B.astype(np.complex128), (len(z), *B.shape)))
+    return found.astype(np.complex128)

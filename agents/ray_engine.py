@@ -38,7 +38,7 @@ def on_ray(
     ------
     InputError
         If ray is not installed, or there is no cluster at the address.
-    JobError
+    WorkerDiedError
         If the worker of a job dies more often than `retries`.
     """
     with _connected(workers, address) as ray:

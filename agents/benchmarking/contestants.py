@@ -4,6 +4,8 @@ A contestant is named on the command line as
 
     pid                        a classical controller, designed for each task's ship with `from_model`
     tuned-pid                  the same with the settings that direct search found for each task of the suite
+    tuned-best                 of these the one that costs least in each task
+    oracle                     what a task leaves to gain: the costs that are kept with the suite
     ppo                        the pretrained agents of `agents/pretrained`
     runs/agent.json            a file of an agent or controller
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
@@ -244,6 +246,8 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if source in CLASSICAL:
         return [designed(source, task)]
     if source.startswith(TUNED):
+        from agents.benchmarking.direct_search import tuned
+
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)
@@ -312,11 +316,6 @@ class _Ship:
 
     def __hash__(self) -> int:
         return hash(model_hash(self.model))
-
-
-def tuned(kind: str, task: BenchmarkTask, suite: str) -> Policy:
-    """A classical controller with the settings found by direct search."""
-    raise InputError(f"there are no tuned settings of suite '{suite}'")
 
 
 def file_hash(path: str | Path) -> str:

@@ -22,6 +22,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -181,6 +182,11 @@ def suite_hash(name: str = DEFAULT_SUITE) -> str:
         For an unknown name.
     """
     return hashlib.sha256(_suite_text(name).encode()).hexdigest()
+
+
+def suite_file(name: str, what: str) -> Path:
+    """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
+    return Path(str(files("agents").joinpath("suites", f"{name}-{what}.json")))
 
 
 def _suite_text(name: str) -> str:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +20,7 @@ from agents.benchmarking.statistics import (
     performance_profile,
     score,
 )
-from agents.benchmarking.suite import BenchmarkTask
+from agents.benchmarking.suite import BenchmarkTask, suite_file
 from shipgym.checks import check_number, check_table
 from shipgym.json_file import read_json
 
@@ -46,7 +44,7 @@ def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
     InputError
         Naming the field of the file at fault.
     """
-    path = Path(str(files("agents").joinpath("suites", f"{suite}-reference.json")))
+    path = suite_file(suite, "reference")
     if not path.exists():
         return {}
     found = {}

@@ -39,7 +39,7 @@ def main() -> None:
     """Train for some iterations, then fly the same 100 episodes as LQ."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="mariner", help="name of a shipped model, or a model file")
-    parser.add_argument("--iterations", type=int, default=30)
+    parser.add_argument("--iterations", type=int, default=12)
     parser.add_argument("--runners", type=int, default=0, help="processes that sail; 0: this one")
     options = parser.parse_args()
     logging.getLogger("ray").setLevel(logging.ERROR)
@@ -63,7 +63,7 @@ def main() -> None:
     for iteration in range(1, options.iterations + 1):
         found = algorithm.train()["env_runners"]
         episode = found.get("episode_return_mean")
-        told = "none over yet" if episode is None else f"{episode:.2f}"
+        told = "of no episode" if episode is None or np.isnan(episode) else f"{episode:.2f}"
         print(
             f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f} steps, mean return {told}",
             flush=True,

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.engines import JobError, run_jobs
+from agents.engines import JobError, WorkerDiedError, run_jobs
 from agents.job_text import pack, unpack
 from agents.ray_engine import check_answers
 from shipgym.errors import InputError
@@ -106,7 +106,7 @@ def test_job_that_always_kills_its_worker_is_named_and_the_others_are_kept(funct
     mark = tmp_path / "mark"
     mark.touch()
     jobs = [{"k": k, "mark": str(mark), "deaths": 99} for k in range(2)]
-    with pytest.raises(JobError, match=r'job \{"k": 1, .*its worker died 2 times'):
+    with pytest.raises(WorkerDiedError, match=r'job \{"k": 1, .*its worker died 2 times'):
         run_jobs(functions.dies_at_first, jobs, workers=2, retries=1, keep=tmp_path / "kept")
     mark.write_text("x" * 99)
     assert run_jobs(functions.dies_at_first, jobs, workers=1, keep=tmp_path / "kept") == [0, 1]
@@ -129,7 +129,7 @@ def test_wrong_input_of_a_job_is_told_with_the_job(functions, tmp_path):
     jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
     with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'):
         run_jobs(functions.logged, jobs)
-    with pytest.raises(JobError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
+    with pytest.raises(WorkerDiedError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
         run_jobs(functions.divides, [{"k": 1}, {"k": 0}])
     assert "return 1 / job" in caught.value.__notes__[0]
 
