@@ -3,9 +3,9 @@
 A task of the suite is taken as it is but for the ship. Contestants know what can be known of her:
 
     tuned          the best classical controller, settings found by direct search on the identified model
-    identified     learned in the identified model
-    posterior      learned in models drawn from its covariance, a new one each episode
-    reference      learned in the ship behind the trials herself: what knowing her would have brought
+    identified     learned in the identified model, added to the controller tuned there
+    posterior      the same, learned in models drawn from its covariance, a new one each episode
+    reference      tuned and learned on the ship behind the trials: what knowing her would have brought
 
 and all fly, in the same episodes, on the identified model, on the ship behind its trials and, where there is
 one, on a model of the same ship identified from measurements.
@@ -25,7 +25,7 @@ from agents.benchmarking.direct_search import tune, tuned_controller
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.controller import Policy
+from agents.controller import Controller, Policy
 from agents.engines import run_jobs
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
@@ -160,10 +160,16 @@ def transfer(
     """
     check_whole(n_runs, "n_runs", at_least=1)
     folder = Path(out)
+    tuned = _tuned(case, folder, engine, workers)
+    file = folder / f"{case.task.name}-tuned.json"
+    tuned.save(file)
+    own = {learner: {"base": str(file), **(settings or {})} for learner in learners}
+    if REFERENCE in own:  # who knows the ship tunes on her
+        own[REFERENCE] |= {"base": "tuned"}
     jobs = [
         {
-            **_identity(case), "learner": learner, "seed": seed,
-            "settings": dict(settings or {}), "out": str(folder / f"{case.task.name}-{learner}-{seed}"),
+            **_identity(case), "learner": learner, "seed": seed, "settings": own[learner],
+            "out": str(folder / f"{case.task.name}-{learner}-{seed}"),
         }
         for learner in learners
         for seed in range(n_runs)
@@ -171,11 +177,7 @@ def transfer(
     files = run_jobs(learn, jobs, engine=engine, workers=workers, keep=folder / "jobs", progress=progress)
     from agents.controller_file import load_agent
 
-    searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
-    settled = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
-    best = min(settled, key=lambda result: result["cost"])
-    controller = tuned_controller(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
-    found: dict[str, dict[str, Floats]] = {TUNED: _flown([controller], case)}
+    found: dict[str, dict[str, Floats]] = {TUNED: _flown([tuned], case)}
     for k, learner in enumerate(learners):
         runs = files[k * n_runs : (k + 1) * n_runs]
         found[learner] = _flown([load_agent(file) for file in runs], case)
@@ -194,6 +196,14 @@ def learn(job: dict[str, Any]) -> str:
     folder = Path(job["out"])
     train(Plan("ppo", task, settings, seed=job["seed"]), folder, resume=folder.exists())
     return str(folder / "agent.json")
+
+
+def _tuned(case: TransferCase, folder: Path, engine: str, workers: int) -> Controller:
+    """The best classical controller on the identified model."""
+    searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
+    found = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
+    best = min(found, key=lambda result: float(result["cost"]))
+    return tuned_controller(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
 
 
 def tune_one(job: dict[str, Any]) -> dict[str, Any]:
