@@ -24,9 +24,11 @@ from shipgym.errors import InputError
 SCHEDULES = ("constant", "linear")
 RUNNING, LEARNED = "running", "learned"
 ACTIVATIONS = ("relu", "tanh")
-#: Classical controllers that a policy may add to, by name; a path that ends in .json is a controller's file.
+#: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
+#: task, and a path that ends in .json is a controller's file.
 BASES = (
-    "none", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos", "alos",
+    "none", "tuned", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos",
+    "alos",
 )  # fmt: skip
 
 
