@@ -107,6 +107,40 @@ def fly_task(
     return Flown(metrics(recording), numbers, failure, spent / max(asked, 1), recording)
 
 
+def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
+    """Cost of each episode: minus the sum of its rewards.
+
+    Parameters
+    ----------
+    policy : Policy
+        Anything with `predict`; it is given the observations of all ships together.
+    engine : Engine
+        With a lane for each seed.
+    seeds : int array of shape (n,)
+
+    Returns
+    -------
+    array of shape (n,)
+
+    Raises
+    ------
+    InputError
+        If the policy answers with something that is not a finite command for each ship.
+    """
+    observations = engine.reset(seeds)
+    total, sailing = np.zeros(len(seeds)), np.ones(len(seeds), dtype=np.bool_)
+    starts, state = sailing.copy(), None
+    while sailing.any():
+        actions, state = policy.predict(observations, state, starts, True)
+        commands = np.array(actions, dtype=np.float32)
+        commands[~sailing] = 0.0  # of no effect any more
+        observations, rewards, terminated, truncated = engine.step(commands)
+        total += rewards
+        sailing &= ~(terminated | truncated)
+        starts[:] = False
+    return -total
+
+
 def commands(actions: Any, engine: Engine, sailing: Flags) -> tuple[NDArray[np.float32], Flags, str]:
     """What is commanded, of which of the ships that sail it is no command, and why.
 
