@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import benchmark
-from agents.benchmarking.contestants import designed
+from agents import PID, benchmark
 from agents.benchmarking.page import command, write_page
 from agents.benchmarking.page_figures import COLOURS
 from agents.benchmarking.page_replays import (
@@ -112,7 +111,7 @@ def test_what_is_flown_again_costs_the_same(result):
 
 def test_an_episode_flown_again_is_that_of_the_single_environment():
     task = load_suite().task("mariner-calm")
-    pilot = designed("pid", task)
+    pilot = PID.from_model(task.ship, dt=task.task.interval(task.ship))
     (flown,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
     env = gymnasium.make(flown.environment, **flown.arguments).unwrapped
     observation, _ = env.reset(seed=FIRST)
@@ -131,8 +130,18 @@ def test_an_episode_flown_again_is_that_of_the_single_environment():
 
 def test_the_last_interval_is_filled_up():
     task = load_suite().task("mariner-current")
-    (whole,), _ = recorded(designed("pid", task), task, [FIRST], samples=task.task.episode_steps)
-    (flown,), _ = recorded(designed("pid", task), task, [FIRST], samples=-(-task.task.episode_steps // 7))
+    (whole,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=task.task.episode_steps,
+    )
+    (flown,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=-(-task.task.episode_steps // 7),
+    )
     assert whole.success
     assert whole.n_steps < task.task.episode_steps
     assert flown.n_steps == -(-whole.n_steps // 7)
