@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,7 +56,6 @@ def fly_task(
     task: BenchmarkTask,
     seeds: ArrayLike | None = None,
     model: ShipModel | None = None,
-    watch: Callable[[Engine], None] | None = None,
 ) -> Flown:
     """Fly the episodes of a task, all at once.
 
@@ -74,8 +72,6 @@ def fly_task(
         By default those that are scored.
     model : ShipModel, optional
         Another ship than the task's own.
-    watch : callable, optional
-        Shown the engine at the beginning and after each interval.
 
     Returns
     -------
@@ -87,8 +83,6 @@ def fly_task(
     log = _Log(engine)
     observations, state = engine.reset(numbers), None
     log.begin()
-    watched = watch or (lambda _: None)
-    watched(engine)
     starts = np.ones(len(numbers), dtype=np.bool_)
     spent, asked, failure = 0.0, 0, ""
     while log.sailing.any():
@@ -108,7 +102,6 @@ def fly_task(
                 break
         observations, _, terminated, truncated = engine.step(command)
         log.note(_shielded(state, len(numbers)), terminated, truncated)
-        watched(engine)
         starts = np.zeros(len(numbers), dtype=np.bool_)
     recording = log.recording()
     return Flown(metrics(recording), numbers, failure, spent / max(asked, 1), recording)
