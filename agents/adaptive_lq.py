@@ -9,19 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.linear_loop import SIGNALS, SampledShip, length_time, rate_weight, sample_steering
-from agents.lq import LQ, lq_gain
+from agents.batched_lq import lq_rows, sampled_ships
+from agents.linear_loop import SIGNALS, length_time, rate_weight
+from agents.lq import LQ
 from agents.stateful import Flags, Stateful, heading_error
 from identification.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
-from shipgym.models.linear import LARGEST_RUDDER, StraightRunning, linearise, straight_running
+from shipgym.models.linear import LARGEST_RUDDER, linearise, straight_running
 from shipgym.simulation.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
@@ -160,8 +162,9 @@ class AdaptiveLQ(Stateful):
         self._learn(kept, now, begins, self._at_rest(kept, now, begins))
         kept[:, LAST] = now
         kept[:, STEP] += 1.0
-        for ship in np.flatnonzero(kept[:, STEP] % self.design["redesign_steps"] == 0.0):
-            self._redesign(kept[ship])
+        due = np.flatnonzero(kept[:, STEP] % self.design["redesign_steps"] == 0.0)
+        if len(due):
+            kept[due] = self._redesigned(kept[due])
         rudder, sway = kept[:, NEUTRAL].T
         signals = (
             seen["sway"] - sway,
@@ -258,40 +261,49 @@ class AdaptiveLQ(Stateful):
 
         Parameters
         ----------
-        state : array of shape (memory_size,)
+        state : array of shape (memory_size,) or (n, memory_size)
 
         Returns
         -------
-        array of shape (2, 4)
+        array of shape (2, 4) or (n, 2, 4)
             As `prior`.
         """
-        scaled = np.asarray(state)[THETA].reshape(N_EQUATIONS, N_TERMS)
+        estimate = np.asarray(state)[..., THETA]
+        scaled = estimate.reshape(*estimate.shape[:-1], N_EQUATIONS, N_TERMS)
         found: Floats = scaled * self.error_size[:, None] / SIZES
         return found
 
-    def _redesign(self, kept: Floats) -> None:
-        """Put new gains and a new neutral rudder into what is remembered, if they can be believed."""
+    def _redesigned(self, kept: Floats) -> Floats:
+        """What is remembered, with new gains and a new neutral rudder where they can be believed."""
+        new = kept.copy()
         prime = self.coefficients(kept)
-        share = prime[1, 2] / self.prior[1, 2]
-        if not 1.0 / WIDEST < share < WIDEST:
-            return
-        si = units(self.design["length"], self.design["speed"])
-        try:
-            sway, rudder = np.linalg.solve((prime * si)[:, [0, 2]], -(prime * si)[:, 3])
-            ships = [self._sampled(one * si) for one in (prime, self.prior)]
-            row = -lq_gain(ships[0], self.design["rate_weight_s2"], self.design["integral_time"])
-        except (np.linalg.LinAlgError, ValueError):  # control raises them where no stable loop is found
-            return
-        poles = [np.abs(np.linalg.eigvals(ship.A + ship.B @ row[None])).max() for ship in ships]
-        if not (max(poles) < 1.0 and np.isfinite(row).all() and abs(rudder) < LARGEST_RUDDER):
-            return
-        kept[GAINS], kept[NEUTRAL] = row, (rudder, sway)
+        share = prime[:, 1, 2] / self.prior[1, 2]
+        linear = prime * units(self.design["length"], self.design["speed"])
+        at_rest = linear[:, :, [0, 2]]
+        solvable = (share > 1.0 / WIDEST) & (share < WIDEST) & (np.linalg.det(at_rest) != 0.0)
+        which = np.flatnonzero(solvable)
+        neutral = np.linalg.solve(at_rest[which], -linear[which, :, 3:])[:, ::-1, 0]  # rudder, sway
+        A, B = sampled_ships(linear[which, :, :3], self.design["gear_lag"], self.design["dt"])
+        weights = self.design["rate_weight_s2"], self.design["integral_time"]
+        rows = lq_rows(A, B, self.design["dt"], *weights)
+        good = np.isfinite(rows).all(axis=1) & (np.abs(neutral[:, 0]) < LARGEST_RUDDER)
+        which, neutral, rows, A, B = which[good], neutral[good], rows[good], A[good], B[good]
+        good = _stable(A, B, rows) & _stable(*self._believed, rows)
+        new[which[good], GAINS], new[which[good], NEUTRAL] = rows[good], neutral[good]
+        return new
 
-    def _sampled(self, linear: Floats) -> SampledShip:
-        """The ship of linear coefficients in SI units."""
-        about = StraightRunning(self.design["speed"], 0.0, 0.0)
-        lag, dt = self.design["gear_lag"], self.design["dt"]
-        return sample_steering(linear[:, :2], linear[:, 2:3], lag, dt, about)
+    @cached_property
+    def _believed(self) -> tuple[Floats, Floats]:
+        """The ship of the model, sampled."""
+        linear = self.prior * units(self.design["length"], self.design["speed"])
+        return sampled_ships(linear[None, :, :3], self.design["gear_lag"], self.design["dt"])
+
+
+def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:
+    """Whether ships are held by feedback rows, shape (n,)."""
+    poles = np.linalg.eigvals(A + B[:, :, None] * rows[:, None, :])
+    held: Flags = np.abs(poles).max(axis=1, initial=0.0) < 1.0
+    return held
 
 
 def units(length: float, speed: float) -> Floats:

@@ -1,8 +1,8 @@
-"""The whole chain: recorded trials in; a model, its certainty, two verified autopilots and a report out."""
+"""The whole chain: recorded trials in; a model, its certainty, verified autopilots and a report out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,19 +11,20 @@ from numpy.typing import NDArray
 
 from agents.autopilot_result import STEP_DEG, AutopilotResult, Pilot, Verification
 from agents.identifying import identification_settings, identify_trials, trials_of
+from agents.monte_carlo import HERE, Engine, monte_carlo
 from agents.output import check_folder, whole_folder
-from agents.spread import manoeuvre_spread
 from identification.concerns import why_unstable
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel
-from shipgym.models.linear import is_course_stable, nomoto
+from shipgym.models.linear import nomoto
 from shipgym.plots import graph_objects
 from shipgym.ship_file import ShipFile
 
 if TYPE_CHECKING:
     from agents.controller import Controller
+    from agents.controller_file import Agent
 
 Floats = NDArray[np.float64]
 
@@ -41,7 +42,9 @@ def build_autopilot(
     draws: int = 200,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
+    where: Engine = HERE,
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
@@ -60,8 +63,12 @@ def build_autopilot(
         Of the draws and of the episodes flown.
     options : mapping, optional
         Of `identify`, by name, trials by file; those not given are the ship file's.
+    agents : sequence of str or Path
+        Files of autopilots to fly beside PID and LQ, or names of pretrained ones (`load_agent`).
     progress : callable, optional
         Called as the work goes on.
+    where : Engine
+        Where the models drawn are worked on; the results are the same.
 
     Returns
     -------
@@ -72,21 +79,32 @@ def build_autopilot(
     InputError
         For anything wrong with the files or arguments; nothing is written then.
     """
+    from agents.controller import Controller
     from agents.report import write_report
 
     folder = Path(out)
+    where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
-    result = examine(ship_file, draws=int(draws), seed=int(seed), options=options, progress=progress)
+    result = examine(
+        ship_file,
+        draws=int(draws),
+        seed=int(seed),
+        options=options,
+        agents=agents,
+        progress=progress,
+        where=where,
+    )
     with whole_folder(folder, FILES) as draft:
         _tell(progress, "writing the report", 0, 1)
         write_json(result.metrics, draft / "metrics.json")
         if result.verification is not None:
             result.model.save(draft / "model.json")
             for pilot in result.verification.pilots:
-                pilot.controller.save(draft / f"{pilot.controller.name}.json")
+                if isinstance(pilot.controller, Controller):  # the others are files already
+                    pilot.controller.save(draft / f"{pilot.controller.name}.json")
         write_report(result, draft / "report.html")
         _tell(progress, "writing the report", 1, 1)
     return result
@@ -98,11 +116,16 @@ def examine(
     draws: int = 200,
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
+    where: Engine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
+    from agents.controller_file import load_agent
+
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
+    guests = [load_agent(agent) for agent in agents]
     trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
     _tell(progress, "reading trials", 1, 1)
     _tell(progress, "identifying", 0, 1)
@@ -111,15 +134,24 @@ def examine(
     instability = why_unstable(identification)
     verification = None
     if instability is None:
+        for guest in guests:
+            guest.check_fits_model(identification.model)
         try:
-            verification = verify(identification.model, draws, seed, progress)
+            verification = verify(identification.model, draws, seed, progress, where, guests)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     return AutopilotResult(ship, identification.trials, identification, instability, verification)
 
 
-def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = None) -> Verification:
-    """Design both autopilots on a model and fly them over models drawn from its covariance.
+def verify(
+    model: ShipModel,
+    draws: int,
+    seed: int,
+    progress: Progress | None = None,
+    where: Engine = HERE,
+    guests: Sequence[Agent] = (),
+) -> Verification:
+    """Design PID and LQ on a model and fly them, and guests, over models drawn from its covariance.
 
     Parameters
     ----------
@@ -129,6 +161,10 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
         See `build_autopilot`.
     progress : callable, optional
         Called as the work goes on.
+    where : Engine
+        Where the draws are worked on; the results are the same.
+    guests : sequence of Controller, LearnedPolicy or Shielded
+        Further autopilots.
 
     Returns
     -------
@@ -141,54 +177,61 @@ def verify(model: ShipModel, draws: int, seed: int, progress: Progress | None = 
     InputError
         If no autopilot can be designed on it.
     """
-    from agents.lq import LQ
-    from agents.pid import PID
+    from agents.flight import fly, step_response
 
-    drawn = model.sample(draws, seed)
-    stage = "manoeuvres of the models drawn"
+    stage = "models drawn"
     _tell(progress, stage, 0, draws)
-    manoeuvres = manoeuvre_spread(model, drawn, lambda done: _tell(progress, stage, done, draws))
-    stable = [draw for draw, lost in zip(drawn, manoeuvres.unstable, strict=True) if not lost]
-    pilots, refused = [], {}
-    designs: tuple[Any, ...] = (PID, LQ)
-    for k, design in enumerate(designs):
-        _tell(progress, "flying the autopilots", k, len(designs))
-        try:
-            controller = design.from_model(model)
-        except InputError as error:  # this design does not suit the ship; another may
-            refused[design.kind] = str(error)
-            continue
-        pilots.append(_fly(controller, model, drawn, stable, seed))
-    if not pilots:
-        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
-    _tell(progress, "flying the autopilots", len(designs), len(designs))
+    controllers, refused = _designed(model)
+    found = monte_carlo(
+        controllers,
+        model,
+        draws,
+        seed,
+        where=where,
+        progress=lambda done: _tell(progress, stage, done, draws),
+    )
+    seeds = seed + np.arange(draws)
+    flights = [*found.flights, *(fly(guest, found.draws, seeds=seeds) for guest in guests)]
+    lost = found.manoeuvres.unstable
+    stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
+    pilots, flown = [], [*controllers, *guests]
+    for k, (controller, flight) in enumerate(zip(flown, flights, strict=True)):
+        _tell(progress, "step responses", k, len(flown))
+        pilots.append(Pilot(controller, flight, step_response(controller, [model, *stable], STEP_DEG)))
+    _tell(progress, "step responses", len(flown), len(flown))
     return Verification(
         draws=draws,
         seed=seed,
-        manoeuvres=manoeuvres,
-        course_unstable=np.array([not _holds_course(draw) for draw in drawn]),
+        manoeuvres=found.manoeuvres,
+        course_unstable=found.course_unstable,
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
         refused=refused,
     )
 
 
-def _fly(
-    controller: Controller, model: ShipModel, drawn: list[ShipModel], stable: list[ShipModel], seed: int
-) -> Pilot:
-    """Episodes on all models drawn, and the step response of the identified and the stable ones."""
-    from agents.flight import fly, step_response
+def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
+    """The autopilots, and why others could not be designed.
 
-    seeds = np.arange(len(drawn)) + seed  # the same episodes for every autopilot
-    step = step_response(controller, [model, *stable], STEP_DEG)
-    return Pilot(controller, fly(controller, drawn, seeds=seeds), step)
+    Raises
+    ------
+    InputError
+        If none could.
+    """
+    from agents.lq import LQ
+    from agents.pid import PID
 
-
-def _holds_course(model: ShipModel) -> bool:
-    try:
-        return is_course_stable(model)
-    except InputError:  # there is no straight course at all
-        return False
+    controllers: list[Controller] = []
+    refused: dict[str, str] = {}
+    designs: tuple[Any, ...] = (PID, LQ)
+    for design in designs:
+        try:
+            controllers.append(design.from_model(model))
+        except InputError as error:  # this design does not suit the ship; another may
+            refused[design.kind] = str(error)
+    if not controllers:
+        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
+    return controllers, refused
 
 
 def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.controller import Controller
 from agents.spread import ManoeuvreSpread
 from identification import IdentificationResult
 from shipgym.models import ShipModel
@@ -16,7 +17,7 @@ from shipgym.ship_file import ShipFile
 from shipgym.trial import Trial
 
 if TYPE_CHECKING:
-    from agents.controller import Controller
+    from agents.controller_file import Agent
     from agents.flight import Flights, StepResponses
 
 Floats = NDArray[np.float64]
@@ -30,15 +31,15 @@ class Pilot:
 
     Attributes
     ----------
-    controller : Controller
-        With name, gains and margins.
+    controller : Controller, LearnedPolicy or Shielded
+        With a name, and gains and margins if it is a Controller.
     flights : Flights
         One episode on each model drawn.
     step : StepResponses
         Of the identified model, first, and of the stable models drawn.
     """
 
-    controller: Controller
+    controller: Agent
     flights: Flights
     step: StepResponses
 
@@ -46,6 +47,11 @@ class Pilot:
     def name(self) -> str:
         """Short name, in capitals as the field writes it."""
         return str(self.controller.name).upper()
+
+    @property
+    def design(self) -> Controller | None:
+        """The controller, if it is one that was designed: with gains and margins."""
+        return self.controller if isinstance(self.controller, Controller) else None
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,11 +152,13 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
-    """Margins of one autopilot and its flights over the models drawn."""
-    flights = pilot.flights
+    """Gains and margins of one autopilot, null if it is learned, and its flights over the models drawn."""
+    flights, design = pilot.flights, pilot.design
+    gains = None if design is None else {name: float(value) for name, value in design.gains.items()}
+    margins = None if design is None else {k: _finite(value) for k, value in asdict(design.margins).items()}
     return {
-        "gains": {name: float(value) for name, value in pilot.controller.gains.items()},
-        "margins": {name: _finite(value) for name, value in asdict(pilot.controller.margins).items()},
+        "gains": gains,
+        "margins": margins,
         "cost_mean": float(np.mean(flights.cost)),
         "cost_quantile_95": float(np.quantile(flights.cost, 0.95)),
         "heading_rmse_deg_mean": float(np.mean(flights.heading_rmse_deg)),

@@ -11,8 +11,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from agents.benchmark_commands import benchmark_command
 from agents.command import (
     FAILED,
+    Address,
+    EngineName,
     HoldOut,
     Json,
     Method,
@@ -29,10 +32,14 @@ from agents.command import (
     Structure,
     Uncertainty,
     Weight,
+    Workers,
     answered,
     fail,
 )
 from agents.identification_commands import advise_command, identify_command, reduce_command
+from agents.learning_commands import train_command
+from agents.policy_commands import export_command
+from agents.tuning_commands import tune_command
 
 if TYPE_CHECKING:
     from agents.autopilot_result import AutopilotResult
@@ -67,6 +74,10 @@ def shipgym_command(
 app.command("identify")(identify_command)
 app.command("advise")(advise_command)
 app.command("reduce")(reduce_command)
+app.command("export")(export_command)
+app.command("train")(train_command)
+app.command("tune")(tune_command)
+app.command("benchmark")(benchmark_command)
 
 
 @app.command("trials")
@@ -146,6 +157,17 @@ def autopilot_command(
     rank: Rank = None,
     weight: Weight = None,
     options: Set = None,
+    agents: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+        ),
+    ] = None,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
     as_json: Json = False,
 ) -> None:
     """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
@@ -155,6 +177,7 @@ def autopilot_command(
     """
     from agents.autopilot import build_autopilot
     from agents.identifying import given_options
+    from agents.monte_carlo import Engine
     from agents.terminal import progress_bars
 
     given = {
@@ -165,7 +188,10 @@ def autopilot_command(
     }  # fmt: skip
     chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
-        result = build_autopilot(ship, out, draws=draws, seed=seed, options=chosen, progress=progress)
+        result = build_autopilot(
+            ship, out, draws=draws, seed=seed, options=chosen, agents=agents or (), progress=progress,
+            where=Engine(engine, workers, address),
+        )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
 
 

@@ -53,6 +53,13 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="OPTION=VALUE", help="Any option of the table [identify]; repeatable."),
 ]
+EngineName = Annotated[
+    str, typer.Option("--engine", help="Where jobs are done: local (this machine) or ray.")
+]
+Workers = Annotated[int, typer.Option(min=1, help="Jobs done at once; the results do not depend on it.")]
+Address = Annotated[
+    str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this machine.")
+]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
 
 
@@ -61,13 +68,14 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+        from agents.engines import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
             command(*args, **kwargs)
         except InputError as error:
             fail(str(error), WRONG_INPUT)
-        except (ManoeuvreError, UnstableModelError) as error:
+        except (ManoeuvreError, UnstableModelError, WorkerDiedError) as error:
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)

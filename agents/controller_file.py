@@ -22,16 +22,30 @@ from collections.abc import Mapping
 from dataclasses import asdict, fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from agents.controller import Controller, check_names
 from agents.linear_loop import Margins
-from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    did_you_mean,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 from shipgym.models import ShipModel
+
+if TYPE_CHECKING:
+    from agents.policy import LearnedPolicy
+    from agents.shield import Shielded
+
+    Agent: TypeAlias = Controller | LearnedPolicy | Shielded
 
 FORMAT = 1
 REMEDY = "design the controller again or take another copy"
@@ -40,6 +54,8 @@ FIELDS = (
     "model", "margins", "design",
 )  # fmt: skip
 MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
+PRETRAINED = Path(__file__).parent / "pretrained"
+POLICIES = ("learned", "shielded")  # whose files are described in `agents.policy_file`
 HOMES = {
     "pid": ("agents.pid", "PID"),
     "pid-filtered": ("agents.filtered_pid", "FilteredPID"),
@@ -87,18 +103,19 @@ def controller_content(controller: Controller) -> dict[str, Any]:
     return content
 
 
-def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
-    """Read a controller file.
+def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
+    """Read the file of a controller, a learned policy or a shielded one; none needs torch.
 
     Parameters
     ----------
     path : str or Path
+        A file, or the name of a pretrained agent, `mariner-calm-ppo` (`list_pretrained`).
     model : ShipModel, optional
         The ship it shall steer; one with other observation scales is refused.
 
     Returns
     -------
-    Controller
+    Controller, LearnedPolicy or Shielded
         Of the kind that was saved.
 
     Raises
@@ -106,21 +123,64 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Controller:
     InputError
         Naming the file and the field at fault, or the difference to the model.
     """
-    where = str(path)
-    controller = _controller(read_json(Path(path), "controller file", REMEDY), where)
+    file, where = find_agent(path), str(path)
+    content = read_json(file, "controller file", REMEDY)
+    agent: Agent
+    if content.get("kind") in POLICIES:
+        from agents.policy_file import read_policy
+
+        agent = read_policy(content, file)
+    else:
+        agent = read_controller(content, where)
     if model is not None:
-        controller.check_fits_model(model)
-    return controller
+        agent.check_fits_model(model)
+    return agent
 
 
-def _controller(content: Mapping[str, Any], where: str) -> Controller:
+def list_pretrained() -> list[str]:
+    """Names of the agents that come with the package: task of the suite and algorithm."""
+    return sorted(file.stem for file in PRETRAINED.glob("*.json"))
+
+
+def find_agent(name: str | Path) -> Path:
+    """The file of an agent: as given, or of the pretrained agent of that name.
+
+    Raises
+    ------
+    InputError
+        If it is neither, with the nearest pretrained name.
+    """
+    given = Path(name)
+    if given.suffix == ".json" or given.exists():
+        return given
+    known = list_pretrained()
+    if str(name) not in known:
+        raise InputError(
+            f"agent: '{name}' found, expected a file, or a pretrained agent: {quoted(known)}."
+            f"{did_you_mean(str(name), known)}"
+        )
+    return PRETRAINED / f"{name}.json"
+
+
+def read_controller(content: Mapping[str, Any], where: str) -> Controller:
+    """A classical controller from what `controller_content` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if "format" in content and content["format"] != FORMAT:
         raise InputError(
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
+    if "kind" in content:
+        kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
+        if kind in POLICIES:
+            raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(HOMES)}")
     check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
-    home, name = HOMES[check_choice(content["kind"], HOMES, f"{where}: kind")]
+    home, name = HOMES[content["kind"]]
     design: type[Controller] = getattr(import_module(home), name)
     has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
     expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
@@ -131,7 +191,7 @@ def _controller(content: Mapping[str, Any], where: str) -> Controller:
     _check_observations(content["observation_names"], design.observes, where)
     more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
     if design.has_autopilot:
-        more["autopilot"] = _controller(
+        more["autopilot"] = read_controller(
             check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
         )
     return design(

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controller import Controller, Policy
+from agents.policy import LearnedPolicy
+from agents.shield import Shielded
 from shipgym.checks import check_number
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, CourseKeepingTask, observation_scales
@@ -129,7 +131,7 @@ def fly(
             f"one row for each model"
         )
     lanes = [model for model in fleet for _ in range(numbers[0].size)] if several else fleet
-    _check_fits(controller, lanes[0])
+    _check_fits(controller, lanes[0], task)
     engine = CourseKeepingEngine(lanes, numbers.size, task, allow_unstable=allow_unstable)
     return _flights(_sums(controller, engine, numbers.reshape(-1)), engine.dt, numbers)
 
@@ -238,7 +240,7 @@ def step_response(
     """
     fleet = _fleet(models)
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
-    _check_fits(controller, fleet[0])
+    _check_fits(controller, fleet[0], task)
     length_time = fleet[0].particulars["length"] / fleet[0].particulars["speed"]
     if duration is None:
         duration = STEP_LENGTHS * length_time
@@ -304,10 +306,14 @@ def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
     return fleet
 
 
-def _check_fits(controller: Policy, model: ShipModel) -> None:
-    """A controller that knows its observations must be meant for this ship."""
+def _check_fits(controller: Policy, model: ShipModel, task: CourseKeepingTask | None) -> None:
+    """A controller that knows its observations must be meant for this ship and what is seen of her."""
     if isinstance(controller, Controller):
         controller.check_fits_model(model)
+    elif isinstance(controller, LearnedPolicy | Shielded):
+        shown = (task or CourseKeepingTask()).observed(model)
+        names, scales = [one.name for one in shown], [one.scale for one in shown]
+        controller.check_fits(names, scales, f"model '{model.name}'")
 
 
 def _command(actions: object, n: int, controller: Policy, step: int) -> NDArray[np.float32]:

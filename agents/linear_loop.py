@@ -25,7 +25,7 @@ Complexes = NDArray[np.complex128]
 
 SIGNALS = ("sway", "yaw_rate", "heading_error", "rudder", "heading_error_integral")
 SWAY, YAW_RATE, ERROR, RUDDER, INTEGRAL = range(5)
-FREQUENCIES = 4000  # of the frequency response
+FREQUENCIES = 500  # of the frequency response; splines lie between them
 SLOWEST = 1e-4  # its lowest frequency over the Nyquist frequency
 FULL_RATE_ERROR = np.radians(7.0)  # heading error that costs as much as the rudder moving at full rate
 
@@ -270,27 +270,39 @@ def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) 
     opened, following = _responses(ship, compensator, omega)
     found: Any = control.stability_margins(control.frd(opened, omega), returnall=True)
     gains, phases, _, _, crossings, _ = (np.asarray(values, dtype=float) for values in found)
-    beyond = np.flatnonzero(np.abs(following) < np.sqrt(0.5))
     return Margins(
         gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
         phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
         delay_margin_s=float(min(np.radians(phases % 360.0) / crossings, default=np.inf)),
-        bandwidth_rad_s=float(omega[beyond[0]]) if len(beyond) else float(omega[-1]),
+        bandwidth_rad_s=_crossing(omega, np.abs(following)),
         lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
     )
 
 
+def _crossing(omega: Floats, size: Floats) -> float:
+    """Frequency at which a response first falls to -3 dB, between two samples; the last where it does not."""
+    beyond = np.flatnonzero(size < np.sqrt(0.5))
+    if len(beyond) == 0 or beyond[0] == 0:
+        return float(omega[-1 if len(beyond) == 0 else 0])
+    pair = slice(beyond[0] - 1, beyond[0] + 1)
+    return float(np.exp(np.interp(-np.sqrt(0.5), -size[pair], np.log(omega[pair]))))
+
+
 def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tuple[Complexes, Complexes]:
     """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
-    import control
-
     z = np.exp(1j * omega * ship.dt)
-    n = len(SIGNALS)
-    motions = control.ss(ship.A, ship.B, np.eye(n), 0.0, ship.dt)(z)[:, 0]
+    motions = _resolved(ship.A, ship.B, z)[:, :, 0].T
     c = compensator
-    orders = control.ss(c.A, c.B, c.C, c.D, ship.dt)(z)[0] if len(c.A) else np.tile(c.D.T, len(z))
+    orders = (c.C @ _resolved(c.A, c.B, z) + c.D)[:, 0].T if len(c.A) else np.tile(c.D.T, len(z))
     of_rudder = orders[RUDDER] * motions[RUDDER]
     of_motions = (orders * motions).sum(axis=0) - of_rudder
     set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
     following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
     return -of_motions / (1.0 - of_rudder), following
+
+
+def _resolved(A: Floats, B: Floats, z: Complexes) -> Complexes:
+    """(z I - A)^-1 B at all z, shape (n_z, ...) as B."""
+    shifted = z[:, None, None] * np.eye(len(A)) - A
+    found = np.linalg.solve(shifted, np.broadcast_to(B.astype(np.complex128), (len(z), *B.shape)))
+    return found.astype(np.complex128)

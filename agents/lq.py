@@ -43,7 +43,15 @@ class LQ(Controller):
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {signal: (signal, 1.0) for signal in SIGNALS}
 
     @classmethod
-    def from_model(cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0) -> LQ:
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
+    ) -> LQ:
         """Design on a model, about straight running.
 
         The weights are those of the environment's reward, with that of the rudder rate raised for the
@@ -59,6 +67,10 @@ class LQ(Controller):
             Control interval, s; by default that of the environment.
         integral_lengths : float
             Time for an offset to decay, in times to travel one ship length. The rest follows the cost.
+        rudder_weight : float
+            Weight of the squared rudder beside that of the heading error; by default the environment's.
+        rate_weight_s2 : float, optional
+            Weight of the squared rudder rate, s^2; by default `rate_weight`.
 
         Returns
         -------
@@ -72,22 +84,27 @@ class LQ(Controller):
         check_number(integral_lengths, "integral_lengths", above=0.0)
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         ship = sample_ship(model, interval)
+        check_number(rudder_weight, "rudder_weight", above=0.0)
         weight = rate_weight(model)
+        if rate_weight_s2 is not None:
+            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
         reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
-        gain = lq_gain(reduced, weight, integral_lengths * length_time(model))
+        gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
         return cls.designed(
             model,
             ship,
             gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
             design={
                 "integral_lengths": float(integral_lengths),
-                "rudder_weight": RUDDER_WEIGHT,
+                "rudder_weight": float(rudder_weight),
                 "rate_weight_s2": weight,
             },
         )
 
 
-def lq_gain(ship: SampledShip, rate_weight: float, integral_time: float) -> Floats:
+def lq_gain(
+    ship: SampledShip, rate_weight: float, integral_time: float, rudder_weight: float = RUDDER_WEIGHT
+) -> Floats:
     """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship.
 
     The reward of an interval is on the state at its end, so the cost is that of the outputs
@@ -101,6 +118,8 @@ def lq_gain(ship: SampledShip, rate_weight: float, integral_time: float) -> Floa
         Weight of the rudder rate, s^2.
     integral_time : float
         Time for an offset to decay, s.
+    rudder_weight : float
+        Weight of the rudder; by default the environment's.
 
     Returns
     -------
@@ -108,7 +127,7 @@ def lq_gain(ship: SampledShip, rate_weight: float, integral_time: float) -> Floa
     """
     import control  # here, because it takes a second to import
 
-    weights = np.array([1.0, np.sqrt(RUDDER_WEIGHT), np.sqrt(rate_weight) / ship.dt, 1.0 / integral_time])
+    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / ship.dt, 1.0 / integral_time])
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
     C, D = ship.A[rows], ship.B[rows]
     C[2, RUDDER] -= 1.0

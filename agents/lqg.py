@@ -27,7 +27,7 @@ from agents.linear_loop import (
 from agents.lq import LQ, lq_gain
 from agents.stateful import Flags, Stateful, heading_error
 from shipgym.checks import check_number
-from shipgym.envs.task import control_interval
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.guidance import wrapped
 from shipgym.models import ShipModel
 from shipgym.models.linear import StraightRunning, linearise
@@ -84,6 +84,8 @@ class LQG(Stateful):
         *,
         dt: float | None = None,
         integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
         noise: float = 1.0,
         disturbance_deg: float = 2.0,
         wave_period: float | None = None,
@@ -97,7 +99,7 @@ class LQG(Stateful):
             Stable or unstable on its course.
         dt : float, optional
             Control interval, s; by default that of the environment.
-        integral_lengths : float
+        integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`.
         noise : float
             Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
@@ -123,7 +125,10 @@ class LQG(Stateful):
         check_number(disturbance_deg, "disturbance_deg", above=0.0)
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         ship, weight = sample_ship(model, interval), rate_weight(model)
-        gain = lq_gain(ship, weight, integral_lengths * length_time(model))
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        if rate_weight_s2 is not None:
+            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
+        gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
         transition, effect = rudder_response(model, ship.about, interval)
         push = np.radians(disturbance_deg) * effect
         push[2] = np.hypot(push[2], COURSE_NOISE)

@@ -63,12 +63,32 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
     ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
+    data = json.dumps({"runs": runs, "quantities": quantities(runs)}, allow_nan=False)
+    return player(f"Replay: {ships}", _script_safe(data))
+
+
+def player(title: str, data: str) -> str:
+    """The page about data of runs.
+
+    Parameters
+    ----------
+    title : str
+        Of the window.
+    data : str
+        JSON of `runs` and `quantities` (`agents.replay_series`) as a script element may hold it; or what
+        will be put in its place.
+
+    Returns
+    -------
+    str
+        HTML that loads nothing.
+    """
     return Template(_part("template")).substitute(
-        title=escape(f"Replay: {ships}"),
+        title=escape(title),
         version=escape(shipgym.__version__),
         chart=_part("chart"),
         player=_part("player"),
-        data=_script_safe(json.dumps({"runs": runs, "quantities": quantities(runs)}, allow_nan=False)),
+        data=data,
     )
 
 

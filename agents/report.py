@@ -33,7 +33,7 @@ from shipgym.pages import (
 from shipgym.pages import verdict as box
 
 if TYPE_CHECKING:
-    from agents.autopilot_result import AutopilotResult, Verification
+    from agents.autopilot_result import AutopilotResult, Pilot, Verification
 
 SURE = 0.95  # probability of passing from which on a criterion counts as met
 
@@ -159,8 +159,7 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
             "Best autopilot",
             best.name,
             Html(
-                f"mean cost {number(float(np.mean(best.flights.cost)), 3)}; phase margin "
-                f"{number(best.controller.margins.phase_margin_deg, 2)}°, heading rmse "
+                f"mean cost {number(float(np.mean(best.flights.cost)), 3)}; {_margin(best)}heading rmse "
                 f"{number(float(np.mean(best.flights.heading_rmse_deg)), 2)}°"
             ),
         ),
@@ -171,6 +170,13 @@ def verdict(result: AutopilotResult, found: Verification) -> Html:
         cards(*facts),
         concerns_list(result.identification),
     )
+
+
+def _margin(pilot: Pilot) -> str:
+    """Phase margin of an autopilot that was designed."""
+    if pilot.design is None:
+        return ""
+    return f"phase margin {number(pilot.design.margins.phase_margin_deg, 2)}°, "
 
 
 def imo_card(found: Verification) -> Html:

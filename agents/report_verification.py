@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -126,6 +127,8 @@ def probability(share: float) -> Html:
 def autopilots_section(result: AutopilotResult, found: Verification) -> Html:
     """Design, margins and step responses."""
     nomoto = found.nomoto
+    designed = [pilot for pilot in _by_name(found) if pilot.design is not None]
+    learned = [pilot for pilot in _by_name(found) if pilot.design is None]
     t = found.pilots[0].step[0]
     responses = {pilot.name: pilot.step[1:] for pilot in _by_name(found)}
     from agents.autopilot_result import STEP_DEG
@@ -134,10 +137,11 @@ def autopilots_section(result: AutopilotResult, found: Verification) -> Html:
         "autopilots",
         "Autopilots",
         paragraph(
-            "Both are designed on the identified model, linearised about straight running. First-order form "
+            f"{_names(designed)} are designed on the identified model, linearised about straight running. "
+            f"{_learned(learned)}First-order form "
             f"(Nomoto): K = {number(nomoto.K, 3)} 1/s, T = {number(nomoto.T, 3)} s."
         ),
-        columns(gains_table(found), margins_table(found)),
+        columns(gains_table(designed), margins_table(designed)),
         figure(
             steps_figure(t, responses, STEP_DEG),
             "steps",
@@ -153,19 +157,31 @@ def _by_name(found: Verification) -> list[Pilot]:
     return sorted(found.pilots, key=lambda pilot: pilot.name, reverse=True)
 
 
-def gains_table(found: Verification) -> Html:
-    """Gains of the autopilots by the signal that they act on."""
-    pilots = _by_name(found)
+def _names(pilots: Sequence[Pilot]) -> str:
+    return " and ".join(pilot.name for pilot in pilots)
+
+
+def _learned(pilots: Sequence[Pilot]) -> str:
+    """What is said of learned autopilots."""
+    if not pilots:
+        return ""
+    verb = "was" if len(pilots) == 1 else "were"
+    return f"{_names(pilots)} {verb} learned before, on another model, and flown as it is in its file. "
+
+
+def gains_table(pilots: Sequence[Pilot]) -> Html:
+    """Gains of designed autopilots by the signal that they act on."""
+    designs = [pilot.design for pilot in pilots if pilot.design is not None]
     gains = [
-        {signal: sign * p.controller.gains[gain] for gain, (signal, sign) in p.controller.feedback.items()}
-        for p in pilots
+        {signal: sign * design.gains[gain] for gain, (signal, sign) in design.feedback.items()}
+        for design in designs
     ]
     rows = [
         [name, unit, *(number(gain.get(signal), 4) for gain in gains)]
         for signal, (name, unit) in SIGNALS.items()
         if any(signal in gain for gain in gains)
     ]
-    neutral = [fixed(float(np.degrees(pilot.controller.neutral_rudder)), 2) for pilot in pilots]
+    neutral = [fixed(float(np.degrees(design.neutral_rudder)), 2) for design in designs]
     rows.append(["neutral rudder", "deg", *neutral])
     return table(
         ["gain on", "unit", *(pilot.name for pilot in pilots)],
@@ -175,10 +191,9 @@ def gains_table(found: Verification) -> Html:
     )
 
 
-def margins_table(found: Verification) -> Html:
-    """Stability margins of each autopilot."""
-    pilots = _by_name(found)
-    margins = [pilot.controller.margins for pilot in pilots]
+def margins_table(pilots: Sequence[Pilot]) -> Html:
+    """Stability margins of designed autopilots."""
+    margins = [pilot.design.margins for pilot in pilots if pilot.design is not None]
     rows = [
         ["gain margin, upwards", "factor", *(_or_infinite(m.gain_margin) for m in margins)],
         ["gain margin, downwards", "factor", *(number(m.lowest_gain, 3) for m in margins)],

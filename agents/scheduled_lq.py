@@ -17,7 +17,7 @@ from agents.linear_loop import SIGNALS, Compensator, compensator_margins, rate_w
 from agents.lq import LQ, lq_gain
 from agents.stateful import Flags, Stateful, heading_error
 from shipgym.checks import check_number
-from shipgym.envs.task import control_interval
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 
@@ -62,6 +62,8 @@ class ScheduledLQ(Stateful):
         *,
         dt: float | None = None,
         integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
         speeds: Sequence[float] | None = None,
     ) -> ScheduledLQ:
         """Design on a model, about straight running at each speed.
@@ -74,7 +76,7 @@ class ScheduledLQ(Stateful):
             Stable or unstable on its course.
         dt : float, optional
             Control interval, s; by default that of the environment.
-        integral_lengths : float
+        integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`, at each speed.
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the
@@ -93,6 +95,10 @@ class ScheduledLQ(Stateful):
         check_number(integral_lengths, "integral_lengths", above=0.0)
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         service = model.particulars["speed"]
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        weight = rate_weight(model)
+        if rate_weight_s2 is not None:
+            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
         listed = _rising([service * part for part in SPEEDS] if speeds is None else speeds)
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
@@ -101,7 +107,7 @@ class ScheduledLQ(Stateful):
             if "q" in model.state_names:
                 reduced = sample_ship(model, interval, first_order=True, speed=speed)
             time = integral_lengths * model.particulars["length"] / speed
-            gains.append(-lq_gain(reduced, rate_weight(model), time))
+            gains.append(-lq_gain(reduced, weight, time, rudder_weight))
             neutral.append((ship.about.rudder, ship.about.sway))
             name = f"ScheduledLQ on model '{model.name}' at {speed:g} m/s"
             margins.append(compensator_margins(ship, Compensator.static(gains[-1][None]), name))
@@ -112,7 +118,7 @@ class ScheduledLQ(Stateful):
             gains=dict(zip(SIGNALS, at_service, strict=True)),
             design={
                 "integral_lengths": float(integral_lengths),
-                "rate_weight_s2": rate_weight(model),
+                "rate_weight_s2": weight,
                 "least_gain_margin": min(1e6, *(m.gain_margin for m in margins)),
                 "least_phase_margin_deg": min(m.phase_margin_deg for m in margins),
             },

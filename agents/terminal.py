@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,7 @@ from rich.text import Text
 if TYPE_CHECKING:
     from agents.autopilot import Progress
     from agents.autopilot_result import AutopilotResult
+    from agents.learning.training import Progress as Training
     from identification import IdentificationResult
     from identification.comparison import Comparison
     from shipgym.manoeuvres import Criterion, IndexInterval
@@ -79,6 +80,50 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
             bars.update(tasks[stage], completed=done)
 
         yield tell
+
+
+@contextmanager
+def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | None]:
+    """A bar of a training on standard error, or a line for each evaluation where that is no terminal.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether to show anything.
+
+    Yields
+    ------
+    callable or None
+        To be told the progress.
+    """
+    if not shown:
+        yield None
+        return
+    if not err.is_terminal:
+
+        def line(now: Training) -> None:
+            if now.evaluated:
+                err.print(
+                    f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: {_costs(now)}", soft_wrap=True
+                )
+
+        yield line
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    told = TextColumn("{task.fields[costs]}")
+    with Progress(
+        TextColumn("training"), BarColumn(bar_width=32), TaskProgressColumn(), TimeRemainingColumn(), told,
+        console=err,
+    ) as bars:  # fmt: skip
+        task = bars.add_task("training", total=None, costs="")
+        yield lambda now: bars.update(task, completed=now.steps, total=now.total, costs=_costs(now))
+
+
+def _costs(now: Training) -> str:
+    """Costs of a training so far, beside LQ's."""
+    lq = "" if now.lq_cost is None else f", LQ {now.lq_cost:.2f}"
+    return "" if now.cost is None else f"cost {now.cost:.2f}, best {now.best_cost:.2f}{lq}"
 
 
 def prediction_table(result: IdentificationResult, what: str = "") -> Table:

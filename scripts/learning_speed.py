@@ -9,7 +9,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.learning_settings import PPO_SETTINGS, PPO_SHIPS
+from agents.learning.algorithms import sb3_arguments
+from agents.learning.settings import load_settings
 from shipgym import ShipVecEnv
 
 
@@ -38,10 +39,12 @@ def ppo_speed(env_id: str, repeats: int = 3, threads: int = 2) -> LearningSpeed:
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
-        env = Timed(env_id, PPO_SHIPS, seed=0)
-        scaled = VecNormalize(env, norm_obs=False, gamma=PPO_SETTINGS["gamma"])
-        agent = PPO("MlpPolicy", scaled, seed=0, **PPO_SETTINGS)
-        frames = PPO_SHIPS * PPO_SETTINGS["n_steps"]
+        settings = load_settings("ppo")
+        arguments = sb3_arguments(settings)
+        env = Timed(env_id, settings.ships, seed=0)
+        scaled = VecNormalize(env, norm_obs=False, gamma=settings.gamma)
+        agent = PPO("MlpPolicy", scaled, seed=0, **arguments)
+        frames = settings.ships * arguments["n_steps"]
         measured = []
         for _ in range(repeats):
             env.spent, start = 0.0, time.perf_counter()

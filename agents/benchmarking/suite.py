@@ -16,11 +16,13 @@ A suite is a TOML file of `agents/suites`:
 
 from __future__ import annotations
 
+import hashlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -168,9 +170,28 @@ def load_suite(name: str = DEFAULT_SUITE) -> Suite:
     InputError
         For an unknown name, or naming the field at fault.
     """
+    return parse_suite(_suite_text(name), f"suite '{name}'")
+
+
+def suite_hash(name: str = DEFAULT_SUITE) -> str:
+    """SHA-256 of the file of a shipped suite.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    return hashlib.sha256(_suite_text(name).encode()).hexdigest()
+
+
+def suite_file(name: str, what: str) -> Path:
+    """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
+    return Path(str(files("agents").joinpath("suites", f"{name}-{what}.json")))
+
+
+def _suite_text(name: str) -> str:
     check_choice(name, list_suites(), "suite")
-    text = files("agents").joinpath("suites", f"{name}.toml").read_text(encoding="utf-8")
-    return parse_suite(text, f"suite '{name}'")
+    return files("agents").joinpath("suites", f"{name}.toml").read_text(encoding="utf-8")
 
 
 def parse_suite(text: str, where: str) -> Suite:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
@@ -226,6 +226,62 @@ class Engine:
         """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
         return self.outcome(rows.STEPS)
 
+    def copy_lanes(self, source: Engine, lanes: ArrayLike) -> None:
+        """Make each lane the copy of one of another engine: same ship, same episode, same future.
+
+        Gusts, noise and what will be asked are functions of the episode's seed and of the step, so copies
+        that are steered alike go on bit for bit like the original.
+
+        Parameters
+        ----------
+        source : Engine
+            Of the same task and ships.
+        lanes : array-like of int, shape (num_envs,)
+            Which lane of `source` each lane becomes.
+
+        Raises
+        ------
+        InputError
+            If the engines differ in more than the number of lanes, or there is no such lane.
+        """
+        which = np.asarray(lanes)
+        if which.shape != (self.num_envs,) or which.dtype.kind not in "iu":
+            raise InputError(
+                f"lanes: {which.dtype} of shape {which.shape} found, expected {self.num_envs} whole numbers"
+            )
+        if which.min() < 0 or which.max() >= source.num_envs:
+            raise InputError(
+                f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
+            )
+        self._check_alike(source)
+        there, here = divmod(which, layout.LANES), divmod(np.arange(self.num_envs), layout.LANES)
+        pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
+            (self._states, source._states), (self._keys, source._keys),
+        ]  # fmt: skip
+        if len(self._ships) == len(self._states):
+            pairs.append((self._ships, source._ships))
+        for own, other in pairs:
+            _lanes_of(own)[here[0], :, here[1]] = _lanes_of(other)[there[0] % len(other), :, there[1]]
+        self.shown.observations[:] = source.shown.observations[which]
+        self.shown.outcomes[:] = source.shown.outcomes[:, which]
+
+    def _check_alike(self, source: Engine) -> None:
+        """Refuse an engine whose lanes cannot be taken over."""
+        same_task = (
+            self._kernel is source._kernel
+            and self._states.shape[1] == source._states.shape[1]
+            and np.array_equal(self._settings, source._settings, equal_nan=True)
+        )
+        if not same_task:
+            raise InputError("source: an engine of another task found, expected one of the same")
+        shared = len(self._ships) < len(self._states)
+        if shared and not all(np.array_equal(tile, self._ships[0], equal_nan=True) for tile in source._ships):
+            raise InputError("source: an engine with other ships found, expected one with the same")
+
+    def write(self, row: int, value: float) -> None:
+        """Write one row of the kernel's state in all lanes: for trials of what might be, see `outcome`."""
+        self._states[:, row : row + layout.LANES] = value
+
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses those that are no numbers.
 
@@ -267,6 +323,15 @@ class Engine:
         self.advance()
         shown = self.shown
         return self.observations, shown.outcomes[0].copy(), shown.terminated.copy(), shown.truncated.copy()
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the steps to come depend on beside their commands, copies by name."""
+        return {"states": self._states.copy(), "keys": self._keys.copy(), "ships": self._ships.copy()}
+
+    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `memory` of the same engine, or of one made alike, gave."""
+        self._states[:], self._keys[:] = memory["states"], memory["keys"]
+        self._ships[:] = memory["ships"]
 
     @property
     def command(self) -> Observation:
@@ -332,6 +397,11 @@ class Engine:
             return None
         tile, lane = divmod(lane, layout.LANES)
         return self._states[tile, rows.END :].reshape(count // 2, 2, layout.LANES)[:, :, lane].copy()
+
+
+def _lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
+    return tiles.reshape(len(tiles), -1, layout.LANES)
 
 
 class _Team:

@@ -6,7 +6,7 @@ stable-baselines3 takes no vector environment of Gymnasium's; its own step singl
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -209,6 +209,18 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         total, length = round(float(self._returns[row]), 6), int(self._lengths[row])
         info["episode"] = {"r": total, "l": length, "t": elapsed}
         return info
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the steps to come depend on beside their actions, copies by name; after a `reset`."""
+        own = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
+        return own | self.vector_env.memory()
+
+    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
+        self._returns[:], self._lengths[:] = memory["returns"], memory["lengths"]
+        self.vector_env.remember(memory)
+        self.reset_infos = [{} for _ in range(self.num_envs)]
+        self._infos, self._touched = [{} for _ in range(self.num_envs)], []
 
     def close(self) -> None:
         """Close the vector environment."""

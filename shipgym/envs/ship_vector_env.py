@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -220,6 +220,17 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         for row, artist in enumerate(self._artists):
             begun = self._engine.steps[row] == 0
             artist.begin(self._engine) if begun else artist.note(self._engine)
+
+    def memory(self) -> dict[str, NDArray[Any]]:
+        """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
+        assert self._keys is not None
+        own = {"row_keys": self._keys.copy(), "ended": self._ended.copy()}
+        return own | self._engine.memory()
+
+    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
+        """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
+        self._keys, self._ended = memory["row_keys"].copy(), memory["ended"].copy()
+        self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:
         """State, course to steer and weather by name, SI units, each of shape (num_envs,)."""

@@ -75,13 +75,20 @@ def load(path: Path) -> ShipModel:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
     try:
-        return _model(fields, str(path))
+        return read_model(fields, str(path))
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
-def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
+def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
+    """The model that `model_fields` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if "format" in fields and fields["format"] != FORMAT:
         raise InputError(
             f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
@@ -106,7 +113,7 @@ def _model(fields: Mapping[str, Any], where: str) -> ShipModel:
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
         coefficients=coefficients,
         covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
-        envelope=_envelope(fields.get("envelope"), f"{where}: envelope"),
+        envelope=read_envelope(fields.get("envelope"), f"{where}: envelope"),
         provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
         own_table=dynamics if isinstance(dynamics, Structure) else None,
         service_shaft_speed=check_number(
@@ -148,7 +155,7 @@ def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> Gre
         structure.equations,
         structure.normalisation,
         structure.quantity,
-        _model(reference, f"{where}.reference"),
+        read_model(reference, f"{where}.reference"),
         shaft,
     )
 
@@ -213,7 +220,14 @@ def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float
     return matrix
 
 
-def _envelope(value: Any, where: str) -> Envelope | None:
+def read_envelope(value: Any, where: str) -> Envelope | None:
+    """The envelope that `Envelope.to_dict` wrote; None for null.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
     if value is None:
         return None
     table = check_table(value, where)

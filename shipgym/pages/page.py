@@ -28,7 +28,7 @@ def plotly_script() -> str:
     return str(get_plotlyjs()).replace("</script", "<\\/script")
 
 
-def page(title: str, body: Mapping[str, Html], titles: Mapping[str, str]) -> str:
+def page(title: str, body: Mapping[str, Html], titles: Mapping[str, str], head: Html | None = None) -> str:
     """A whole page.
 
     Parameters
@@ -39,6 +39,8 @@ def page(title: str, body: Mapping[str, Html], titles: Mapping[str, str]) -> str
         Sections by their name, in order.
     titles : mapping of str to str
         What the table of contents calls them; sections without a title are not in it.
+    head : Html, optional
+        What stands at the end of the page's head; by default plotly.js.
 
     Returns
     -------
@@ -56,7 +58,7 @@ def page(title: str, body: Mapping[str, Html], titles: Mapping[str, str]) -> str
     return template.substitute(
         title=html(title),
         version=html(shipgym.__version__),
-        plotly=plotly_script(),
+        head=Html(f"<script>{plotly_script()}</script>") if head is None else head,
         contents=contents,
         body=join(body.values(), "\n"),
     )

@@ -7,15 +7,32 @@ import pytest
 
 from agents import LQ, AdaptiveLQ, check_controller, fly, load_agent
 from agents.adaptive_lq import GAINS
-from agents.linear_loop import SIGNALS
+from agents.batched_lq import lq_rows, sampled_ships
+from agents.linear_loop import SIGNALS, length_time, rate_weight, sample_ship
+from agents.lq import lq_gain
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.models.conversions import nomoto, nomoto2_ship
+from shipgym.models.linear import linearise, straight_running
 
 MARINER = load_model("mariner")
 GENTLE = CourseKeepingTask(course_change_deg=10.0, episode_steps=2000)
+
+
+@pytest.mark.parametrize("name", ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"])
+def test_many_designs_at_once_are_those_made_one_by_one(name):
+    model = load_model(name)
+    dt, time = control_interval(model), 20.0 * length_time(model)
+    ship = sample_ship(model, dt)
+    linear = np.concatenate(linearise(model, straight_running(model)), axis=1)
+    A, B = sampled_ships(np.stack([linear, 0.5 * linear]), model.steering.time_constant, dt)
+    np.testing.assert_allclose(A[0], ship.A, atol=1e-12)
+    np.testing.assert_allclose(B[0], ship.B[:, 0], atol=1e-12)
+    wanted = -lq_gain(ship, rate_weight(model), time)
+    np.testing.assert_allclose(lq_rows(A, B, dt, rate_weight(model), time)[0], wanted, rtol=1e-9)
 
 
 def changed(**factors):

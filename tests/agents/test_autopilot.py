@@ -4,13 +4,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from agents import LQ, fly
 from agents.autopilot import build_autopilot, verify
 from agents.autopilot_result import verification_metrics
+from agents.report import write_report
 from agents.spread import manoeuvre_spread
 from identification import identify
 from identification.concerns import concerns
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
+from tests.agents.policies import random_policy
 
 
 def test_the_folder_holds_report_model_metrics_and_both_autopilots(chain):
@@ -49,9 +52,28 @@ def test_the_saved_model_is_the_identified_one(chain):
     assert load_model(folder / "model.json").coefficients == result.model.coefficients
 
 
+def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_path):
+    result = chain[1]
+    guest = random_policy(result.model, base=LQ.from_model(result.model), authority=0.01)
+    found = verify(result.model, 24, 1, guests=[guest])
+    told = verification_metrics(found)["controllers"]
+    alone = fly(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
+    assert told["learned"]["cost_mean"] == pytest.approx(alone.cost.mean(), rel=1e-6)
+    assert told["learned"]["gains"] is told["learned"]["margins"] is None
+    assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
+    write_report(replace(result, verification=found), tmp_path / "report.html")
+    assert "LEARNED was learned before, on another model" in (tmp_path / "report.html").read_text()
+
+
+def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
+    with pytest.raises(InputError, match="agent: 'mariner-clam-ppo' found, expected a file, or a pretrained"):
+        build_autopilot("examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"])
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_progress_is_told_to_the_end(chain):
     stages = chain[2]
-    assert ("manoeuvres of the models drawn", 24, 24) in stages
+    assert ("models drawn", 24, 24) in stages
     assert stages[-1] == ("writing the report", 1, 1)
 
 

@@ -7,7 +7,8 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.learning_settings import PPO_SETTINGS, SAC_SETTINGS, SAC_SHIPS
+from agents.learning.algorithms import sb3_arguments
+from agents.learning.settings import load_settings
 from shipgym import ShipVecEnv
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
@@ -16,9 +17,10 @@ SHORT = {
     PATH: {"dt": 5.0, "episode_steps": 60, "n_legs": 1, "leg_lengths": (6.0, 6.0), "ground": 2.0},
 }
 QUICK = {
-    **PPO_SETTINGS, "n_steps": 64, "batch_size": 512, "learning_rate": 2e-3, "gamma": 0.95,
-    "policy_kwargs": {"net_arch": [32]},
+    "ships": 64, "n_steps": 64, "batch_size": 512, "n_epochs": 10, "learning_rate": 2e-3, "gamma": 0.95,
+    "net_arch": [32], "activation": "tanh",
 }  # fmt: skip
+COARSE = {"ships": 16, "learning_rate": 2e-3, "schedule": "constant", "gamma": 0.95, "net_arch": [32, 32]}
 
 
 @pytest.fixture(autouse=True)
@@ -39,21 +41,21 @@ def mean_return(agent, name):
     return evaluate_policy(agent, env, n_eval_episodes=32)[0]  # a warning if it had no statistics
 
 
-def learned(algorithm, name, ships, steps, settings):
+def learned(algorithm, name, steps, settings):
     env = VecNormalize(
-        ShipVecEnv(name, ships, seed=0, **SHORT[name]), norm_obs=False, gamma=settings["gamma"]
+        ShipVecEnv(name, settings.ships, seed=0, **SHORT[name]), norm_obs=False, gamma=settings.gamma
     )
-    return algorithm("MlpPolicy", env, seed=0, **settings).learn(steps)
+    return algorithm("MlpPolicy", env, seed=0, **sb3_arguments(settings)).learn(steps)
 
 
 @pytest.mark.parametrize("name", [COURSE, PATH])
 def test_ppo_learns(name):
-    agent = learned(PPO, name, 64, 8 * 4096, QUICK)
+    agent = learned(PPO, name, 8 * 4096, load_settings("ppo", given=QUICK))
     assert mean_return(agent, name) > 0.25 * mean_return(Nothing(), name)
     assert max(info["l"] for info in agent.ep_info_buffer) <= 60
     assert bool(agent.ep_success_buffer) == (name == PATH)  # what stable-baselines3 logs as success rate
 
 
 def test_sac_learns():
-    agent = learned(SAC, COURSE, SAC_SHIPS, 2560, SAC_SETTINGS)
+    agent = learned(SAC, COURSE, 2560, load_settings("sac", given=COARSE))
     assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)

@@ -1,0 +1,343 @@
+"""Who takes part in a benchmark, and how each is made for a task.
+
+A contestant is named on the command line as
+
+    pid                        a classical controller, designed for each task's ship with `from_model`
+    tuned-pid                  the same with the settings that direct search found for each task of the suite
+    tuned-best                 of these the one that costs least in each task
+    oracle                     what a task leaves to gain: the costs that are kept with the suite
+    ppo                        the pretrained agents of `agents/pretrained`
+    runs/agent.json            a file of an agent or controller
+    runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
+    a.json+b.json              training runs, one by one
+    my_module:factory          a function of one's own: given a `BenchmarkTask`, it returns a controller
+    name=...                   any of these under a name of one's own
+"""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from agents.benchmarking.suite import BenchmarkTask
+from agents.controller import Controller, Policy, model_hash
+from agents.controller_file import HOMES, controller_content
+from agents.los_autopilot import LAWS
+from shipgym.checks import did_you_mean, quoted
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
+LEARNED = ("ppo", "sac", "td3", "tqc")
+TUNED = "tuned-"
+ORACLE = "oracle"
+Factory = Callable[[BenchmarkTask], Policy]
+
+
+@dataclass(frozen=True, eq=False)
+class Contestant:
+    """One who takes part.
+
+    Attributes
+    ----------
+    name : str
+        In tables and files.
+    source : str, Policy, callable, or sequence of them
+        A text as in the module's docstring; a controller; a factory, given a `BenchmarkTask`; or several,
+        each a training run.
+    """
+
+    name: str
+    source: Any
+
+    @property
+    def is_text(self) -> bool:
+        """Whether another process can make it too."""
+        return isinstance(self.source, str)
+
+    def policies(self, task: BenchmarkTask, suite: str) -> tuple[Policy, ...]:
+        """Its controllers for a task, one for each training run.
+
+        Raises
+        ------
+        InputError
+            If it cannot be made for this task, or was made for other observations.
+        """
+        made = tuple(_made(self.source, task, suite))
+        for policy in made:
+            check_fits(policy, task, f"'{self.name}' on task '{task.name}'")
+        return made
+
+    def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
+        """SHA-256 of each file that it is made from for a task, by path."""
+        if not self.is_text:
+            return {}
+        return {str(path): file_hash(path) for path in _files(self.source, task)}
+
+
+def check_fits(policy: Any, task: BenchmarkTask, where: str) -> None:
+    """Refuse a controller made for other observations than a task shows.
+
+    Raises
+    ------
+    InputError
+        Naming the difference.
+    """
+    check = getattr(policy, "check_fits", None)
+    if check is not None:
+        shown = task.task.observed(task.ship)
+        check([one.name for one in shown], [one.scale for one in shown], where)
+
+
+def contestants(given: Any) -> tuple[Contestant, ...]:
+    """Contestants from what a user gave.
+
+    Parameters
+    ----------
+    given : str, sequence, or mapping of str
+        Texts (several in one are separated by commas), contestants, controllers with a `name`; or any
+        source by name.
+
+    Raises
+    ------
+    InputError
+        For an unknown one, with the nearest known; or two of one name.
+    """
+    if isinstance(given, Mapping):
+        found = [_named(str(name), source) for name, source in given.items()]
+    else:
+        listed = given.split(",") if isinstance(given, str) else _listed(given)
+        found = [_contestant(one) for one in listed]
+    if not found:
+        raise InputError("controllers: none found, expected at least one")
+    names = [one.name for one in found]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"controllers: '{name}' found twice; give one of them a name: other={name}")
+    return tuple(found)
+
+
+def _listed(given: Any) -> list[Any]:
+    if hasattr(given, "predict") or isinstance(given, Contestant) or not isinstance(given, Iterable):
+        return [given]
+    return list(given)
+
+
+def _contestant(one: Any) -> Contestant:
+    if isinstance(one, Contestant):
+        return one
+    if isinstance(one, str):
+        text = one.strip()
+        name, equals, source = text.partition("=")
+        if equals:
+            return _named(name.strip(), source.strip())
+        _check_text(text)
+        return Contestant(_short_name(text), text)
+    name = getattr(one, "name", None) or getattr(one, "__name__", None) or type(one).__name__
+    return _named(str(name), one)
+
+
+def _named(name: str, source: Any) -> Contestant:
+    if not name or set(name) & set(",=/{}*"):
+        raise InputError(f"controllers: name '{name}' found, expected one without any of , = / {{ }} *")
+    if isinstance(source, str):
+        _check_text(source)
+    elif isinstance(source, Sequence):
+        for run in source:
+            _check_object(run, name)
+    else:
+        _check_object(source, name)
+    return Contestant(name, source)
+
+
+def _check_object(source: Any, name: str) -> None:
+    if not callable(getattr(source, "predict", None)) and not callable(source):
+        raise InputError(
+            f"controllers: '{name}' is {source!r}, expected a controller (with `predict`), a function that "
+            f"makes one for a task, or a text such as 'pid'"
+        )
+
+
+def _check_text(text: str) -> None:
+    """Refuse what is neither a name, nor a file, nor a function."""
+    known = (*CLASSICAL, *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+    if text in known:
+        return
+    if _is_factory(text):
+        _factory(text)
+        return
+    if "{task}" in text:
+        return
+    for pattern in text.split("+"):
+        if not _matches(pattern):
+            raise InputError(
+                f"controllers: '{text}' found, expected one of {quoted(known)}, a file of an agent that is "
+                f"there, or module:function.{did_you_mean(text, known)}"
+            )
+
+
+def _short_name(text: str) -> str:
+    if _is_factory(text):
+        return text.rpartition(":")[2]
+    if text.endswith(".json"):
+        stem = Path(text.split("+")[0]).stem.replace("{task}", "").replace("*", "").strip("-_.")
+        return stem or "agent"
+    return text
+
+
+def _is_factory(text: str) -> bool:
+    module, colon, function = text.rpartition(":")
+    return bool(colon) and function.isidentifier() and all(part.isidentifier() for part in module.split("."))
+
+
+def _factory(text: str) -> Any:
+    """The function that a text names; modules of the working folder are found."""
+    module, _, function = text.rpartition(":")
+    here = str(Path.cwd())
+    if here not in sys.path:
+        sys.path.insert(0, here)
+    try:
+        found = getattr(import_module(module), function)
+    except (ImportError, AttributeError) as error:
+        raise InputError(
+            f"controllers: '{text}' cannot be imported ({error}); expected module:function"
+        ) from None
+    _check_object(found, text)
+    return found
+
+
+def _matches(pattern: str) -> list[Path]:
+    return [Path(path) for path in sorted(glob.glob(pattern)) if Path(path).is_file()]  # noqa: PTH207 - whole paths
+
+
+def _files(text: str, task: BenchmarkTask) -> list[Path]:
+    """Files from which a contestant is made for a task."""
+    if text in LEARNED:
+        return pretrained(task.name, text)
+    if _is_factory(text):
+        source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
+        return [Path(source)] if source else []
+    if text in CLASSICAL or text == ORACLE or text.startswith(TUNED):
+        return []
+    return [path for one in text.split("+") for path in _matches(one.replace("{task}", task.name))]
+
+
+def pretrained(task: str, algorithm: str) -> list[Path]:
+    """Files of the agents trained for a task: `TASK-ALGO.json`, or one for each run, `TASK-ALGO-RUN.json`."""
+    folder = Path(str(files("agents").joinpath("pretrained")))
+    name = f"{glob.escape(str(folder / task))}-{algorithm}"
+    return [*_matches(f"{name}.json"), *_matches(f"{name}-*.json")]
+
+
+def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
+    if not isinstance(source, str):
+        runs = source if isinstance(source, Sequence) else [source]
+        return [run if hasattr(run, "predict") else _from_factory(run, task) for run in runs]
+    if source in CLASSICAL:
+        return [designed(source, task)]
+    if source.startswith(TUNED):
+        from agents.benchmarking.direct_search import tuned
+
+        return [tuned(source.removeprefix(TUNED), task, suite)]
+    if _is_factory(source):
+        found = _factory(source)
+        return [found if hasattr(found, "predict") else _from_factory(found, task)]
+    from agents.controller_file import load_agent
+
+    paths = _files(source, task)
+    if not paths:
+        what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"
+        raise InputError(f"there is no file of {what} for task '{task.name}'")
+    return [load_agent(path) for path in paths]
+
+
+def _from_factory(factory: Factory, task: BenchmarkTask) -> Policy:
+    made = factory(task)
+    if not callable(getattr(made, "predict", None)):
+        raise InputError(
+            f"{getattr(factory, '__name__', factory)}: {made!r} found for task '{task.name}', expected a "
+            f"controller with `predict`"
+        )
+    return made
+
+
+def designed(kind: str, task: BenchmarkTask, **options: Any) -> Policy:
+    """A classical controller for the ship of a task.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CLASSICAL`. A guidance law is, where no path is followed, its heading autopilot.
+    task : BenchmarkTask
+        Its ship and control interval, and its path's lookahead and corridor.
+    **options
+        Of the class's `from_model`.
+
+    Raises
+    ------
+    InputError
+        If there is no such design for the ship.
+    """
+    if kind in LAWS:
+        if not isinstance(task.task, PathFollowingTask):
+            return designed("lq", task)
+        return LAWS[kind].from_model(task.ship, task=task.task, **options)
+    return _designed(
+        kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True)
+    )
+
+
+@lru_cache(maxsize=256)
+def _designed(kind: str, ship: _Ship, dt: float, options: str) -> Policy:
+    home, name = HOMES[kind]
+    design: Any = getattr(import_module(home), name)
+    made: Policy = design.from_model(ship.model, dt=dt, **json.loads(options))
+    return made
+
+
+@dataclass(frozen=True)
+class _Ship:
+    """A ship that equals another of the same numbers."""
+
+    model: ShipModel
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Ship) and hash(self) == hash(other)
+
+    def __hash__(self) -> int:
+        return hash(model_hash(self.model))
+
+
+def file_hash(path: str | Path) -> str:
+    """SHA-256 of a file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+
+
+def policy_hash(policy: Policy) -> str | None:
+    """SHA-256 of what the file of a controller would hold; None for one that has no file."""
+    if not isinstance(policy, Controller):
+        return None
+    try:
+        content = controller_content(policy)
+    except (AttributeError, InputError):  # guidance over a user's own autopilot
+        return None
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,0 +1,327 @@
+"""Settings of the classical controllers, found for each task by direct search on its cost.
+
+Every controller has the same budget: `EVALUATIONS` settings, each flown on the same `EPISODES` episodes,
+whose seeds are never scored. The search is Nelder and Mead's, over logarithms of the settings of `from_model`,
+and begins with the design's own; so what is found is never worse on those episodes than the design. Settings
+whose loop is unstable or has too little margin are refused without being flown.
+
+Source: Nelder & Mead 1965, A simplex method for function minimization, Computer Journal 7 (scipy.optimize).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.benchmarking.suite import BenchmarkTask
+from agents.controller import Controller, Policy
+from agents.controller_file import HOMES
+from agents.linear_loop import rate_weight
+from agents.los_autopilot import CRITICAL, LAWS
+from agents.pid import PID
+from shipgym.checks import check_choice, check_table, check_whole
+from shipgym.envs.engine import Engine
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.task import RUDDER_WEIGHT
+from shipgym.errors import InputError
+from shipgym.json_file import read_json
+
+Floats = NDArray[np.float64]
+
+#: Controllers that are tuned, in an order in which those come first that others build on.
+CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "los", "ilos", "alos")
+EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
+LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
+FIRST_STEP = 0.4  # of the simplex, in natural logarithms
+REFUSED = 1e12  # cost of settings with which no controller can be designed
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting that is searched.
+
+    Attributes
+    ----------
+    name : str
+        Keyword of `from_model`.
+    start : float
+        The design's own value.
+    low, high : float
+        Bounds, as factors of it.
+    """
+
+    name: str
+    start: float
+    low: float = 0.1
+    high: float = 10.0
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What a search found.
+
+    Attributes
+    ----------
+    settings : dict of str to float
+        Keywords of `from_model`.
+    cost, start_cost : float
+        Mean over the tuning episodes, of these and of the design's own settings.
+    evaluations : int
+        Settings that were tried, refused ones among them.
+    """
+
+    settings: dict[str, float]
+    cost: float
+    start_cost: float
+    evaluations: int
+
+
+def search(
+    cost: Callable[[Mapping[str, float]], float],
+    spaces: Sequence[Sequence[Setting]],
+    evaluations: int = EVALUATIONS,
+) -> Tuned:
+    """Least cost over settings, within a budget.
+
+    Parameters
+    ----------
+    cost : callable
+        Of settings by name; `REFUSED` where there is no such controller.
+    spaces : sequence of sequence of Setting
+        Alternatives, such as without and with a filter: each is tried at its start, the best is searched. The
+        first is the design's own.
+    evaluations : int
+        Budget.
+
+    Returns
+    -------
+    Tuned
+        The same for the same arguments.
+
+    Raises
+    ------
+    InputError
+        If every start is refused.
+    """
+    from scipy.optimize import minimize
+
+    check_whole(evaluations, "evaluations", at_least=len(spaces))
+    starts = [cost({one.name: one.start for one in space}) for space in spaces]
+    number = int(np.argmin(starts))
+    if starts[number] >= REFUSED:
+        raise InputError("cost: every start is refused, expected settings that can be designed with")
+    space = spaces[number]
+    best, least = {one.name: one.start for one in space}, starts[number]
+    count = len(starts)
+
+    def of_logarithms(x: Floats) -> float:
+        nonlocal best, least, count
+        settings = {one.name: float(one.start * np.exp(z)) for one, z in zip(space, x, strict=True)}
+        found = min(cost(settings), REFUSED)
+        count += 1
+        if found < least:
+            best, least = settings, found
+        return found
+
+    bounds = [(float(np.log(one.low)), float(np.log(one.high))) for one in space]
+    simplex = np.vstack([np.zeros(len(space)), FIRST_STEP * np.eye(len(space))])
+    left = evaluations - count
+    if left > len(space):
+        minimize(
+            of_logarithms, np.zeros(len(space)), method="Nelder-Mead", bounds=bounds,
+            options={"initial_simplex": simplex, "maxfev": left, "xatol": 1e-3, "fatol": 1e-6},
+        )  # fmt: skip
+    return Tuned(best, float(least), float(starts[0]), count)
+
+
+def tune(
+    kind: str,
+    task: BenchmarkTask,
+    settings: Mapping[str, Mapping[str, float]] | None = None,
+    evaluations: int = EVALUATIONS,
+    episodes: int = EPISODES,
+) -> Tuned:
+    """Search the settings of a classical controller on a task.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CLASSICAL`; guidance laws only where a path is followed.
+    task : BenchmarkTask
+    settings : mapping of str to mapping of str to float, optional
+        Those found for LQ, which guidance laws lead; by default its design's own.
+    evaluations, episodes : int
+        Budget.
+    """
+    check_choice(kind, CLASSICAL, "controller")
+    seeds = FIRST_SEED + np.arange(episodes)
+    autopilot = {} if settings is None else dict(settings.get("lq", {}))
+    engine = task.engine(episodes)
+
+    def cost(asked: Mapping[str, float]) -> float:
+        try:
+            controller = tuned_controller(kind, task, {**_prefixed(autopilot, kind), **asked})
+        except InputError:
+            return REFUSED
+        if not is_sane(controller):
+            return REFUSED
+        return float(episode_costs(controller, task, seeds, engine).mean())
+
+    found = search(cost, search_spaces(kind, task), evaluations)
+    return replace(found, settings={**_prefixed(autopilot, kind), **found.settings})
+
+
+def _prefixed(autopilot: Mapping[str, float], kind: str) -> dict[str, float]:
+    """Settings of the autopilot that a guidance law leads, beside its own."""
+    return {f"lq_{name}": value for name, value in autopilot.items()} if kind in LAWS else {}
+
+
+def is_sane(controller: Controller) -> bool:
+    """Whether a loop has the least margins."""
+    margins = controller.margins
+    return margins.gain_margin >= LEAST_GAIN_MARGIN and margins.phase_margin_deg >= LEAST_PHASE_MARGIN
+
+
+def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
+    """What is searched of a controller: alternatives, each a list of settings, the design's own first."""
+    if kind in LAWS:
+        if not isinstance(task.task, PathFollowingTask):
+            raise _no_path(kind, task)
+        lookahead = task.task.lookahead
+        own = [Setting("lookahead_lengths", lookahead)]
+        if kind != "los":
+            own.append(Setting("integral_lengths", CRITICAL * lookahead))
+        return [own]
+    ship, interval = task.ship, task.task.interval(task.ship)
+    integral = Setting("integral_lengths", 20.0, 0.1, 100.0)
+    if kind.startswith("pid"):
+        design = PID.from_model(ship, dt=interval).design
+        own = [Setting("frequency", design["frequency"]), Setting("damping", design["damping"]), integral]
+        if kind == "pid-filtered":
+            own.append(Setting("reference_share", 3.0, 0.2, 100.0))
+    else:
+        own = [
+            integral,
+            Setting("rudder_weight", RUDDER_WEIGHT, 0.01, 100.0),
+            Setting("rate_weight_s2", rate_weight(ship), 0.01, 100.0),
+        ]
+    if kind == "lqg":
+        own += [Setting("noise", 1.0, 0.01, 100.0), Setting("disturbance_deg", 2.0, 0.01, 100.0)]
+    waves = task.task.weather.waves
+    if kind not in ("pid-filtered", "lqg") or waves is None:
+        return [own]
+    return [own, [*own, Setting("wave_period", waves.peak_period, 0.3, 3.0)]]
+
+
+def tuned_controller(kind: str, task: BenchmarkTask, settings: Mapping[str, float]) -> Controller:
+    """A classical controller with settings as they stand in the file of those found.
+
+    Parameters
+    ----------
+    kind : str
+        Of the controller file's kinds.
+    task : BenchmarkTask
+        Its ship, control interval and path.
+    settings : mapping of str to float
+        Keywords of `from_model`; of a guidance law also those of the LQ that it leads, with `lq_` before
+        them.
+
+    Raises
+    ------
+    InputError
+        If there is no such design.
+    """
+    home, name = HOMES[check_choice(kind, HOMES, "controller")]
+    design: Any = getattr(import_module(home), name)
+    interval = task.task.interval(task.ship)
+    if kind not in LAWS:
+        made: Controller = design.from_model(task.ship, dt=interval, **settings)
+        return made
+    if not isinstance(task.task, PathFollowingTask):
+        raise _no_path(kind, task)
+    inner = {key.removeprefix("lq_"): value for key, value in settings.items() if key.startswith("lq_")}
+    own = {key: value for key, value in settings.items() if not key.startswith("lq_")}
+    autopilot = tuned_controller("lq", task, inner)
+    law: Controller = design.from_model(task.ship, autopilot=autopilot, task=task.task, **own)
+    return law
+
+
+def _no_path(kind: str, task: BenchmarkTask) -> InputError:
+    return InputError(f"controller: '{kind}' found, but task '{task.name}' has no path to be led along")
+
+
+def episode_costs(
+    controller: Policy, task: BenchmarkTask, seeds: ArrayLike, engine: Engine | None = None
+) -> Floats:
+    """Cost of each episode, minus the sum of its rewards, shape (n_episodes,).
+
+    Parameters
+    ----------
+    controller : Policy
+    task : BenchmarkTask
+    seeds : array-like of int, shape (n_episodes,)
+    engine : Engine, optional
+        Of the task, with as many lanes, to be used again.
+    """
+    numbers = np.asarray(seeds)
+    ships = task.engine(len(numbers)) if engine is None else engine
+    seen, state = ships.reset(numbers), None
+    starts, none = np.ones(len(numbers), dtype=np.bool_), np.zeros(len(numbers), dtype=np.bool_)
+    costs, over = np.zeros(len(numbers)), none.copy()
+    while not over.all():
+        actions, state = controller.predict(seen, state, starts, True)
+        seen, rewards, terminated, truncated = ships.step(actions)
+        over |= terminated | truncated
+        costs -= rewards
+        starts = none
+    return costs
+
+
+def tuned_file(suite: str) -> Path:
+    """Where the settings found for a suite are."""
+    return Path(str(files("agents").joinpath("suites", f"{suite}-tuned.json")))
+
+
+def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
+    """Settings found for a suite.
+
+    Returns
+    -------
+    dict
+        By task and controller: `settings`, `cost`, `start_cost`, `evaluations`, as in `Tuned`.
+
+    Raises
+    ------
+    InputError
+        If the suite has none, or the file is broken.
+    """
+    path = tuned_file(suite)
+    content = read_json(path, "file of tuned settings", "make it again with scripts/tune_controllers.py")
+    tasks = check_table(content.get("tasks"), f"{path}: tasks")
+    return {name: dict(check_table(found, f"{path}: tasks.{name}")) for name, found in tasks.items()}
+
+
+def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
+    """A classical controller with the settings found for a task; "best" is the best of them all.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    found = load_tuned(suite).get(task.name, {})
+    if kind == "best" and found:
+        kind = min(found, key=lambda name: float(found[name]["cost"]))
+    if kind not in found:
+        raise InputError(
+            f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
+            f"{', '.join(found) or 'none'}"
+        )
+    return tuned_controller(kind, task, found[kind]["settings"])

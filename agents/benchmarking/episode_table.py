@@ -1,0 +1,119 @@
+"""The table of episodes as columns, and its Parquet file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+
+Columns = dict[str, NDArray[Any]]
+
+KEYS = ("contestant", "task", "run", "seed")
+#: Figures that are yes or no, and numbers of events: so they are in the file; missing ones are null.
+FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
+COUNTS = ("interventions",)
+
+
+def joined(
+    parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]],
+) -> Columns:
+    """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN.
+
+    Parameters
+    ----------
+    parts : sequence of (contestant, task, run, seeds, figures)
+    """
+    names = list(dict.fromkeys(name for *_, figures in parts for name in figures))
+    counts = [len(seeds) for *_, seeds, _ in parts]
+    columns: Columns = {
+        "contestant": np.repeat(np.array([part[0] for part in parts], dtype=np.str_), counts),
+        "task": np.repeat(np.array([part[1] for part in parts], dtype=np.str_), counts),
+        "run": np.repeat(np.array([part[2] for part in parts], dtype=np.int64), counts),
+        "seed": np.concatenate([np.zeros(0, dtype=np.int64), *(part[3] for part in parts)]),
+    }
+    for name in names:
+        columns[name] = np.concatenate(
+            [part[4].get(name, np.full(len(part[3]), np.nan)) for part in parts], dtype=np.float64
+        )
+    return columns
+
+
+def check_library() -> None:
+    """Refuse to go on without pyarrow.
+
+    Raises
+    ------
+    InputError
+        Saying how it is installed.
+    """
+    _arrow()
+
+
+def write_episodes(columns: Columns, path: Path) -> None:
+    """Write a table as Parquet, to a temporary name and then renamed.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    arrow, parquet = _arrow()
+    arrays = {name: _array(arrow, name, values) for name, values in columns.items()}
+    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    try:
+        parquet.write_table(arrow.table(arrays), draft, compression="zstd")
+        draft.replace(path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def read_episodes(path: Path) -> Columns:
+    """Read what `write_episodes` wrote; figures as float64, null as NaN.
+
+    Raises
+    ------
+    InputError
+        If it is missing or no such file.
+    """
+    arrow, parquet = _arrow()
+    try:
+        table = parquet.read_table(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file of episodes") from None
+    except (OSError, arrow.ArrowException) as error:
+        raise InputError(f"{path}: cannot be read as Parquet ({error}); it may be cut short") from None
+    columns: Columns = {}
+    for name in table.column_names:
+        values = table.column(name)
+        if name in KEYS:
+            columns[name] = np.array(values.to_pylist(), dtype=np.str_ if name in KEYS[:2] else np.int64)
+        else:
+            columns[name] = values.cast(arrow.float64()).to_numpy(zero_copy_only=False)
+    return columns
+
+
+def _array(arrow: Any, name: str, values: NDArray[Any]) -> Any:
+    if name in KEYS:
+        return arrow.array(values.tolist() if values.dtype.kind == "U" else values)
+    missing = np.isnan(values)
+    kind = np.bool_ if name in FLAGS else np.int64 if name in COUNTS else np.float64
+    return arrow.array(np.where(missing, 0.0, values).astype(kind), mask=missing)
+
+
+def _arrow() -> tuple[Any, Any]:
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ModuleNotFoundError:
+        raise InputError(
+            "benchmark: pyarrow, which writes the table of episodes, is not installed; install it with: "
+            "pip install 'shipgym[benchmark]'"
+        ) from None

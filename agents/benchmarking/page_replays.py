@@ -1,0 +1,185 @@
+"""The worst episodes of a benchmark, ready for the replay player in its page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.refly import SAME_COST, Flight, Reflown, cost_of
+from agents.benchmarking.results import BenchmarkResult
+from agents.replay import player
+from agents.replay_series import quantities, run
+from shipgym.episode import Episode
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 240  # of a history at most
+MOST_RUNS = 300  # in a page, 5 kB each
+MARK = "@episodes@"  # what the page's script puts its runs in the place of
+DECIMALS = {
+    "x": 1, "y": 1, "psi": 1, "delta": 1, "heading_error": 1, "course_order": 1, "rudder_order": 1,
+    "cross_track_error": 1, "speed": 2, "yaw_rate": 3, "heel": 2, "shaft_speed": 1, "reward_so_far": 3,
+    "wind_speed": 1, "wind_from": 0, "current_speed": 2, "current_towards": 0,
+}  # fmt: skip
+REWARD_DECIMALS = 4
+
+
+def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
+    """Names of those who flew a task and could do it at sea, as they are ranked."""
+    return [name for name in result.ranking if name in result.summary["tasks"][task] and name != ORACLE]
+
+
+def bests_of(result: BenchmarkResult, task: str) -> list[str]:
+    """Who has the lowest mean cost in a task, the same to rounding; the oracle does not count."""
+    costs = {
+        name: result.summary["tasks"][task][name]["cost"]["value"] for name in contestants_of(result, task)
+    }
+    known = {name: cost for name, cost in costs.items() if cost is not None}
+    least = min(known.values(), default=np.nan)
+    return [name for name, cost in known.items() if np.isclose(cost, least, rtol=SAME_COST)]
+
+
+def worst_of(result: BenchmarkResult, contestant: str, task: str, count: int) -> list[Flight]:
+    """The episodes that cost a contestant most, the worst first; over all of its training runs."""
+    costs = result.figures(contestant, task)
+    order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")[:count]
+    runs, places = np.unravel_index(order, costs.shape)
+    first = result.summary["seeds"]["first"]
+    return [
+        Flight(contestant, task, int(run), first + int(place))
+        for run, place in zip(runs, places, strict=True)
+    ]
+
+
+def hardest_of(result: BenchmarkResult, task: str) -> int:
+    """Seed of the episode whose cost has the highest median over the contestants."""
+    costs = [result.figures(name, task).mean(axis=0) for name in contestants_of(result, task)]
+    place = int(np.argmax(np.median(np.nan_to_num(costs, nan=np.inf), axis=0))) if costs else 0
+    return int(result.summary["seeds"]["first"]) + place
+
+
+def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[Flight]]]:
+    """What may be replayed of a task: for whom, and the flights to lay over each other, the first chosen.
+
+    At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
+    each, beside the task's best contestant in the same.
+    """
+    who, seed = contestants_of(result, task), hardest_of(result, task)
+    best = next(iter(bests_of(result, task)), None)
+    found = [("", [Flight(name, task, 0, seed) for name in who])]
+    for name in who:
+        for flight in worst_of(result, name, task, count):
+            beside = [] if best is None or name == best else [Flight(best, task, 0, flight.seed)]
+            found.append((name, [flight, *beside]))
+    return found
+
+
+def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[Flight]]:
+    """How many of the worst episodes of each contestant a page has room for, and all flights it shows.
+
+    Parameters
+    ----------
+    result : BenchmarkResult
+    wanted : int
+        Fewer are taken if together they are too many; at least one.
+    """
+    for count in range(wanted, 0, -1):
+        entries = [entry for task in result.tasks for entry in entries_of(result, task, count)]
+        flights = list(dict.fromkeys(flight for _, flown in entries for flight in flown))
+        if len(flights) <= MOST_RUNS:
+            break
+    return count, flights
+
+
+def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[str, Any]:
+    """All that the page's script needs to replay episodes, ready for JSON.
+
+    Returns
+    -------
+    dict
+        page : the player, with a mark where its runs go.
+        quantities : what it shows over time.
+        runs : short forms of them (`short`).
+        entries : what may be chosen, by task: for whom, seed, cost, outcome and numbers of the runs.
+    """
+    kept: dict[Flight, int] = {}
+    runs: list[dict[str, Any]] = []
+    whole: list[dict[str, Any]] = []
+    entries: dict[str, list[dict[str, Any]]] = {}
+    for task in result.tasks:
+        entries[task] = []
+        for who, flights in entries_of(result, task, count):
+            there = [flight for flight in flights if flight in reflown.episodes]
+            if not there or (who and there[0].contestant != who):
+                continue
+            for flight in there:
+                if flight not in kept:
+                    kept[flight] = len(runs)
+                    whole.append(thin(reflown.episodes[flight], _called(result, flight)))
+                    runs.append(short(whole[-1]))
+            entries[task].append(
+                {
+                    "who": who,
+                    "seed": there[0].seed,
+                    "cost": round(cost_of(result, there[0]), 2),
+                    "outcome": runs[kept[there[0]]]["outcome"],
+                    "runs": [kept[flight] for flight in there],
+                }
+            )
+    page = player("Replay", MARK)
+    return {"page": page, "mark": MARK, "quantities": quantities(whole), "runs": runs, "entries": entries}
+
+
+def _called(result: BenchmarkResult, flight: Flight) -> str:
+    several = result.summary["tasks"][flight.task][flight.contestant]["runs"] > 1
+    return f"{flight.contestant}, run {flight.run + 1}" if several else flight.contestant
+
+
+def thin(episode: Episode, name: str, samples: int = SAMPLES) -> dict[str, Any]:
+    """An episode for the player, with fewer samples; rewards are summed in between.
+
+    The last interval is filled up: the ship stays where the episode ended.
+    """
+    whole = run(name, episode)
+    stride = -(-episode.n_steps // samples)
+    at = np.minimum(np.arange(0, episode.n_steps + stride, stride), episode.n_steps)
+
+    def summed(values: Sequence[float]) -> list[float]:
+        together: list[float] = np.diff(np.cumsum(values)[at], prepend=0.0).tolist()
+        return together
+
+    return {
+        **whole,
+        "dt": whole["dt"] * stride,
+        "steps": len(at) - 1,
+        "series": {key: np.asarray(values)[at].tolist() for key, values in whole["series"].items()},
+        "parts": {key: summed(values) for key, values in whole["parts"].items() if np.any(values)},
+        "rewards": summed(whole["rewards"]),
+        "other": {},
+    }
+
+
+def short(whole: dict[str, Any]) -> dict[str, Any]:
+    """A run with its histories as whole numbers, each the difference to the one before; see `DECIMALS`."""
+    return {
+        **whole,
+        "series": {key: differences(values, DECIMALS[key]) for key, values in whole["series"].items()},
+        "parts": {key: differences(values, REWARD_DECIMALS) for key, values in whole["parts"].items()},
+        "rewards": differences(whole["rewards"], REWARD_DECIMALS),
+    }
+
+
+def differences(values: Sequence[float], decimals: int) -> list[int]:
+    """The decimals, and the differences of values in units of the last of them."""
+    units = np.round(np.asarray(values) * 10.0**decimals).astype(np.int64)
+    return [decimals, *np.diff(units, prepend=0).tolist()]
+
+
+def as_json(data: Any) -> str:
+    """JSON without needless spaces."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":"))

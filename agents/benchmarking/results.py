@@ -1,0 +1,293 @@
+"""What a benchmark found: one row an episode, and the summary with its intervals; both as files.
+
+`results.json`, format 1:
+
+    format, kind         1, "shipgym-benchmark"
+    versions             {name: version}, and the processor: bit for bit on equal ones only
+    suite                {"name", "sha256", "tasks": {task: {"environment", "model", "model_sha256", "why"}}}
+    seeds                {"first", "count"}
+    contestants          {name: {"source", "files": {path: sha256}, "runs", "refused": {task: why}}}
+    tasks                {task: {name: {"cost", "cost_iqm", "score": {"value", "low", "high"},
+                            "relative_cost", "runs", "lost", "failed", "failure", "policy_sha256",
+                            "microseconds_per_action", "metrics": {name: {"mean", "median", "p95"}}}}}
+    reference            {task: {"pid", "oracle"}}: costs that are scores of 0 and 1
+    ranking              [{"name", "score", "relative_cost", "tasks", "lost", "failed"}], best first
+    improvement          {name: {other: {"value", "low", "high"}}}
+    profile              {"thresholds", "shares": {name: [...]}}
+    episodes             {"file", "rows", "sha256"}
+
+`episodes.parquet` has one row for each contestant, task, run and seed, with the figures of `metrics`.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.benchmarking.contestants import Contestant, file_hash
+from agents.benchmarking.episode_table import (
+    KEYS,
+    Columns,
+    check_library,
+    joined,
+    read_episodes,
+    write_episodes,
+)
+from agents.benchmarking.suite import FIRST_SEED, BenchmarkTask, Suite, suite_hash
+from agents.benchmarking.summary import summary_of
+from agents.controller import model_hash
+from shipgym.checks import check_choice, check_keys, check_table
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+
+Floats = NDArray[np.float64]
+
+FORMAT, KIND = 1, "shipgym-benchmark"
+RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
+FIELDS = (
+    "format", "kind", "versions", "suite", "seeds", "contestants", "tasks", "reference", "ranking",
+    "improvement", "profile", "episodes",
+)  # fmt: skip
+PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control", "osqp")
+REMEDY = "run `shipgym benchmark` again"
+
+
+@dataclass(frozen=True, eq=False)
+class BenchmarkResult:
+    """Result of a benchmark.
+
+    Attributes
+    ----------
+    summary : dict
+        What `results.json` holds (format in the module's docstring).
+    episodes : dict of str to array
+        One row an episode: contestant, task, run, seed, and figures by name (`metrics`).
+    """
+
+    summary: dict[str, Any]
+    episodes: Columns
+
+    @property
+    def ranking(self) -> list[str]:
+        """Names of the contestants, the best first."""
+        return [entry["name"] for entry in self.summary["ranking"]]
+
+    @cached_property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of the tasks."""
+        return tuple(self.summary["tasks"])
+
+    def figures(self, contestant: str, task: str, name: str = "cost") -> Floats:
+        """A figure of each episode, shape (n_runs, n_episodes); of no runs where it took no part.
+
+        Raises
+        ------
+        InputError
+            For an unknown contestant, task or figure.
+        """
+        check_choice(contestant, self.summary["contestants"], "contestant")
+        check_choice(task, self.tasks, "task")
+        check_choice(name, self.episodes, "figure")
+        rows = (self.episodes["contestant"] == contestant) & (self.episodes["task"] == task)
+        values: Floats = self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"])
+        return values
+
+    def save(self, folder: str | Path) -> None:
+        """Write `episodes.parquet` and then `results.json`, each whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If pyarrow is missing or the folder cannot be written.
+        """
+        target = Path(folder)
+        check_library()
+        try:
+            target.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+        write_episodes(self.episodes, target / EPISODES)
+        about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
+        write_json({**self.summary, "episodes": about}, target / RESULTS)
+
+
+def check_new(folder: Path, resume: bool) -> None:
+    """Refuse a folder that cannot take results, or that holds some and is not to be gone on with.
+
+    Raises
+    ------
+    InputError
+        Saying what to do.
+    """
+    check_library()
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is no folder, expected one to write the results to; choose another")
+    if not folder.is_dir():
+        return
+    known = (RESULTS, EPISODES, PARTS)
+    there = [entry.name for entry in folder.iterdir()]
+    if not resume and any(name in known for name in there):
+        raise InputError(
+            f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
+        )
+    if not any(name in known for name in there) and there:
+        raise InputError(
+            f"{folder}: holds '{sorted(there)[0]}', which is no result of this; choose a new folder"
+        )
+
+
+def gathered(
+    suite: Suite,
+    tasks: Sequence[BenchmarkTask],
+    who: Sequence[Contestant],
+    flown: Mapping[tuple[str, str], Mapping[str, Any]],
+    episodes: int,
+) -> BenchmarkResult:
+    """Put together what was flown.
+
+    Parameters
+    ----------
+    suite : Suite
+    tasks : sequence of BenchmarkTask
+        Those that were flown.
+    who : sequence of Contestant
+    flown : dict of (contestant, task) to dict
+        See `agents.benchmarking.run.flown_by`.
+    episodes : int
+        Number of episodes of each task.
+    """
+    seeds = FIRST_SEED + np.arange(episodes)
+    table = joined(
+        [
+            (one.name, task.name, number, seeds, run["episodes"])
+            for one in who
+            for task in tasks
+            for number, run in enumerate(flown[one.name, task.name]["runs"])
+        ]
+    )
+    about = {
+        "format": FORMAT,
+        "kind": KIND,
+        "versions": versions(),
+        "suite": {
+            "name": suite.name,
+            "sha256": suite_hash(suite.name),
+            "tasks": {task.name: _about_task(task) for task in tasks},
+        },
+        "seeds": {"first": FIRST_SEED, "count": episodes},
+        "contestants": {one.name: _about_contestant(one, tasks, flown) for one in who},
+    }
+    found = summary_of(suite.name, tasks, [one.name for one in who], flown)
+    rows = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
+    return BenchmarkResult({**about, **found, "episodes": rows}, table)
+
+
+def versions() -> dict[str, str]:
+    """Versions of what the results depend on, and the processor."""
+    from llvmlite import binding
+
+    found = {"python": platform.python_version(), "processor": str(binding.get_host_cpu_name())}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:
+            continue
+    return found
+
+
+def _about_task(task: BenchmarkTask) -> dict[str, Any]:
+    return {
+        "environment": task.environment,
+        "model": task.model,
+        "model_sha256": model_hash(task.ship),
+        "why": task.why,
+    }
+
+
+def _about_contestant(
+    one: Contestant, tasks: Sequence[BenchmarkTask], flown: Mapping[tuple[str, str], Mapping[str, Any]]
+) -> dict[str, Any]:
+    files: dict[str, str] = {}
+    for task in tasks:
+        files |= one.fingerprint(task)
+    parts = {task.name: flown[one.name, task.name] for task in tasks}
+    return {
+        "source": one.source if one.is_text else None,
+        "files": files,
+        "runs": max(len(part["runs"]) for part in parts.values()),
+        "refused": {name: part["refused"] for name, part in parts.items() if part["refused"]},
+    }
+
+
+def load_results(path: str | Path) -> BenchmarkResult:
+    """Read the results of a benchmark.
+
+    Parameters
+    ----------
+    path : str or Path
+        Their folder, or `results.json` in it.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the field at fault.
+    """
+    where = Path(path)
+    where = where / RESULTS if where.is_dir() else where
+    content = read_json(where, "file of benchmark results", REMEDY)
+    if content.get("kind") != KIND:
+        raise InputError(
+            f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': no benchmark results"
+        )
+    if content.get("format") != FORMAT:
+        raise InputError(
+            f"{where}: format {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
+        )
+    check_keys(content, FIELDS, str(where))
+    for name in FIELDS:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
+    for name in ("versions", "suite", "seeds", "contestants", "tasks", "reference", "improvement", "profile"):
+        check_table(content[name], f"{where}: {name}")
+    about = check_table(content["episodes"], f"{where}: episodes")
+    table = where.with_name(EPISODES)
+    if about.get("sha256") != file_hash(table):
+        raise InputError(
+            f"{table}: is not the one that {RESULTS} was written with, or is cut short; {REMEDY}"
+        )
+    result = BenchmarkResult(dict(content), read_episodes(table))
+    _check_agree(result, str(where))
+    return result
+
+
+def _check_agree(result: BenchmarkResult, where: str) -> None:
+    """The rows must be those of the contestants, tasks and seeds that the summary names."""
+    count, episodes = result.summary["seeds"].get("count"), result.episodes
+    for name in KEYS:
+        if name not in episodes:
+            raise InputError(f"{where}: column '{name}' of {EPISODES} is missing; {REMEDY}")
+    pairs = {
+        (str(one), str(task)) for one, task in zip(episodes["contestant"], episodes["task"], strict=True)
+    }
+    told = {
+        (one, task): found
+        for task, by_name in result.summary["tasks"].items()
+        for one, found in by_name.items()
+    }
+    if pairs != set(told):
+        raise InputError(f"{where}: contestants and tasks differ from those of {EPISODES}; {REMEDY}")
+    for (one, task), found in told.items():
+        rows = int(((episodes["contestant"] == one) & (episodes["task"] == task)).sum())
+        if rows != found.get("runs", 0) * count:
+            raise InputError(
+                f"{where}: {rows} episodes of '{one}' on '{task}' found, expected {found.get('runs')} runs "
+                f"of {count}; {REMEDY}"
+            )

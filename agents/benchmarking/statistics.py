@@ -1,0 +1,278 @@
+"""Statistics of scores: rliable's, with the episodes as a second source of chance.
+
+A score is the share of the way from the best constant-gain PID (0) to the oracle (1). Costs of episodes have
+the shape (n_runs, n_episodes), runs being training runs of a learned agent; a controller that is not trained
+has one.
+
+The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement.
+Everybody gets the same draws of episodes, because everybody flew the same ones: differences are paired.
+
+Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement Learning at the Edge of
+the Statistical Precipice, NeurIPS 34 (interquartile mean, stratified bootstrap, probability of improvement,
+performance profiles); Efron & Tibshirani 1993, An Introduction to the Bootstrap, chapters 13 (percentile
+interval) and 8 (more than one source of chance).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+N_DRAWS = 2000
+LEVEL = 0.95
+TRIMMED = 0.25  # of the scores at each end
+
+
+class Interval(NamedTuple):
+    """A statistic and its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+
+    def to_dict(self) -> dict[str, float | None]:
+        """With null where there is no number."""
+        return {name: finite(number) for name, number in self._asdict().items()}
+
+
+def finite(number: float) -> float | None:
+    """The number, None if it is none or not finite."""
+    return float(number) if np.isfinite(number) else None
+
+
+def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
+    """Mean of the middle half: a quarter, rounded down, is dropped at each end.
+
+    Parameters
+    ----------
+    values : array-like
+    axis : int, optional
+        By default all values together.
+    """
+    from scipy.stats import trim_mean
+
+    found: Floats = np.asarray(trim_mean(np.asarray(values, dtype=np.float64), TRIMMED, axis=axis))
+    return found
+
+
+class Draws:
+    """Bootstrap draws of the episodes of each task, the same for every contestant.
+
+    Parameters
+    ----------
+    n_tasks, n_episodes : int
+    seed : int
+        Of the draws.
+    n_draws : int
+    """
+
+    def __init__(self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS) -> None:
+        random = np.random.default_rng([seed, 0])
+        even = np.full(n_episodes, 1.0 / n_episodes)
+        self.n_draws, self.seed = n_draws, seed
+        #: How often each episode is drawn, over their number, shape (n_tasks, n_draws, n_episodes).
+        self.episodes: Floats = random.multinomial(n_episodes, even, (n_tasks, n_draws)) / n_episodes
+
+    def runs(self, task: int, n_runs: int, who: int) -> NDArray[np.int64]:
+        """Training runs of one contestant that are drawn for a task, shape (n_draws, n_runs)."""
+        random = np.random.default_rng([self.seed, 1, task, who])
+        return random.integers(n_runs, size=(self.n_draws, n_runs))
+
+    def means(self, costs: Floats, task: int, who: int = 0) -> Floats:
+        """Mean cost of each run that is drawn, over the episodes that are drawn, shape (n_draws, n_runs).
+
+        Parameters
+        ----------
+        costs : array of shape (n_runs, n_episodes)
+        task : int
+            Number of the task.
+        who : int
+            Number of the contestant.
+        """
+        by_run = self.episodes[task] @ costs.T
+        return np.take_along_axis(by_run, self.runs(task, len(costs), who), axis=1)
+
+
+def interval(value: float, draws: Floats) -> Interval:
+    """A statistic with its percentile interval.
+
+    Parameters
+    ----------
+    value : float
+        Of what was measured.
+    draws : array of shape (n_draws,)
+        Of what was drawn.
+    """
+    if not np.isfinite(value) or not np.isfinite(draws).all():
+        return Interval(float(value), np.nan, np.nan)
+    tail = 50.0 * (1.0 - LEVEL)
+    low, high = np.percentile(draws, [tail, 100.0 - tail])
+    return Interval(float(value), float(low), float(high))
+
+
+def mean_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> Interval:
+    """Mean over runs and episodes of one task.
+
+    Parameters
+    ----------
+    costs : array of shape (n_runs, n_episodes)
+    draws : Draws
+    task, who : int
+        Numbers of task and contestant.
+    """
+    return interval(float(costs.mean()), draws.means(costs, task, who).mean(axis=1))
+
+
+def interquartile_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> Interval:
+    """Interquartile mean over runs and episodes of one task: what usually happens, without the rare bad ends.
+
+    Parameters
+    ----------
+    costs : array of shape (n_runs, n_episodes)
+    draws : Draws
+    task, who : int
+        Numbers of task and contestant.
+    """
+    n_runs, n_episodes = costs.shape
+    counts = np.rint(draws.episodes[task] * n_episodes).astype(np.int64)
+    runs = draws.runs(task, n_runs, who)
+    number = np.zeros((draws.n_draws, n_runs), dtype=np.int64)
+    np.add.at(number, (np.arange(draws.n_draws)[:, None], runs), 1)
+    weights = (number[:, :, None] * counts[:, None, :]).reshape(draws.n_draws, -1)
+    drawn = weighted_interquartile_mean(costs.ravel(), weights)
+    return interval(float(interquartile_mean(costs)), drawn)
+
+
+def weighted_interquartile_mean(values: Floats, weights: NDArray[np.int64]) -> Floats:
+    """Interquartile means of samples given by how often they hold each value.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+    weights : int array of shape (n_samples, n)
+        Each row of the same sum.
+
+    Returns
+    -------
+    array of shape (n_samples,)
+    """
+    order = np.argsort(values, kind="stable")
+    upper = np.cumsum(weights[:, order], axis=1)
+    total = upper[:, -1:]
+    cut = np.floor(TRIMMED * total).astype(np.int64)
+    kept = np.clip(upper, cut, total - cut)
+    inside = np.diff(kept, axis=1, prepend=cut)
+    found: Floats = inside @ values[order] / (total - 2 * cut)[:, 0]
+    return found
+
+
+def score(cost: ArrayLike, pid: ArrayLike, oracle: ArrayLike) -> Floats:
+    """Share of the way from the best constant-gain PID, 0, to the oracle, 1.
+
+    NaN where they do not differ, or the oracle is the worse.
+    """
+    zero = np.asarray(pid, dtype=np.float64)
+    way, made = zero - np.asarray(oracle, dtype=np.float64), zero - np.asarray(cost, dtype=np.float64)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share: Floats = np.where(way > 0.0, made / way, np.nan)
+    return share
+
+
+def aggregate_score(
+    costs: Sequence[Floats],
+    references: Sequence[tuple[float, float]],
+    draws: Draws,
+    tasks: Sequence[int],
+    who: int,
+) -> Interval:
+    """Interquartile mean of the scores of all runs and tasks.
+
+    Parameters
+    ----------
+    costs : sequence of array of shape (n_runs, n_episodes)
+        Of each task.
+    references : sequence of tuple
+        Costs of the best constant-gain PID and of the oracle in each task.
+    draws : Draws
+    tasks : sequence of int
+        Numbers of the tasks.
+    who : int
+        Number of the contestant.
+    """
+    found, drawn = [], []
+    for task, cost, (pid, oracle) in zip(tasks, costs, references, strict=True):
+        found.append(score(cost.mean(axis=1), pid, oracle))
+        drawn.append(score(draws.means(cost, task, who), pid, oracle))
+    value = float(interquartile_mean(np.concatenate(found)))
+    return interval(value, interquartile_mean(np.concatenate(drawn, axis=1), axis=1))
+
+
+def probability_of_improvement(one: Floats, other: Floats) -> float:
+    """Probability that a run of one costs less than a run of the other in the same episode; ties count half.
+
+    Parameters
+    ----------
+    one, other : array of shape (n_runs, n_episodes)
+        Costs of the same episodes.
+    """
+    return float(_wins(one, other).mean())
+
+
+def improvement(
+    one: Mapping[int, Floats], other: Mapping[int, Floats], draws: Draws, who: tuple[int, int]
+) -> Interval:
+    """Mean over the tasks that both flew of the probability of improvement.
+
+    Parameters
+    ----------
+    one, other : dict of int to array of shape (n_runs, n_episodes)
+        Costs by the number of the task.
+    draws : Draws
+    who : tuple of int
+        Numbers of the two contestants.
+    """
+    common = sorted(set(one) & set(other))
+    if not common:
+        return Interval(np.nan, np.nan, np.nan)
+    values, drawn = [], np.zeros(draws.n_draws)
+    for task in common:
+        wins = _wins(one[task], other[task])
+        values.append(wins.mean())
+        per_draw = np.tensordot(draws.episodes[task], wins, axes=(1, 2))
+        first, second = (
+            draws.runs(task, len(costs[task]), number)
+            for costs, number in zip((one, other), who, strict=True)
+        )
+        rows = np.arange(draws.n_draws)[:, None, None]
+        drawn += per_draw[rows, first[:, :, None], second[:, None, :]].mean(axis=(1, 2))
+    return interval(float(np.mean(values)), drawn / len(common))
+
+
+def _wins(one: Floats, other: Floats) -> Floats:
+    """Whether run i of one costs less than run k of the other in each episode, shape (i, k, n_episodes)."""
+    wins: Floats = (one[:, None] < other[None]) + 0.5 * (one[:, None] == other[None])
+    return wins
+
+
+def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
+    """Share of the scores above each threshold.
+
+    Parameters
+    ----------
+    scores : array-like
+        Of runs, tasks and, here, episodes: of any shape.
+    thresholds : array-like of shape (n,)
+
+    Returns
+    -------
+    array of shape (n,)
+    """
+    ordered = np.sort(np.ravel(scores))
+    below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
+    above: Floats = 1.0 - below / len(ordered)
+    return above

@@ -1,0 +1,175 @@
+"""Whether a file of benchmark results is true: a sample of it is flown again and compared."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.benchmarking.contestants import CLASSICAL, Contestant, file_hash
+from agents.benchmarking.results import BenchmarkResult, load_results, versions
+from agents.benchmarking.run import fly_job, fly_job_of
+from agents.benchmarking.suite import load_suite, suite_hash
+from agents.engines import run_jobs
+from shipgym.checks import check_number, check_whole
+from shipgym.errors import InputError
+
+N_SAMPLED = 8
+#: Largest relative difference of an episode's cost with another processor, other versions, or a learned
+#: policy, whose matrix products may be summed in another order.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Check:
+    """One contestant and task, all episodes and training runs of it flown again.
+
+    Attributes
+    ----------
+    contestant, task : str
+        Which.
+    episodes : int
+        How many were compared.
+    difference : float
+        Largest relative difference of an episode's cost; 0 if all figures are the same bit for bit.
+    exact : bool
+        Whether they are.
+    allowed : float
+        Difference up to which it passes.
+    note : str
+        What is wrong, or why a difference is allowed.
+    """
+
+    contestant: str
+    task: str
+    episodes: int
+    difference: float
+    exact: bool
+    allowed: float
+    note: str
+
+    @property
+    def passed(self) -> bool:
+        """Whether it is what the file says."""
+        return self.exact or self.difference <= self.allowed
+
+    def to_dict(self) -> dict[str, Any]:
+        """For programs; a difference that is no number is null."""
+        known = np.isfinite(self.difference)
+        return {**asdict(self), "difference": self.difference if known else None, "passed": self.passed}
+
+
+def verify(
+    path: str | Path,
+    *,
+    sample: int = N_SAMPLED,
+    seed: int = 0,
+    tolerance: float | None = None,
+    workers: int | None = 1,
+) -> list[Check]:
+    """Fly a sample of a benchmark again and compare.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder of the results, or their `results.json`.
+    sample : int
+        Pairs of a contestant and a task; all their episodes are flown, at most all pairs there are.
+    seed : int
+        Of the sample.
+    tolerance : float, optional
+        Largest relative difference of an episode's cost. By default 0, and 1e-6 for a learned policy or
+        where processor or versions differ from those the file was written with.
+    workers : int or None
+        As in `benchmark`.
+
+    Returns
+    -------
+    list of Check
+
+    Raises
+    ------
+    InputError
+        If the files are broken, written on another suite of the name, or hold nothing that can be flown
+        again: contestants that were given as objects.
+    """
+    result = load_results(path)
+    check_whole(sample, "sample", at_least=1)
+    if tolerance is not None:
+        check_number(tolerance, "tolerance", at_least=0.0)
+    suite = result.summary["suite"]
+    if suite_hash(suite["name"]) != suite["sha256"]:
+        raise InputError(
+            f"{path}: was flown on another suite '{suite['name']}' than that of this version of shipgym "
+            f"({result.summary['versions'].get('shipgym')}): install the version it was written with"
+        )
+    pairs = _sampled(result, sample, seed)
+    jobs = [_job(result, one, task) for one, task in pairs]
+    flown = run_jobs(fly_job, jobs, workers=workers)
+    return [
+        _compared(result, one, task, again, tolerance)
+        for (one, task), again in zip(pairs, flown, strict=True)
+    ]
+
+
+def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str, str]]:
+    """Pairs by chance, the contestants by turns."""
+    sources = {name: about["source"] for name, about in result.summary["contestants"].items()}
+    pairs = [
+        (one, task)
+        for task, by_name in result.summary["tasks"].items()
+        for one in by_name
+        if sources[one] is not None
+    ]
+    if not pairs:
+        raise InputError(
+            "results: no contestant that can be made again; name them by a text: a file, or module:function"
+        )
+    random = np.random.default_rng(seed)
+    shuffled = [pairs[k] for k in random.permutation(len(pairs))]
+    before: dict[str, int] = {}
+    turns = {}
+    for pair in shuffled:
+        before[pair[0]] = turns[pair] = before.get(pair[0], -1) + 1
+    return sorted(shuffled, key=lambda pair: turns[pair])[:sample]
+
+
+def _job(result: BenchmarkResult, name: str, task: str) -> dict[str, Any]:
+    suite = result.summary["suite"]["name"]
+    one = Contestant(name, result.summary["contestants"][name]["source"])
+    return fly_job_of(one, load_suite(suite).task(task), suite, result.summary["seeds"]["count"])
+
+
+def _compared(
+    result: BenchmarkResult, name: str, task: str, again: dict[str, Any], tolerance: float | None
+) -> Check:
+    cost = result.figures(name, task)
+    about = result.summary["contestants"][name]
+    changed = _changed_files(about["files"])
+    other = [key for key, one in result.summary["versions"].items() if versions().get(key) != one]
+    learned = about["source"] not in CLASSICAL
+    allowed = tolerance if tolerance is not None else ROUNDING if learned or other else 0.0
+    note = f"{', '.join(other)} differ from those of the file" if other else ""
+    if changed:
+        note = f"'{changed[0]}' is not the file that was flown"
+    if len(again["runs"]) != len(cost):
+        note = (
+            again["refused"] or note or f"{len(again['runs'])} training runs found, {len(cost)} in the file"
+        )
+        return Check(name, task, cost.size, np.inf, False, allowed, note)
+    costs = np.stack([run["episodes"]["cost"] for run in again["runs"]])
+    exact = all(
+        np.array_equal(run["episodes"][figure], result.figures(name, task, figure)[k], equal_nan=True)
+        for k, run in enumerate(again["runs"])
+        for figure in run["episodes"]
+    )
+    difference = float(np.max(np.abs(costs - cost) / np.maximum(np.abs(cost), 1e-12)))
+    if not exact and difference == 0.0:  # of another figure than the cost
+        difference, note = np.inf, note or "the costs are the same, but another figure is not"
+    return Check(name, task, cost.size, 0.0 if exact else difference, exact, allowed, note)
+
+
+def _changed_files(files: dict[str, str]) -> list[str]:
+    return [path for path, sha256 in files.items() if not Path(path).is_file() or file_hash(path) != sha256]

@@ -1,0 +1,50 @@
+"""Classical controllers by name, designed on a task's ship: what policies add to and are compared with."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+
+from agents.benchmarking.suite import BenchmarkTask
+from agents.controller import Controller
+from agents.controller_file import HOMES, load_agent
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+
+
+def design_base(name: str, task: BenchmarkTask) -> Controller | None:
+    """The controller of the setting `base`.
+
+    Parameters
+    ----------
+    name : str
+        "none", a kind of controller, which is designed on the task's ship, or a controller's file.
+    task : BenchmarkTask
+        The ship, the control interval and the path.
+
+    Returns
+    -------
+    Controller or None
+
+    Raises
+    ------
+    InputError
+        If the ship has no such controller, the file is not one for her, or guidance has no path to follow.
+    """
+    if name == "none":
+        return None
+    if name.endswith(".json"):
+        agent = load_agent(name, task.ship)
+        if not isinstance(agent, Controller):
+            raise InputError(f"base: {name} holds a learned policy, expected a classical controller")
+        return agent
+    home, kind = HOMES[name]
+    design = getattr(import_module(home), kind)
+    known = inspect.signature(design.from_model).parameters
+    if "task" in known:
+        if not isinstance(task.task, PathFollowingTask):
+            raise InputError(f"base: '{name}' found on a task without a path, expected a course autopilot")
+        guide: Controller = design.from_model(task.ship, task=task.task)
+        return guide
+    autopilot: Controller = design.from_model(task.ship, dt=task.task.interval(task.ship))
+    return autopilot

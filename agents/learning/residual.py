@@ -1,0 +1,171 @@
+"""What a learned policy sees and does in training: past observations, and a classical controller to add to.
+
+The network acts on what `agents.policy.LearnedPolicy` gives it when it steers: the last observations, oldest
+first, then the base controller's action. The rudder is that action and the network's part of it.
+
+Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
+al. 2019, Residual reinforcement learning for robot control, ICRA.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from agents.controller import Policy
+from shipgym.checks import check_number, check_whole
+from shipgym.errors import InputError
+
+try:
+    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
+except ImportError:
+    raise InputError(
+        "stable-baselines3 is not installed, learning needs it: pip install 'shipgym[rl]'"
+    ) from None
+
+Floats = NDArray[np.float32]
+Flags = NDArray[np.bool_]
+
+
+class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+    """Ships steered by a base controller to which an agent adds; the agent remembers observations.
+
+    The agent sees `[observation(t - history + 1), ..., observation(t), base action(t)]`; where an episode
+    begins the first observation fills the history. What is done is
+    `clip(base action + authority * clip(output, -1, 1), -1, 1)`. Rewards stay what they are.
+
+    Parameters
+    ----------
+    venv : VecEnv
+        Ships, such as `shipgym.ShipVecEnv`.
+    base : Policy, optional
+        Any controller with or without a memory, in the signature of `Controller.predict`; None: the agent's
+        output is the action.
+    authority : float
+        Share of the action's range by which the agent may differ from the base, above 0, at most 2; without a
+        base it has to be 1.
+    history : int
+        Number of observations that are shown, the newest last.
+
+    Raises
+    ------
+    InputError
+        For commands that are not continuous beside a base, a base that does not fit the ship, or a value out
+        of its range.
+    """
+
+    def __init__(
+        self, venv: VecEnv, base: Policy | None = None, *, authority: float = 1.0, history: int = 1
+    ) -> None:
+        self.base = base
+        self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
+        self.history = check_whole(history, "history", at_least=1)
+        low, high = (np.tile(bound, self.history) for bound in _bounds(venv))
+        if base is None:
+            if self.authority != 1.0:
+                raise InputError(f"authority: {authority:g} found without a base, expected 1, or a base")
+        else:
+            _check_base(venv, base)
+            low, high = np.append(low, venv.action_space.low), np.append(high, venv.action_space.high)
+        super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
+        self._past = np.zeros((venv.num_envs, self.history, *venv.observation_space.shape), np.float32)
+        self._state: Any = None
+        self._proposed: Floats = np.zeros((venv.num_envs, 0), np.float32)
+
+    def reset(self) -> Floats:
+        """Begin an episode in each row.
+
+        Returns
+        -------
+        float32 array of shape (num_envs, history * n_observations + n_commands), n_commands without a base 0
+        """
+        observations = self.venv.reset()
+        self._state = None
+        every = np.ones(self.num_envs, dtype=np.bool_)
+        return self._begin(observations, every)
+
+    def step_async(self, actions: Any) -> None:
+        """Add the agent's outputs, shape (num_envs, n_commands), to what the base proposed."""
+        if self.base is None:
+            self.venv.step_async(actions)
+            return
+        outputs = np.clip(np.asarray(actions, dtype=np.float32), -1.0, 1.0)
+        self.venv.step_async(np.clip(self._proposed + np.float32(self.authority) * outputs, -1.0, 1.0))
+
+    def step_wait(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
+        """One control interval; `terminal_observation` is what the agent would have seen next.
+
+        Returns
+        -------
+        observations, rewards, dones, infos
+            As those of the ships inside.
+        """
+        observations, rewards, dones, infos = self.venv.step_wait()
+        self._past[:, :-1] = self._past[:, 1:]
+        ended = np.flatnonzero(dones)
+        if len(ended) == 0:
+            self._past[:, -1] = observations
+            return self._shown(None), rewards, dones, infos
+        self._past[:, -1] = observations
+        for row in ended:
+            self._past[row, -1] = infos[row]["terminal_observation"]
+        kept = copy.deepcopy(self._state)  # a base may write into its state
+        last = self._shown(None)
+        self._state = kept
+        for row in ended:
+            infos[row]["terminal_observation"] = last[row]
+        return self._begin(observations, np.asarray(dones, dtype=np.bool_)), rewards, dones, infos
+
+    def memory(self) -> dict[str, Any]:
+        """All that it adds to what the steps to come depend on: history, the base's state and proposals."""
+        return copy.deepcopy({"past": self._past, "state": self._state, "proposed": self._proposed})
+
+    def remember(self, memory: Mapping[str, Any]) -> None:
+        """Go on from what `memory` gave, in place of a `reset`."""
+        self._past[:], self._state, self._proposed = memory["past"], memory["state"], memory["proposed"]
+
+    def _begin(self, observations: Floats, starts: Flags) -> Floats:
+        """What the agent sees where some rows begin an episode."""
+        self._past[:, -1] = observations
+        self._past[starts] = observations[starts, None]
+        return self._shown(starts)
+
+    def _shown(self, starts: Flags | None) -> Floats:
+        """Histories and the base's proposals, which are kept for the step that follows."""
+        seen = self._past.reshape(self.num_envs, -1)
+        if self.base is None:
+            return seen.copy()
+        flags = np.zeros(self.num_envs, dtype=np.bool_) if starts is None else starts
+        proposed, self._state = self.base.predict(self._past[:, -1].copy(), self._state, flags, True)
+        self._proposed = np.asarray(proposed, dtype=np.float32)
+        return np.concatenate([seen, self._proposed], axis=1)
+
+
+def _bounds(venv: VecEnv) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Least and largest observation of the ships inside."""
+    space = venv.observation_space
+    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+        raise InputError(f"venv: observations in {space} found, expected a flat Box of numbers")
+    return space.low, space.high
+
+
+def _check_base(venv: VecEnv, base: Policy) -> None:
+    """Refuse commands that cannot be added to, and a controller of another ship."""
+    space = venv.action_space
+    if not isinstance(space, spaces.Box) or not (np.all(space.low >= -1.0) and np.all(space.high <= 1.0)):
+        raise InputError(
+            f"venv: actions in {space} found, expected a Box within [-1, 1]: a base needs the action 'rudder'"
+        )
+    if not callable(getattr(base, "predict", None)):
+        raise InputError(
+            f"base: {type(base).__name__} found, expected a controller, such as LQ.from_model(model)"
+        )
+    check_fits = getattr(base, "check_fits", None)
+    if check_fits is not None:
+        names, scales = venv.get_attr("observation_names", 0)[0], venv.get_attr("observation_scales", 0)[0]
+        check_fits(names, scales, "base")

@@ -1,0 +1,81 @@
+"""PPO of RLlib learns to keep a course with a ship of shipgym, and is flown beside LQ afterwards."""
+
+import argparse
+import logging
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from ray.rllib.algorithms.ppo import PPOConfig
+from ray.tune.registry import register_env
+
+import shipgym
+from agents import LQ, fly
+
+
+class Steersman:
+    """The mean of what RLlib's policy does, as shipgym's controllers answer."""
+
+    def __init__(self, module: Any) -> None:
+        self.module = module
+
+    def predict(
+        self,
+        observation: NDArray[np.float32],
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[NDArray[np.float32], None]:
+        """Rudder for each ship, as a share of its limit; deterministic always."""
+        with torch.no_grad():
+            answer = self.module.forward_inference({"obs": torch.as_tensor(observation)})
+        mean = answer["action_dist_inputs"][:, :1]  # the logarithm of the deviation follows
+        return np.clip(mean.numpy(), -1.0, 1.0), None
+
+
+def main() -> None:
+    """Train for some iterations, then fly the same 100 episodes as LQ."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--model", default="mariner", help="name of a shipped model, or a model file")
+    parser.add_argument("--iterations", type=int, default=12)
+    parser.add_argument("--runners", type=int, default=0, help="processes that sail; 0: this one")
+    options = parser.parse_args()
+    logging.getLogger("ray").setLevel(logging.ERROR)
+    register_env("course-keeping", lambda config: gym.make("shipgym/CourseKeeping-v0", **config))
+    config = (
+        PPOConfig()
+        .environment("course-keeping", env_config={"model": options.model})
+        .env_runners(num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length=256)
+        .training(
+            lr=1e-3,
+            gamma=0.99,
+            train_batch_size_per_learner=4096,
+            minibatch_size=512,
+            num_epochs=5,
+            vf_clip_param=1e6,
+        )
+        .rl_module(model_config={"fcnet_hiddens": [64, 64], "fcnet_activation": "relu"})
+        .debugging(seed=1, log_level="ERROR")
+    )
+    algorithm = config.build_algo()
+    for iteration in range(1, options.iterations + 1):
+        found = algorithm.train()["env_runners"]
+        episode = found.get("episode_return_mean")
+        told = "of no episode" if episode is None or np.isnan(episode) else f"{episode:.2f}"
+        print(
+            f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f} steps, mean return {told}",
+            flush=True,
+        )
+    ship = shipgym.load_model(options.model)
+    seeds = 1_000_000 + np.arange(100)
+    for name, controller in (("RLlib PPO", Steersman(algorithm.get_module())), ("LQ", LQ.from_model(ship))):
+        flights = fly(controller, ship, seeds=seeds)
+        rmse = flights.heading_rmse_deg.mean()
+        print(f"{name}: mean cost {flights.cost.mean():.3f}, heading rmse {rmse:.2f} deg")
+    algorithm.stop()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Tune a suite's classical controllers by direct search and fly the oracle: the suite's two result files.
+
+    python scripts/tune_controllers.py                      # what is missing in both files
+    python scripts/tune_controllers.py --tasks mariner-calm --again
+
+Both files are written after every controller and task: killed at any moment, it goes on where it was. Where
+the oracle flies fewer episodes than are scored, its cost is that of the best classical controller over all of
+them times the oracle's part of that controller's cost on those it flew.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from agents.benchmarking.direct_search import (
+    CLASSICAL,
+    EPISODES,
+    EVALUATIONS,
+    FIRST_SEED,
+    episode_costs,
+    load_tuned,
+    tune,
+    tuned_controller,
+    tuned_file,
+)
+from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
+from agents.los_autopilot import LAWS
+from agents.oracle import OracleSettings, fly_oracle
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+
+ORACLE_EPISODES = 100
+
+
+def main() -> None:
+    """Tune, then fly, and say what came out."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--suite", default=DEFAULT_SUITE)
+    parser.add_argument("--tasks", default="", help="names, separated by commas; by default all")
+    parser.add_argument("--controllers", default=",".join(CLASSICAL))
+    parser.add_argument("--evaluations", type=int, default=EVALUATIONS)
+    parser.add_argument("--episodes", type=int, default=EPISODES)
+    parser.add_argument("--oracle-episodes", type=int, default=ORACLE_EPISODES)
+    parser.add_argument("--again", action="store_true", help="also what is there already")
+    asked = parser.parse_args()
+    suite = load_suite(asked.suite)
+    tasks = [suite.task(name) for name in asked.tasks.split(",") if name] or list(suite.tasks)
+    for task in tasks:
+        tune_task(task, asked)
+        refer(task, asked)
+
+
+def tune_task(task: BenchmarkTask, asked: argparse.Namespace) -> None:
+    """Tune all controllers on a task and write each as it is found."""
+    found = _tuned(asked.suite)
+    own = found.setdefault(task.name, {})
+    for kind in asked.controllers.split(","):
+        is_path = task.environment == "path-following"
+        if (kind in LAWS and not is_path) or (kind in own and not asked.again):
+            continue
+        began = time.process_time()
+        settings = {name: one["settings"] for name, one in own.items()}
+        best = tune(kind, task, settings, asked.evaluations, asked.episodes)
+        own[kind] = asdict(best)
+        budget = {"evaluations": EVALUATIONS, "episodes": EPISODES, "first_seed": FIRST_SEED}
+        write_json({"suite": asked.suite, **budget, "tasks": found}, tuned_file(asked.suite))
+        spent = time.process_time() - began
+        costs = f"{best.start_cost:9.2f} -> {best.cost:9.2f}"
+        print(f"{task.name:20s} {kind:14s} {costs}   {spent:5.1f} s", flush=True)
+
+
+def refer(task: BenchmarkTask, asked: argparse.Namespace) -> None:
+    """Fly the tuned controllers and the oracle on the scored seeds."""
+    path = reference_file(asked.suite)
+    found = dict(read_json(path, "reference file", "delete it")) if path.exists() else {}
+    if task.name in found and not asked.again:
+        return
+    began = time.process_time()
+    tuned = _tuned(asked.suite)[task.name]
+    best = min(tuned, key=lambda kind: float(tuned[kind]["cost"]))
+    start = tuned_controller(best, task, tuned[best]["settings"])
+    pid = tuned_controller("pid", task, tuned["pid"]["settings"])
+    seeds = task.seeds[: asked.oracle_episodes]
+    flight = fly_oracle(task.ship, task.task, seeds, start, OracleSettings(), task.variety)
+    cost = float(episode_costs(start, task, task.seeds).mean())
+    part = float(flight.costs.mean() / flight.start_costs.mean())
+    found[task.name] = {
+        "pid": float(episode_costs(pid, task, task.seeds).mean()),
+        "best_classical": {"name": best, "cost": cost},
+        "oracle": part * cost,
+        "oracle_episodes": len(seeds),
+    }
+    write_json(found, path)
+    print(f"{task.name:20s} {found[task.name]}   {time.process_time() - began:.0f} s", flush=True)
+
+
+def reference_file(suite: str) -> Path:
+    """Where the suite's costs of reference are."""
+    return tuned_file(suite).with_name(f"{suite}-reference.json")
+
+
+def _tuned(suite: str) -> dict[str, Any]:
+    """Settings found so far."""
+    try:
+        return load_tuned(suite)
+    except InputError:
+        if tuned_file(suite).exists():
+            raise
+        return {}
+
+
+if __name__ == "__main__":
+    main()

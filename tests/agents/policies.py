@@ -1,0 +1,35 @@
+"""Policies with weights at random, for tests."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from agents import LearnedPolicy
+from agents.network import Network
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
+from shipgym.models import load_model
+
+MARINER = load_model("mariner")
+
+
+def random_network(*sizes, seed=0, activation="relu", output="linear"):
+    random = np.random.default_rng(seed)
+    layers = [
+        (random.normal(0.0, n_in**-0.5, (n_out, n_in)), random.normal(0.0, 0.1, n_out))
+        for n_in, n_out in pairwise(sizes)
+    ]
+    single = tuple((weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers)
+    return Network(single, activation, output)
+
+
+def random_policy(model=MARINER, seed=0, **more):
+    """Of course keeping, with hidden layers of 16."""
+    inputs = max(more.get("history", 1), 1) * 8 + ("base" in more)
+    outputs = {"rudder-discrete": 9, "rudder-shaft": 2}.get(more.get("action"), 1)
+    given = {
+        "network": random_network(inputs, 16, 16, outputs, seed=seed),
+        "observation_names": OBSERVATION_NAMES,
+        "observation_scales": tuple(observation_scales(model).tolist()),
+        "model_name": model.name,
+    }
+    return LearnedPolicy(**(given | more))

@@ -1,0 +1,308 @@
+import json
+import sys
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import LQ, PID, benchmark, load_results
+from agents.benchmarking.contestants import contestants, designed
+from agents.benchmarking.suite import load_suite
+from agents.benchmarking.verification import verify
+from agents.cli import app
+from shipgym import load_model
+from shipgym.errors import InputError
+
+TASKS = ["mariner-calm"]
+N = 4
+
+
+def shipgym(*arguments):
+    return CliRunner().invoke(app, ["benchmark", *(str(argument) for argument in arguments)])
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Results of PID and LQ in one task, four episodes."""
+    out = tmp_path_factory.mktemp("benchmark") / "results"
+    benchmark("pid,lq", tasks=TASKS, out=out, episodes=N)
+    return out
+
+
+@pytest.fixture
+def copy(folder, tmp_path):
+    """The same, to be tampered with."""
+    for name in ("results.json", "episodes.parquet"):
+        (tmp_path / name).write_bytes((folder / name).read_bytes())
+    return tmp_path
+
+
+def test_results_are_read_back_as_they_were_written(folder):
+    again, fresh = load_results(folder), benchmark("pid,lq", tasks=TASKS, episodes=N)
+    assert again.ranking == fresh.ranking == ["lq", "pid"]
+    for name, column in fresh.episodes.items():
+        np.testing.assert_array_equal(column, again.episodes[name], err_msg=name)
+    costs = again.figures("lq", "mariner-calm")
+    assert costs.shape == (1, N)
+    found = again.summary["tasks"]["mariner-calm"]["lq"]
+    assert found["cost"]["value"] == costs.mean()
+    assert found["cost"]["low"] < costs.mean() < found["cost"]["high"]
+    assert again.summary["improvement"]["lq"]["pid"]["value"] == np.mean(
+        costs < again.figures("pid", "mariner-calm")
+    )
+
+
+def test_the_file_names_what_it_was_made_with(folder):
+    summary = json.loads((folder / "results.json").read_text())
+    assert {"shipgym", "numpy", "numba", "python", "processor"} <= set(summary["versions"])
+    assert len(summary["suite"]["sha256"]) == 64
+    assert len(summary["suite"]["tasks"]["mariner-calm"]["model_sha256"]) == 64
+    assert summary["seeds"] == {"first": 1_000_000, "count": N}
+    assert summary["contestants"]["lq"]["source"] == "lq"
+    assert len(summary["tasks"]["mariner-calm"]["lq"]["policy_sha256"][0]) == 64
+
+
+def test_the_table_is_tidy(folder):
+    import pyarrow.parquet as parquet
+
+    table = parquet.read_table(folder / "episodes.parquet")
+    assert table.num_rows == 2 * N
+    assert table.column_names[:4] == ["contestant", "task", "run", "seed"]
+    assert str(table.schema.field("success").type) == "bool"
+    assert table.column("cross_track_rmse_m").null_count == 2 * N  # course keeping has no path
+
+
+def test_workers_find_the_same_bit_for_bit(folder, tmp_path):
+    result = benchmark("pid,lq", tasks=TASKS, out=tmp_path / "two", workers=2, episodes=N)
+    for name, column in load_results(folder).episodes.items():
+        np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
+
+
+def test_what_was_flown_is_kept_and_not_flown_again(folder, copy, monkeypatch):
+    parts = copy / "parts"
+    parts.mkdir()
+    for path in (folder / "parts").iterdir():
+        (parts / path.name).write_bytes(path.read_bytes())
+    with pytest.raises(InputError, match=r"holds results already.*--resume"):
+        benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
+    flown = []
+    monkeypatch.setattr(
+        "agents.benchmarking.run.fly_task",
+        lambda policy, *rest: flown.append(policy.name) or original(policy, *rest),
+    )
+    from agents.benchmarking.flying import fly_task as original
+
+    result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
+    assert flown == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
+    np.testing.assert_array_equal(result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm"))
+    assert load_results(copy).summary["contestants"].keys() == {"pid", "lq", "los"}
+
+
+class Broken:
+    name = "broken"
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.full((len(observation), 1), np.nan), state
+
+
+def test_a_contestant_that_fails_is_last_and_the_ranking_shows_it():
+    result = benchmark([Broken(), "pid"], tasks=TASKS, episodes=N)
+    assert result.ranking == ["pid", "broken"]
+    assert result.summary["ranking"][1]["failed"] == N
+    found = result.summary["tasks"]["mariner-calm"]["broken"]
+    assert "no finite number for 4 of 4 ships" in found["failure"]
+    assert found["metrics"]["failed"]["mean"] == 1.0
+
+
+def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
+    other = LQ.from_model(load_model("kvlcc2"))
+    result = benchmark({"other": other, "pid": "pid"}, tasks=TASKS, episodes=2)
+    refused = result.summary["contestants"]["other"]["refused"]["mariner-calm"]
+    assert "scale of 'yaw_rate'" in refused
+    assert result.ranking == ["pid", "other"]
+    assert result.figures("other", "mariner-calm").size == 0
+
+
+def test_training_runs_of_one_contestant(tmp_path):
+    ship = load_model("mariner")
+    for run, frequency in enumerate((0.05, 0.08)):
+        PID.from_model(ship, frequency=frequency).save(tmp_path / f"mariner-calm-pid-{run}.json")
+    result = benchmark(f"mine={tmp_path}/{{task}}-pid-*.json", tasks=TASKS, episodes=2)
+    assert result.figures("mine", "mariner-calm").shape == (2, 2)
+    assert result.summary["contestants"]["mine"]["runs"] == 2
+    assert len(result.summary["contestants"]["mine"]["files"]) == 2
+    profile = result.summary["improvement"]
+    assert profile == {"mine": {}}
+
+
+def test_functions_of_ones_own(tmp_path, monkeypatch):
+    (tmp_path / "my_autopilots.py").write_text(
+        "from agents import LQ\n\n\n"
+        "def gentle(task):\n    return LQ.from_model(task.ship, integral_lengths=50.0)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    by_text = benchmark("my_autopilots:gentle", tasks=TASKS, episodes=2)
+    by_function = benchmark(
+        {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)}, tasks=TASKS, episodes=2
+    )
+    assert by_text.ranking == ["gentle"]
+    np.testing.assert_array_equal(
+        by_text.figures("gentle", "mariner-calm"), by_function.figures("gentle", "mariner-calm")
+    )
+    assert len(by_text.summary["contestants"]["gentle"]["files"]) == 1
+
+
+def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
+    kept = {
+        "tuned": {
+            "tasks": {
+                "mariner-calm": {
+                    "lq": {"settings": {"integral_lengths": 80.0}, "cost": 24.0},
+                    "pid": {"settings": {"damping": 0.9}, "cost": 25.0},
+                }
+            }
+        },
+        "oracle": {"mariner-calm": [float(k) for k in range(100)]},
+        "reference": {"mariner-calm": {"pid": 30.0, "oracle": 0.5}},
+    }
+    for name, content in kept.items():
+        (tmp_path / f"{name}.json").write_text(json.dumps(content))
+    monkeypatch.setattr("agents.benchmarking.direct_search.tuned_file", lambda suite: tmp_path / "tuned.json")
+    monkeypatch.setattr(
+        "agents.benchmarking.oracle_costs.suite_file", lambda suite, what: tmp_path / f"{what}.json"
+    )
+    monkeypatch.setattr(
+        "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
+    )
+    result = benchmark("tuned-best,tuned-lq,tuned-mpc,oracle", tasks=TASKS, episodes=2)
+    own = benchmark(
+        {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}, tasks=TASKS, episodes=2
+    )
+    for name in ("tuned-best", "tuned-lq"):
+        np.testing.assert_array_equal(
+            result.figures(name, "mariner-calm"), own.figures("own", "mariner-calm"), err_msg=name
+        )
+    refused = result.summary["contestants"]["tuned-mpc"]["refused"]["mariner-calm"]
+    assert "no tuned settings of 'mpc'" in refused
+    found = result.summary["tasks"]["mariner-calm"]
+    assert found["oracle"]["score"]["value"] == 1.0  # its first two costs are 0 and 1
+    cost = found["tuned-lq"]["cost"]["value"]
+    assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
+    assert result.ranking == ["oracle", "tuned-best", "tuned-lq", "tuned-mpc"]
+
+
+def test_classical_controllers_are_designed_for_the_ship_of_the_task():
+    keeping, path = (load_suite().task(name) for name in ("mariner-calm", "mariner-current"))
+    assert designed("lq", keeping) is designed("lq", path)  # the same ship and interval: designed once
+    guided = designed("ilos", path)
+    assert guided.design["dt"] == path.task.interval(path.ship)
+    assert guided.observation_scales[8] == path.task.corridor * path.ship.particulars["length"]
+    assert designed("ilos", keeping).kind == "lq"
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("lqq", "'lqq' found.*Did you mean 'lq'"),
+        ("pid,pid", "'pid' found twice"),
+        ("x=nobody.json", "'nobody.json' found"),
+        ("no_such_module:make", "'no_such_module:make' cannot be imported"),
+        ({"a": 3}, "'a' is 3, expected a controller"),
+        ([], "none found"),
+    ],
+)
+def test_wrong_contestants(given, said):
+    with pytest.raises(InputError, match=said):
+        contestants(given)
+
+
+def test_wrong_task_and_suite():
+    with pytest.raises(InputError, match="Did you mean 'mariner-calm'"):
+        benchmark("pid", tasks=["mariner-clam"])
+    with pytest.raises(InputError, match="suite: 'shipgym-v2' found"):
+        benchmark("pid", suite="shipgym-v2")
+
+
+def test_what_was_flown_is_true(folder):
+    checks = verify(folder)
+    assert [check.exact for check in checks] == [True, True]
+    assert {check.episodes for check in checks} == {N}
+
+
+def _rewritten(copy, change):
+    """Results whose table was changed, with hashes that fit."""
+    from agents.benchmarking.results import BenchmarkResult
+
+    result = load_results(copy)
+    columns = {name: values.copy() for name, values in result.episodes.items()}
+    change(columns)
+    BenchmarkResult(result.summary, columns).save(copy)
+
+
+def test_a_result_that_was_touched_up_is_found_out(copy):
+    def flatter(columns):
+        columns["cost"][columns["contestant"] == "lq"] *= 0.99
+
+    _rewritten(copy, flatter)
+    checks = {check.contestant: check for check in verify(copy)}
+    assert checks["pid"].passed
+    assert not checks["lq"].passed
+    assert checks["lq"].difference == pytest.approx(0.01, rel=0.02)
+    answer = shipgym("--verify", copy, "--workers", 1)
+    assert answer.exit_code == 1
+    assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "damage", "said"),
+    [
+        ("results.json", lambda data: data[:500], "may be cut short"),
+        ("results.json", lambda data: data.replace(b'"format": 1', b'"format": 9'), "format 9 found"),
+        ("results.json", lambda data: data.replace(b'"ranking"', b'"rankings"'), "unknown key 'rankings'"),
+        ("episodes.parquet", lambda data: data[:-10], "is not the one that results.json was written with"),
+    ],
+)
+def test_broken_results(copy, name, damage, said):
+    path = copy / name
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(InputError, match=said):
+        load_results(copy)
+
+
+def test_the_command_ranks_and_writes(tmp_path):
+    answer = shipgym(
+        "--controllers",
+        "pid",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        2,
+        "--workers",
+        1,
+        "--out",
+        tmp_path / "r",
+    )
+    assert answer.exit_code == 0, answer.stderr
+    assert "1 tasks of 2 episodes" in answer.stdout
+    assert "for a quick look, not for a ranking" in answer.stderr
+    assert load_results(tmp_path / "r").ranking == ["pid"]
+    again = shipgym(
+        "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
+        "--out", tmp_path / "r", "--resume", "--json",
+    )  # fmt: skip
+    assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
+
+
+def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
+    out = tmp_path / "r"
+    for arguments, said in (
+        (["--controllers", "pdi", "--out", out], "Did you mean 'pid'"),
+        (["--controllers", "pid"], "--out"),
+        (["--controllers", "pid", "--out", out, "--engine", "rai"], "engine: 'rai' found"),
+        (["--verify", out], "there is no such file of benchmark results"),
+    ):
+        answer = shipgym(*arguments)
+        assert (answer.exit_code, answer.stdout) == (2, "")
+        assert said in answer.stderr
+    assert not out.exists()

@@ -1,0 +1,152 @@
+import numpy as np
+import pytest
+
+from agents import LQ, PID, fly
+from agents.benchmarking.flying import fly_task
+from agents.benchmarking.metrics import reversals, step_figures, worst_step_cost
+from agents.benchmarking.suite import BenchmarkTask
+from shipgym import load_model
+
+KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})
+PATH = BenchmarkTask("path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1})
+SEEDS = np.arange(1_000_000, 1_000_006)
+
+
+@pytest.fixture(scope="module")
+def lq():
+    return LQ.from_model(load_model("mariner"))
+
+
+class Steers:
+    """Hands back what a function makes of the number of the call and the observations."""
+
+    def __init__(self, answer):
+        self.answer, self.calls = answer, 0
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        self.calls += 1
+        return self.answer(self.calls - 1, observation), state
+
+
+def steady(rudder):
+    return Steers(lambda call, seen: np.full((len(seen), 1), rudder, dtype=np.float32))
+
+
+def test_costs_and_errors_are_those_of_a_flight(lq):
+    flown = fly_task(lq, KEEPING, SEEDS).episodes
+    flight = fly(lq, KEEPING.ship, KEEPING.task, SEEDS)
+    np.testing.assert_allclose(flown["cost"], flight.cost, rtol=1e-14)
+    np.testing.assert_allclose(flown["cost_rudder_rate"], flight.rudder_rate_cost, rtol=1e-14)
+    np.testing.assert_allclose(flown["heading_rmse_deg"], flight.heading_rmse_deg, rtol=1e-14)
+    np.testing.assert_allclose(flown["rudder_travel_deg_min"], flight.rudder_travel_deg_min, rtol=1e-12)
+    np.testing.assert_array_equal(flown["duration_s"], flight.duration_s)
+
+
+def test_an_episode_does_not_depend_on_those_beside_it(lq):
+    many, one = fly_task(lq, PATH, SEEDS), fly_task(lq, PATH, SEEDS[2:3])
+    for name, values in one.episodes.items():
+        np.testing.assert_array_equal(values[0], many.episodes[name][2], err_msg=name)
+
+
+@pytest.mark.parametrize("task", [KEEPING, PATH], ids=lambda task: task.name)
+def test_the_worst_step_is_what_the_kernels_charge_for_the_rest(task):
+    flown = fly_task(steady(1.0), task, SEEDS[:2])  # hard over: she turns until control is lost, or aground
+    end, steps = flown.episodes["cost_end"], flown.recording.steps
+    assert flown.episodes["terminated"].all()
+    np.testing.assert_allclose(
+        end, worst_step_cost(task.task) * (task.task.episode_steps - steps), rtol=1e-12
+    )
+
+
+def test_straight_running_needs_the_fuel_of_straight_running():
+    calm = BenchmarkTask(
+        "calm", "course-keeping", "kvlcc2", options={"course_change_deg": 0.0, "episode_steps": 100}
+    )
+    flown = fly_task(LQ.from_model(calm.ship), calm, SEEDS[:2]).episodes
+    np.testing.assert_allclose(flown["fuel"], 1.0, atol=2e-3)
+    assert np.isnan(flown["overshoot_percent"]).all()  # no change of course, no figure
+
+
+def test_hard_over_makes_no_way_along_the_course_and_costs_more_fuel(lq):
+    turns = fly_task(steady(0.3), KEEPING, SEEDS[:2]).episodes["fuel"]
+    assert (turns > 1.2 * fly_task(lq, KEEPING, SEEDS[:2]).episodes["fuel"]).all()
+
+
+def test_a_path_is_followed_to_its_end_and_the_corridor_is_left_or_not(lq):
+    kept = fly_task(lq, PATH, SEEDS).episodes
+    left = fly_task(steady(0.2), PATH, SEEDS).episodes
+    assert kept["success"].all()
+    assert not kept["left_corridor"].any()
+    assert not kept["terminated"].any()  # to arrive is no loss of control
+    assert (left["outside_corridor"] > 0.0).all()
+    assert left["grounded"].all()
+    assert not left["success"].any()
+
+
+def test_reversals_within_the_dead_band_are_none():
+    t = np.linspace(0.0, 4.0 * np.pi, 401)
+    angle = np.radians(np.stack([5.0 * np.sin(t), 0.2 * np.sin(t), t], axis=1))
+    counts = np.ones((400, 3), dtype=np.bool_)
+    assert reversals(angle, counts).tolist() == [4.0, 0.0, 0.0]  # two periods: four turns; a tremble; a ramp
+    counts[100:] = False
+    assert reversals(angle, counts).tolist() == [1.0, 0.0, 0.0]
+
+
+def test_overshoot_and_settling_of_a_damped_oscillation():
+    t = np.arange(0.0, 60.0, 0.1)
+    for damping in (0.3, 0.6):
+        damped = np.sqrt(1.0 - damping**2)
+        response = np.exp(-damping * t) * (np.cos(damped * t) + damping / damped * np.sin(damped * t))
+        overshoot, settling, unsettled = step_figures(np.radians(-20.0) * response, 0.1)
+        assert overshoot == pytest.approx(100.0 * np.exp(-np.pi * damping / damped), abs=0.2)
+        outside = t[np.abs(response) > 0.05].max()
+        assert (settling, unsettled) == (pytest.approx(outside + 0.1), 0.0)
+    assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (0.0, 2.0, 1.0)  # has not settled
+
+
+FAILURES = {
+    "nan for one ship": lambda call, seen: np.where(
+        (np.arange(len(seen)) == 1) & (call >= 50), np.nan, 0.0
+    ).reshape(-1, 1),
+    "another shape": lambda call, seen: np.zeros((len(seen), 1 if call < 50 else 2)),
+    "an error": lambda call, seen: (
+        np.zeros((len(seen), 1)) / (0 if call < 0 else 1) if call < 50 else {}["missing"]
+    ),
+    "no numbers": lambda call, seen: np.zeros((len(seen), 1)) if call < 50 else [["port"]] * len(seen),
+}
+
+
+@pytest.mark.parametrize("how", FAILURES)
+def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(how):
+    sails = fly_task(steady(0.0), KEEPING, SEEDS[:3])
+    flown = fly_task(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
+    concerned = np.array([False, True, False]) if how == "nan for one ship" else np.ones(3, dtype=np.bool_)
+    assert (flown.episodes["failed"] > 0.0).tolist() == concerned.tolist()
+    assert "step 50" in flown.failure
+    steps = flown.recording.steps
+    assert (steps[concerned] == 50.0).all()
+    np.testing.assert_allclose(
+        flown.episodes["cost_end"][concerned], (250 - 50) * worst_step_cost(KEEPING.task), rtol=1e-12
+    )
+    for name, values in flown.episodes.items():
+        np.testing.assert_array_equal(values[~concerned], sails.episodes[name][~concerned], err_msg=name)
+
+
+def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
+    flown = fly_task(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
+    assert flown.episodes["failed"].all()
+    np.testing.assert_allclose(flown.episodes["cost"], 250 * worst_step_cost(KEEPING.task))
+    assert np.isnan(flown.episodes["heading_rmse_deg"]).all()
+
+
+def test_a_shield_is_counted(lq):
+    from agents.shield import Shielded
+
+    reckless = Shielded.from_model(KEEPING.ship, steady(1.0))
+    found = fly_task(reckless, KEEPING, SEEDS[:3]).episodes
+    assert not found["terminated"].any()
+    assert (found["interventions"] >= 1.0).all()
+    assert (found["shielded"] > 0.0).all()
+    never = fly_task(Shielded.from_model(KEEPING.ship, lq), KEEPING, SEEDS[:3]).episodes
+    np.testing.assert_array_equal(never["cost"], fly_task(lq, KEEPING, SEEDS[:3]).episodes["cost"])
+    assert fly_task(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3]).episodes["interventions"].sum() == 0.0

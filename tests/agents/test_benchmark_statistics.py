@@ -1,0 +1,117 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import trim_mean
+
+from agents.benchmarking.statistics import (
+    Draws,
+    aggregate_score,
+    improvement,
+    interquartile_cost,
+    interquartile_mean,
+    interval,
+    mean_cost,
+    performance_profile,
+    probability_of_improvement,
+    score,
+    weighted_interquartile_mean,
+)
+
+RANDOM = np.random.default_rng(0)
+
+
+def test_interquartile_mean_of_eight_scores_by_hand():
+    assert interquartile_mean([9.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0]) == (2.0 + 3.0 + 4.0 + 5.0) / 4.0
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=12),
+    st.integers(0, 2**32 - 1),
+)
+def test_weighted_interquartile_means_are_scipys_of_the_samples(values, seed):
+    array, n = np.array(values), len(values)
+    weights = np.random.default_rng(seed).multinomial(3 * n, np.full(n, 1.0 / n), 4)
+    expected = [trim_mean(np.repeat(array, row), 0.25) for row in weights]
+    np.testing.assert_allclose(weighted_interquartile_mean(array, weights), expected, atol=1e-9)
+
+
+def test_scores_are_the_way_from_pid_to_oracle():
+    assert score([30.0, 25.0, 20.0, 40.0], 30.0, 20.0).tolist() == [0.0, 0.5, 1.0, -1.0]
+    assert np.isnan(score(1.0, 2.0, 2.0))
+
+
+def test_interval_of_a_mean_is_that_of_theory():
+    costs = RANDOM.normal(50.0, 10.0, (1, 100))
+    found = mean_cost(costs, Draws(1, 100), 0)
+    assert found.value == costs.mean()
+    half = 1.96 * costs.std() / np.sqrt(100)
+    assert found.low == pytest.approx(costs.mean() - half, abs=0.2)
+    assert found.high == pytest.approx(costs.mean() + half, abs=0.2)
+
+
+def test_training_runs_that_differ_widen_the_interval():
+    alike = np.tile(RANDOM.normal(50.0, 1.0, 100), (5, 1))
+    apart = alike + np.array([[-20.0], [-10.0], [0.0], [10.0], [20.0]])
+    draws = Draws(1, 100)
+    narrow, wide = mean_cost(alike, draws, 0), mean_cost(apart, draws, 0)
+    assert narrow.value == pytest.approx(wide.value)
+    assert wide.high - wide.low > 10.0 * (narrow.high - narrow.low)
+
+
+def test_interquartile_cost_does_not_see_one_bad_end():
+    costs = RANDOM.normal(50.0, 1.0, (1, 100))
+    lost = costs.copy()
+    lost[0, 3] = 1e5
+    draws = Draws(1, 100)
+    assert interquartile_cost(costs, draws, 0).value == float(trim_mean(costs, 0.25, axis=None))
+    assert abs(interquartile_cost(lost, draws, 0).value - interquartile_cost(costs, draws, 0).value) < 0.1
+    assert interquartile_cost(lost, draws, 0).high < 52.0
+
+
+def test_aggregate_score_without_chance_is_the_interquartile_mean_of_the_scores():
+    levels = [0.0, 0.2, 0.4, 0.6, 0.8, 9.0, -9.0, 0.5]
+    costs = [np.full((1, 10), 30.0 - 10.0 * level) for level in levels]
+    found = aggregate_score(costs, [(30.0, 20.0)] * 8, Draws(8, 10), range(8), 0)
+    expected = float(interquartile_mean(levels))
+    assert found == pytest.approx((expected, expected, expected))
+
+
+def test_probability_of_improvement_is_paired_and_ties_count_half():
+    one, other = np.array([[1.0, 2.0, 3.0, 4.0]]), np.array([[2.0, 2.0, 1.0, 9.0]])
+    assert probability_of_improvement(one, other) == (1.0 + 0.5 + 0.0 + 1.0) / 4.0
+    assert probability_of_improvement(other, one) == 1.0 - probability_of_improvement(one, other)
+    runs = np.array([[0.0, 0.0], [5.0, 5.0]])  # one training run wins, the other loses
+    assert probability_of_improvement(runs, np.array([[1.0, 1.0]])) == 0.5
+
+
+def test_improvement_is_the_mean_over_common_tasks_with_its_interval():
+    better = {0: RANDOM.normal(10.0, 1.0, (1, 100)), 1: RANDOM.normal(10.0, 1.0, (3, 100))}
+    worse = {1: better[1] + 0.5, 0: better[0] + 0.5, 2: np.zeros((1, 100))}
+    draws = Draws(3, 100)
+    found = improvement(better, worse, draws, (0, 1))
+    each = [probability_of_improvement(better[k], worse[k]) for k in (0, 1)]
+    assert each[0] == 1.0
+    assert found.value == pytest.approx(np.mean(each))
+    assert found.low <= found.value <= found.high
+    back = improvement(worse, better, draws, (0, 1))
+    assert back.value == pytest.approx(1.0 - found.value)
+    assert np.isnan(improvement({0: better[0]}, {2: worse[2]}, draws, (0, 1)).value)
+
+
+def test_performance_profile_by_hand():
+    shares = performance_profile([[0.1, 0.5], [0.5, 0.9]], [-1.0, 0.1, 0.4, 0.5, 1.0])
+    assert shares.tolist() == [1.0, 0.75, 0.75, 0.25, 0.0]
+
+
+def test_percentile_interval():
+    assert interval(1.0, np.arange(1001.0)) == pytest.approx((1.0, 25.0, 975.0))
+
+
+def test_draws_are_the_same_every_time_and_others_for_each_task():
+    draws, again = Draws(2, 50), Draws(2, 50)
+    np.testing.assert_array_equal(draws.episodes, again.episodes)
+    np.testing.assert_array_equal(draws.runs(1, 4, 2), again.runs(1, 4, 2))
+    assert (draws.episodes[0] != draws.episodes[1]).any()
+    np.testing.assert_allclose(draws.episodes.sum(axis=2), 1.0)

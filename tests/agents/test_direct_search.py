@@ -1,0 +1,122 @@
+"""Direct search: it finds a known optimum within its budget, and refuses loops that are not sane."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents import PID
+from agents.benchmarking import direct_search
+from agents.benchmarking.direct_search import (
+    CLASSICAL,
+    REFUSED,
+    Setting,
+    episode_costs,
+    is_sane,
+    load_tuned,
+    search,
+    search_spaces,
+    tune,
+    tuned,
+    tuned_controller,
+)
+from agents.benchmarking.suite import BenchmarkTask, load_suite
+from agents.los_autopilot import LAWS
+from shipgym.errors import InputError
+from shipgym.json_file import write_json
+
+CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
+NOISY = BenchmarkTask("noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0})
+PATH = BenchmarkTask("path", "path-following", "mariner", "", {"episode_steps": 60})
+
+
+def bowl(asked: Mapping[str, float]) -> float:
+    return 1.0 + float(np.log(asked["a"] / 3.0) ** 2 + np.log(asked["b"] / 0.05) ** 2)
+
+
+def test_it_finds_the_bottom_of_a_bowl() -> None:
+    found = search(bowl, [[Setting("a", 1.0), Setting("b", 0.1)]], 80)
+    assert found.settings["a"] == pytest.approx(3.0, rel=0.02)
+    assert found.settings["b"] == pytest.approx(0.05, rel=0.02)
+    assert found.cost == pytest.approx(1.0, abs=1e-3)
+    assert found.start_cost == bowl({"a": 1.0, "b": 0.1})
+    assert found.evaluations <= 80
+
+
+def test_bounds_budget_and_alternatives_hold() -> None:
+    asked: list[float] = []
+
+    def cost(settings: Mapping[str, float]) -> float:
+        asked.append(settings["a"])
+        return REFUSED if settings["a"] < 0.8 else settings["a"] + (0.0 if "c" in settings else 10.0)
+
+    found = search(
+        cost, [[Setting("a", 1.0, 0.5, 2.0)], [Setting("a", 1.0, 0.5, 2.0), Setting("c", 1.0)]], 25
+    )
+    assert "c" in found.settings
+    assert found.settings["a"] == pytest.approx(0.8, abs=0.05)
+    assert found.start_cost == 11.0
+    assert found.evaluations == len(asked) <= 25
+    assert all(0.5 <= one <= 2.0 for one in asked)
+    with pytest.raises(InputError, match="every start is refused"):
+        search(lambda settings: REFUSED, [[Setting("a", 1.0)]], 5)
+
+
+def test_tuning_is_reproducible_never_worse_than_the_design_and_sane() -> None:
+    first, second = (tune("pid", NOISY, evaluations=8, episodes=4) for _ in range(2))
+    assert first == second
+    assert first.cost < first.start_cost
+    controller = tuned_controller("pid", NOISY, first.settings)
+    assert is_sane(controller)
+    seeds = direct_search.FIRST_SEED + np.arange(4)
+    assert episode_costs(controller, NOISY, seeds).mean() == pytest.approx(first.cost, rel=1e-12)
+    assert episode_costs(PID.from_model(CALM.ship), NOISY, seeds).mean() == pytest.approx(first.start_cost)
+
+
+def test_a_loop_with_little_margin_is_not_sane() -> None:
+    plain = PID.from_model(CALM.ship)
+    assert is_sane(plain)
+    assert not is_sane(replace(plain, margins=replace(plain.margins, phase_margin_deg=10.0)))
+    assert not is_sane(replace(plain, margins=replace(plain.margins, gain_margin=1.2)))
+
+
+@pytest.mark.parametrize("kind", CLASSICAL)
+def test_the_search_of_every_controller_starts_at_its_own_design(kind: str) -> None:
+    task = PATH if kind in LAWS else CALM
+    start = {one.name: one.start for one in search_spaces(kind, task)[0]}
+    designed, plain = tuned_controller(kind, task, start), tuned_controller(kind, task, {})
+    for name, gain in plain.gains.items():
+        assert designed.gains[name] == pytest.approx(gain, rel=1e-6), name
+
+
+def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
+    led = tuned_controller("los", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
+    inner = tuned_controller("lq", PATH, {"integral_lengths": 50.0})
+    assert getattr(led, "autopilot").gains == inner.gains  # noqa: B009
+    for ask in (search_spaces, lambda kind, task: tuned_controller(kind, task, {})):
+        with pytest.raises(InputError, match="no path"):
+            ask("los", CALM)
+
+
+def test_settings_found_are_read_from_the_file_of_the_suite(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "tuned.json"
+    monkeypatch.setattr(direct_search, "tuned_file", lambda suite: path)
+    found = {"pid": {"settings": {"damping": 1.0}, "cost": 2.0}, "lq": {"settings": {}, "cost": 3.0}}
+    write_json({"tasks": {"calm": found}}, path)
+    assert tuned("best", CALM, "any").kind == "pid"
+    assert tuned("pid", CALM, "any").design["damping"] == 1.0
+    with pytest.raises(InputError, match="no tuned settings of 'lqg' for task 'calm'"):
+        tuned("lqg", CALM, "any")
+
+
+def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
+    suite, found = load_suite(), load_tuned("shipgym-v1")
+    assert set(found) == {task.name for task in suite.tasks}
+    for task in suite.tasks:
+        best = min(found[task.name], key=lambda kind: float(found[task.name][kind]["cost"]))
+        assert is_sane(tuned(best, task, suite.name))
+        assert all(one["cost"] <= one["start_cost"] for one in found[task.name].values())

@@ -1,0 +1,222 @@
+"""Jobs give the same results wherever they run, outlive their workers, and are not done twice."""
+
+import json
+import math
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from http.server import BaseHTTPRequestHandler, HTTPServer
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.engines import JobError, WorkerDiedError, run_jobs
+from agents.job_text import pack, unpack
+from agents.ray_engine import check_answers
+from shipgym.errors import InputError
+
+JOBS = """
+import os, signal, time
+from pathlib import Path
+import numpy as np
+from shipgym.errors import InputError
+
+
+def spectrum(job):
+    x = np.random.default_rng(job["seed"]).normal(size=(60, 40))
+    return {"seed": job["seed"], "values": np.linalg.svd(x, compute_uv=False), "pair": (1, float("inf"))}
+
+
+def dies_at_first(job):
+    mark = Path(job["mark"])
+    if job["k"] == 1 and len(mark.read_text()) < job["deaths"]:
+        mark.write_text(mark.read_text() + "x")
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job["k"] ** 2
+
+
+def logged(job):
+    with Path(job["log"]).open("a") as log:
+        log.write(f"{job['k']}\\n")
+    if job["k"] == job["wrong"]:
+        raise InputError("k: 2 found, expected another number")
+    return job["k"]
+
+
+def divides(job):
+    return 1 / job["k"]
+
+
+def sleeps(job):
+    Path(job["pids"], str(os.getpid())).touch()
+    time.sleep(600)
+"""
+
+
+@pytest.fixture
+def functions(tmp_path, monkeypatch):
+    """A module of job functions that workers find too."""
+    (tmp_path / "engine_jobs.py").write_text(JOBS)
+    monkeypatch.syspath_prepend(tmp_path)
+    import engine_jobs
+
+    yield engine_jobs
+    del sys.modules["engine_jobs"]
+
+
+def same(a, b):
+    return json.dumps(pack(a)) == json.dumps(pack(b))
+
+
+def test_results_are_the_same_wherever_they_were_computed(functions, tmp_path):
+    jobs = [{"seed": seed} for seed in (3, 1, 3, 2)]
+    alone = run_jobs(functions.spectrum, jobs)
+    assert [result["seed"] for result in alone] == [3, 1, 3, 2]
+    assert alone[0]["values"] is not alone[2]["values"]
+    expected = np.linalg.svd(np.random.default_rng(1).normal(size=(60, 40)), compute_uv=False)
+    np.testing.assert_allclose(alone[1]["values"], expected, rtol=1e-12)
+    two = run_jobs(functions.spectrum, jobs, workers=2, keep=tmp_path / "kept")
+    resumed = run_jobs(functions.spectrum, jobs, keep=tmp_path / "kept")
+    assert same(alone, two)
+    assert same(alone, resumed)
+
+
+@pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")
+def test_ray_gives_the_same_results(functions, tmp_path):
+    jobs = [{"seed": seed} for seed in range(3)]
+    assert same(
+        run_jobs(functions.spectrum, jobs, engine="ray", workers=2), run_jobs(functions.spectrum, jobs)
+    )
+
+
+def test_killed_worker_is_replaced(functions, tmp_path):
+    mark = tmp_path / "mark"
+    mark.touch()
+    jobs = [{"k": k, "mark": str(mark), "deaths": 1} for k in range(4)]
+    assert run_jobs(functions.dies_at_first, jobs, workers=2) == [0, 1, 4, 9]
+    assert mark.read_text() == "x"
+
+
+def test_job_that_always_kills_its_worker_is_named_and_the_others_are_kept(functions, tmp_path):
+    mark = tmp_path / "mark"
+    mark.touch()
+    jobs = [{"k": k, "mark": str(mark), "deaths": 99} for k in range(2)]
+    with pytest.raises(WorkerDiedError, match=r'job \{"k": 1, .*its worker died 2 times'):
+        run_jobs(functions.dies_at_first, jobs, workers=2, retries=1, keep=tmp_path / "kept")
+    mark.write_text("x" * 99)
+    assert run_jobs(functions.dies_at_first, jobs, workers=1, keep=tmp_path / "kept") == [0, 1]
+
+
+def test_what_is_kept_is_not_done_again(functions, tmp_path):
+    log = tmp_path / "log"
+    jobs = [{"k": k, "log": str(log), "wrong": -1} for k in range(4)]
+    kept = tmp_path / "kept"
+    told = []
+    run_jobs(functions.logged, jobs[:3], keep=kept)
+    sorted(kept.iterdir())[0].write_text('{"cut short')
+    run_jobs(functions.logged, jobs, keep=kept, progress=lambda *progress: told.append(progress))
+    assert told == [(2, 4), (3, 4), (4, 4)]
+    assert len(log.read_text().split()) == 5
+    assert len(list(kept.iterdir())) == 4
+
+
+def test_wrong_input_of_a_job_is_told_with_the_job(functions, tmp_path):
+    jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
+    with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'):
+        run_jobs(functions.logged, jobs)
+    with pytest.raises(WorkerDiedError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
+        run_jobs(functions.divides, [{"k": 1}, {"k": 0}])
+    assert "return 1 / job" in caught.value.__notes__[0]
+
+
+def test_interrupt_ends_the_workers(functions, tmp_path):
+    pids = tmp_path / "pids"
+    pids.mkdir()
+    script = (
+        "import sys, engine_jobs\nfrom agents.engines import run_jobs\n"
+        "if __name__ == '__main__':\n"
+        "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"
+        "    try:\n        run_jobs(engine_jobs.sleeps, jobs, workers=2)\n"
+        "    except KeyboardInterrupt:\n        sys.exit(130)\n"
+    )
+    (tmp_path / "script.py").write_text(script)
+    environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{Path.cwd()}"}
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "script.py", pids], env=environment, stderr=subprocess.PIPE
+    ) as parent:
+        end = time.monotonic() + 60
+        while len(list(pids.iterdir())) < 2 and time.monotonic() < end:
+            time.sleep(0.05)
+        parent.send_signal(2)
+        error = parent.communicate(timeout=30)[1]
+    assert parent.returncode == 130, error
+    assert error == b""
+    for entry in pids.iterdir():
+        assert not Path("/proc", entry.name).exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"engine": "rai"}, "Did you mean 'ray'"),
+        ({"workers": 0}, "workers: 0 found"),
+        ({"retries": -1}, "retries: -1 found"),
+        ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
+        ({"engine": "ray", "address": "10.0.0.1"}, "expected 'HOST:PORT'"),
+        ({"function": lambda job: job}, "top level of a module"),
+        ({"jobs": [{"k": object()}]}, r"jobs\[0\]: .* found, expected a dict of numbers"),
+        ({"jobs": [{"k": math.nan}]}, r"jobs\[0\]"),
+        ({"jobs": [3]}, r"jobs\[0\]: 3 found, expected a dict"),
+    ],
+)
+@pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")
+def test_wrong_arguments(arguments, message):
+    given = {"function": os.path.join, "jobs": [{}]} | arguments
+    with pytest.raises(InputError, match=message):
+        run_jobs(given.pop("function"), given.pop("jobs"), **given)
+
+
+def test_address_that_does_not_answer():
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        port = silent.getsockname()[1]
+        with pytest.raises(InputError, match=r"no ray cluster answers .* \(Connection refused\)"):
+            check_answers(f"127.0.0.1:{port}")
+        silent.listen()
+        with pytest.raises(InputError, match=r"no ray cluster answers .* \(no answer\)"):
+            check_answers(f"ray://127.0.0.1:{port}", patience_s=0.2)
+
+
+def test_web_server_is_not_taken_for_ray():
+    class Page(BaseHTTPRequestHandler):
+        def log_message(self, *args):
+            """Say nothing."""
+
+    with HTTPServer(("127.0.0.1", 0), Page) as server:
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        with pytest.raises(InputError, match="is not ray; is it the right port"):
+            check_answers(f"127.0.0.1:{server.server_port}")
+
+
+def test_packing_keeps_types_shapes_and_bits():
+    value = {
+        "a": np.arange(6, dtype=">i2").reshape(2, 3)[:, ::2],
+        "b": [0.1 + 0.2, -0.0, math.nan, np.float32(0.1), np.True_, None],
+        "c": {"complex": np.array([1j, math.nan]), "empty": np.zeros((0, 3), dtype=np.float32)},
+    }
+    back = unpack(json.loads(json.dumps(pack(value), allow_nan=False)))
+    assert back["a"].dtype == ">i2"
+    np.testing.assert_array_equal(back["a"], [[0, 2], [3, 5]])
+    assert back["b"][:2] == [0.1 + 0.2, -0.0]
+    assert math.isnan(back["b"][2])
+    assert back["b"][3:] == [float(np.float32(0.1)), True, None]
+    np.testing.assert_array_equal(back["c"]["complex"], value["c"]["complex"])
+    assert back["c"]["empty"].shape == (0, 3)
+    for wrong in (object(), {3: 1}, np.array([None])):
+        with pytest.raises(TypeError, match="found in a result"):
+            pack(wrong)

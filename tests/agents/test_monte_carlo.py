@@ -1,0 +1,73 @@
+"""Monte Carlo over the posterior gives the same in this process, in others, resumed, and draw by draw."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from agents import LQ, PID, fly
+from agents.monte_carlo import Engine, monte_carlo
+from agents.spread import manoeuvre_spread
+from shipgym import InputError, load_model
+
+DRAWS, SEED = 28, 3  # two jobs
+
+
+@pytest.fixture(scope="module")
+def ship():
+    return load_model("mariner-tls-svm")
+
+
+@pytest.fixture(scope="module")
+def pilots(ship):
+    return PID.from_model(ship), LQ.from_model(ship)
+
+
+@pytest.fixture(scope="module")
+def found(ship, pilots):
+    return monte_carlo(pilots, ship, DRAWS, SEED)
+
+
+def assert_same(one, other):
+    assert [draw.coefficients for draw in one.draws] == [draw.coefficients for draw in other.draws]
+    np.testing.assert_array_equal(one.course_unstable, other.course_unstable)
+    np.testing.assert_array_equal(one.manoeuvres.unstable, other.manoeuvres.unstable)
+    np.testing.assert_array_equal(one.manoeuvres.zigzag_headings, other.manoeuvres.zigzag_headings)
+    for name, criterion in one.manoeuvres.criteria.items():
+        np.testing.assert_array_equal(criterion.drawn.values, other.manoeuvres.criteria[name].drawn.values)
+    for a, b in zip(one.flights, other.flights, strict=True):
+        for item in fields(a):
+            np.testing.assert_array_equal(getattr(a, item.name), getattr(b, item.name))
+
+
+def test_two_workers_give_the_same_and_what_they_did_is_resumed(found, ship, pilots, tmp_path):
+    told = []
+    engine = Engine(workers=2, keep=tmp_path)
+    assert_same(monte_carlo(pilots, ship, DRAWS, SEED, where=engine, progress=told.append), found)
+    assert told == sorted(told)
+    assert (told[0], told[-1]) == (0, DRAWS)
+    told.clear()
+    assert_same(
+        monte_carlo(pilots, ship, DRAWS, SEED, where=Engine(keep=tmp_path), progress=told.append), found
+    )
+    assert told == [DRAWS]
+
+
+def test_jobs_change_nothing_in_what_is_sailed_and_flown(found, ship, pilots):
+    drawn = ship.sample(DRAWS, SEED)
+    together = fly(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
+    np.testing.assert_array_equal(found.flights[1].cost, together.cost)
+    spread = manoeuvre_spread(ship, drawn)
+    for name, criterion in spread.criteria.items():
+        assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()
+    for one, other in zip(spread.circle_paths, found.manoeuvres.circle_paths, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_wrong_arguments(ship, pilots):
+    with pytest.raises(InputError, match="no covariance"):
+        monte_carlo([], load_model("mariner"), 10)
+    with pytest.raises(InputError, match="draws: 1 found"):
+        monte_carlo(pilots, ship, 1)
+    with pytest.raises(InputError, match="Did you mean 'local'"):
+        Engine("lokal").check()

@@ -1,0 +1,84 @@
+"""The ONNX graph commands what the policy does, for any number of ships."""
+
+import json
+import sys
+
+import numpy as np
+import onnxruntime
+import pytest
+from typer.testing import CliRunner
+
+from agents import LQ, Shielded
+from agents.cli import app
+from agents.onnx_export import export_onnx
+from shipgym.errors import InputError
+from tests.agents.policies import MARINER, random_network, random_policy
+
+LQ_MARINER = LQ.from_model(MARINER)
+POLICIES = {
+    "relu": random_policy(),
+    "tanh": random_policy(network=random_network(8, 16, 1, activation="tanh", output="tanh")),
+    "discrete": random_policy(action="rudder-discrete"),
+    "shaft": random_policy(action="rudder-shaft"),
+    "history": random_policy(history=3),
+    "residual": random_policy(base=LQ_MARINER, authority=0.6, history=2),
+}
+
+
+@pytest.mark.parametrize("name", POLICIES)
+def test_the_graph_commands_what_the_policy_does(name, tmp_path):
+    policy = POLICIES[name]
+    export_onnx(policy, tmp_path / "policy.onnx")
+    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
+    random = np.random.default_rng(0)
+    for n in (1, 64):
+        state, past = None, None
+        for step in range(4):
+            seen = random.uniform(-1.0, 1.0, (n, 8)).astype(np.float32)
+            expected, state = policy.predict(seen, state, np.full(n, step == 0))
+            past = [seen] * policy.history if past is None else [*past[1:], seen]
+            inputs = {"observations": np.concatenate(past, axis=1)}
+            if policy.base is not None:
+                inputs["base_action"] = policy.base.predict(seen)[0]
+            (action,) = session.run(["action"], inputs)
+            np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-6)
+
+
+def test_the_metadata_say_what_it_observes(tmp_path):
+    policy = POLICIES["residual"]
+    export_onnx(policy, tmp_path / "policy.onnx")
+    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
+    found = {key: json.loads(text) for key, text in session.get_modelmeta().custom_metadata_map.items()}
+    assert tuple(found["observation_names"]) == policy.observation_names
+    assert tuple(found["observation_scales"]) == policy.observation_scales
+    assert found["model"] == {"name": "mariner", "sha256": policy.model_sha256}
+    assert found["environment"]["id"] == "shipgym/CourseKeeping-v0"
+    assert (found["history"], found["authority"], found["base"]["kind"]) == (2, 0.6, "lq")
+
+
+def test_the_command_writes_it(tmp_path):
+    POLICIES["relu"].save(tmp_path / "ppo.json")
+    result = CliRunner().invoke(
+        app, ["export", str(tmp_path / "ppo.json"), "--onnx", str(tmp_path / "ppo.onnx")]
+    )
+    assert result.exit_code == 0, result.output
+    assert (tmp_path / "ppo.onnx").stat().st_size < 10_000
+    LQ_MARINER.save(tmp_path / "lq.json")
+    result = CliRunner().invoke(
+        app, ["export", str(tmp_path / "lq.json"), "--onnx", str(tmp_path / "lq.onnx")]
+    )
+    assert result.exit_code == 2
+    assert not (tmp_path / "lq.onnx").exists()
+
+
+def test_what_is_no_network_is_refused(tmp_path):
+    shield = Shielded.from_model(MARINER, POLICIES["relu"])
+    for policy, name in ((shield, "Shielded"), (LQ_MARINER, "LQ")):
+        with pytest.raises(InputError, match=f"policy: {name} found, expected a learned policy"):
+            export_onnx(policy, tmp_path / "policy.onnx")
+
+
+def test_without_onnx_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    with pytest.raises(InputError, match=r"pip install 'shipgym\[onnx\]'"):
+        export_onnx(POLICIES["relu"], tmp_path / "policy.onnx")

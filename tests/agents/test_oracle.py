@@ -1,0 +1,102 @@
+"""The oracle: copies of ships share their future, and what is found is never dearer than the start."""
+
+import numpy as np
+import pytest
+
+from agents import LQ, PID
+from agents.oracle import OracleSettings, fly_oracle
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.engine import Engine
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.variety import Variety
+from shipgym.errors import InputError
+from shipgym.models import load_model
+
+MARINER = load_model("mariner")
+QUICK = OracleSettings(
+    candidates=24, elites=4, iterations=2, passes=1, horizon_steps=90, plan_steps=60, knot_steps=10
+)
+SEEDS = np.arange(3)
+ONE_TURN = PathFollowingTask(
+    waypoints=[(0.0, 0.0), (1000.0, 0.0), (1000.0, 1000.0)], episode_steps=260, ground=8.0
+)
+
+
+@pytest.mark.parametrize("variety", [None, Variety(speed_range=(0.6, 1.0))], ids=["one ship", "drawn ships"])
+def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(variety: Variety | None) -> None:
+    task = CourseKeepingTask(sea="rough", noise=2.0, change_interval_steps=10)
+    ships, copies = Engine(MARINER, 3, task, variety), Engine(MARINER, 70, task, variety)
+    rudder = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 3, 1))
+    ships.reset(SEEDS)
+    for action in rudder[:25]:
+        ships.step(action)
+    lanes = np.arange(70) % 3
+    copies.copy_lanes(ships, lanes)
+    assert np.array_equal(copies.observations, ships.observations[lanes])
+    for action in rudder[25:]:
+        seen, rewards, *_ = ships.step(action)
+        copied, copied_rewards, *_ = copies.step(action[lanes])
+        assert np.array_equal(copied, seen[lanes])
+        assert np.array_equal(copied_rewards, rewards[lanes])
+
+
+def test_lanes_of_another_task_or_that_are_not_there_are_refused() -> None:
+    ships = Engine(MARINER, 2, CourseKeepingTask())
+    with pytest.raises(InputError, match="another task"):
+        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask(episode_steps=10)), [0, 1])
+    with pytest.raises(InputError, match="0 to 2 found, expected 0 to 1"):
+        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask()), [0, 2])
+    with pytest.raises(InputError, match="expected 2 whole numbers"):
+        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask()), [0])
+
+
+def test_it_prepares_a_turn_of_the_path_and_saves_more_than_a_quarter() -> None:
+    found = fly_oracle(MARINER, ONE_TURN, SEEDS, settings=QUICK)
+    assert np.all(found.costs < 0.75 * found.start_costs)
+
+
+def test_its_costs_are_those_of_its_rudder_and_of_its_start() -> None:
+    start = PID.from_model(MARINER, frequency=0.02)
+    found = fly_oracle(MARINER, ONE_TURN, SEEDS, start, QUICK)
+    ships = Engine(MARINER, len(SEEDS), ONE_TURN)
+    ships.reset(SEEDS)
+    steered = sum(ships.step(found.actions[:, [step]])[1] for step in range(ONE_TURN.episode_steps))
+    np.testing.assert_allclose(found.costs, -steered, rtol=1e-9)
+    seen, costs = ships.reset(SEEDS), 0.0
+    for _ in range(ONE_TURN.episode_steps):
+        seen, rewards, *_ = ships.step(start.predict(seen)[0])
+        costs -= rewards
+    np.testing.assert_allclose(found.start_costs, costs, rtol=1e-12)
+
+
+def test_it_is_never_dearer_than_its_start_and_knows_the_state_behind_the_noise() -> None:
+    task = CourseKeepingTask(sea="rough", noise=5.0, course_change_deg=5.0, episode_steps=120)
+    found = fly_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), QUICK)
+    assert np.all(found.costs < found.start_costs)
+    coarse = OracleSettings(candidates=4, elites=2, iterations=1, passes=1, spread=3.0)
+    found = fly_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), coarse)
+    assert np.all(found.costs <= found.start_costs)
+
+
+def test_an_episode_is_the_same_again_and_in_any_company() -> None:
+    task = CourseKeepingTask(course_change_deg=60.0, episode_steps=100, change_interval_steps=40)
+    together, alone = (
+        fly_oracle(MARINER, task, SEEDS, settings=QUICK),
+        fly_oracle(MARINER, task, [1], settings=QUICK),
+    )
+    assert np.array_equal(together.actions[1], alone.actions[0])
+    assert together.costs[1] == alone.costs[0]
+
+
+def test_it_does_not_know_a_course_change_before_it_is_ordered() -> None:
+    short = CourseKeepingTask(course_changes_deg=[0.0, 40.0], change_interval_steps=60, episode_steps=120)
+    none = CourseKeepingTask(course_changes_deg=[0.0], change_interval_steps=60, episode_steps=120)
+    quick = OracleSettings(candidates=16, elites=4, iterations=2, passes=1)
+    turned, straight = (fly_oracle(MARINER, task, [0], settings=quick).actions[0] for task in (short, none))
+    assert np.array_equal(turned[:60], straight[:60])
+    assert np.abs(turned[60:]).max() > 0.3
+
+
+def test_it_steers_by_the_rudder_alone() -> None:
+    with pytest.raises(InputError, match="expected 'rudder'"):
+        fly_oracle(MARINER, CourseKeepingTask(action="rudder-discrete"), SEEDS)

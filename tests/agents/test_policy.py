@@ -1,0 +1,159 @@
+"""A learned policy steers as its network and its base say, and refuses what it was not made for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents import LQ, LQG, LearnedPolicy, check_controller, fly
+from agents.policy import ORDERS, order_numbers
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.models import load_model
+from shipgym.models.mariner import mariner
+from tests.agents.policies import MARINER, random_network, random_policy
+
+RNG = np.random.default_rng(1)
+SEEN = RNG.uniform(-1.0, 1.0, (30, 8)).astype(np.float32)
+LQ_MARINER = LQ.from_model(MARINER)
+WITH_MEMORY = {
+    "history": {"history": 3},
+    "base": {"base": LQ_MARINER, "authority": 0.3},
+    "stateful base": {"base": LQG.from_model(MARINER), "authority": 0.3, "history": 2},
+}
+
+
+def by_hand(network, x):
+    """In double precision, layer by layer."""
+    for i, (weight, bias) in enumerate(network.layers):
+        x = weight.astype(float) @ x + bias
+        if i + 1 < len(network.layers):
+            x = np.tanh(x) if network.activation == "tanh" else np.maximum(x, 0.0)
+    return np.tanh(x) if network.output == "tanh" else np.clip(x, -1.0, 1.0)
+
+
+@pytest.mark.parametrize("activation", ["relu", "tanh"])
+@pytest.mark.parametrize("output", ["linear", "tanh"])
+def test_the_action_is_that_of_the_layers(activation, output):
+    policy = random_policy(network=random_network(8, 16, 16, 1, activation=activation, output=output))
+    actions, state = policy.predict(SEEN)
+    assert actions.dtype == np.float32
+    assert state is None
+    expected = [by_hand(policy.network, row.astype(float)) for row in SEEN]
+    np.testing.assert_allclose(actions, expected, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(policy.predict(SEEN[0])[0], expected[0], rtol=0.0, atol=1e-6)
+
+
+def test_a_discrete_policy_gives_the_order_with_the_largest_output():
+    policy = random_policy(action="rudder-discrete")
+    actions, _ = policy.predict(SEEN)
+    best = policy.network(SEEN).argmax(axis=1)
+    assert len(set(best.tolist())) > 1
+    np.testing.assert_array_equal(actions, ORDERS[best, None])
+    np.testing.assert_array_equal(order_numbers(actions), best)
+
+
+def test_rudder_and_shaft_are_two_commands():
+    assert random_policy(action="rudder-shaft").predict(SEEN)[0].shape == (30, 2)
+    assert random_policy(action="rudder-shaft").predict(SEEN[0])[0].shape == (2,)
+
+
+def test_the_history_begins_with_the_first_observation_and_is_kept_oldest_first():
+    policy = random_policy(history=3)
+    state, rows = None, [SEEN[:4], SEEN[4:8], SEEN[8:12], SEEN[12:16]]
+    shown = [[0, 0, 0], [0, 0, 1], [0, 1, 2], [1, 2, 3]]
+    for step, numbers in enumerate(shown):
+        actions, state = policy.predict(rows[step], state, np.zeros(4, bool))
+        inputs = np.concatenate([rows[k] for k in numbers], axis=1)
+        np.testing.assert_array_equal(actions, np.clip(policy.network(inputs), -1.0, 1.0))
+    begins = np.array([False, True, False, False])
+    actions, _ = policy.predict(SEEN[16:20], state, begins)
+    np.testing.assert_allclose(actions[1], policy.predict(SEEN[17])[0], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(actions[0], policy.predict(SEEN[16], (state.seen[0], None))[0], atol=1e-6)
+
+
+def test_the_network_adds_its_part_to_the_base():
+    policy = random_policy(base=LQ_MARINER, authority=0.3)
+    base, _ = LQ_MARINER.predict(SEEN)
+    part = np.clip(policy.network(np.concatenate([SEEN, base], axis=1)), -1.0, 1.0)
+    np.testing.assert_array_equal(policy.predict(SEEN)[0], np.clip(base + np.float32(0.3) * part, -1.0, 1.0))
+    silent = tuple((0.0 * weight, 0.0 * bias) for weight, bias in policy.network.layers)
+    quiet = replace(policy, network=replace(policy.network, layers=silent))
+    np.testing.assert_array_equal(fly(quiet, MARINER).cost, fly(LQ_MARINER, MARINER).cost)
+
+
+@pytest.mark.parametrize("more", [{}, {"action": "rudder-discrete"}, *WITH_MEMORY.values()], ids=list)
+def test_learned_policies_pass_the_conformance_suite(more):
+    policy = random_policy(**more)
+    check_controller(policy, n_steps=8)
+    check_controller(policy, MARINER, PathFollowingTask(), n_steps=3)
+
+
+def path_policy():
+    shown = PathFollowingTask(corridor=0.5).observed(MARINER)
+    return random_policy(
+        network=random_network(len(shown), 16, 1),
+        observation_names=tuple(one.name for one in shown),
+        observation_scales=tuple(one.scale for one in shown),
+        env_id="shipgym/PathFollowing-v0",
+        env_options={"corridor": 0.5},
+    )
+
+
+def test_a_policy_fits_what_it_learned_with():
+    random_policy().check_fits_model(MARINER)
+    path_policy().check_fits_model(MARINER)
+    assert fly(random_policy(), MARINER, CourseKeepingTask(episode_steps=5)).cost > 0.0
+
+
+def test_another_environment_is_refused_with_the_difference():
+    other = mariner(service_speed=4.0)
+    with pytest.raises(InputError, match=r"model 'mariner': the scale of 'yaw_rate' is .* policy 'learned'"):
+        random_policy().check_fits_model(other)
+    with pytest.raises(InputError, match="the scale of 'yaw_rate'"):
+        fly(random_policy(), load_model("kvlcc2"))
+    with pytest.raises(InputError, match=r"8 observations found, expected 13; .*: cross_track, course_error"):
+        fly(path_policy(), MARINER)
+    with pytest.raises(
+        InputError, match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last"
+    ):
+        path_policy().predict(SEEN)
+    wider = PathFollowingTask().observed(MARINER)
+    with pytest.raises(InputError, match=r"scale of 'cross_track' is 160.9.*learned with 80.4"):
+        path_policy().check_fits([one.name for one in wider], [one.scale for one in wider])
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"network": random_network(7, 4, 1)}, "network: 7 inputs found, expected 8: 1 x 8 observations"),
+        ({"network": random_network(8, 4, 2)}, "network: 2 outputs found, expected 1: for action 'rudder'"),
+        ({"action": "rudders"}, "action: 'rudders' found.*Did you mean 'rudder'"),
+        ({"history": 0}, "history: 0 found, expected a whole number of at least 1"),
+        ({"authority": 0.5}, "authority: 0.5 found without a base"),
+        ({"base": LQ_MARINER, "authority": -1.0}, "authority: -1 found"),
+        ({"base": LQ_MARINER, "action": "rudder-shaft"}, "'rudder-shaft' found beside a base"),
+        ({"base": LQ.from_model(load_model("kvlcc2"))}, "base: the scale of 'yaw_rate'"),
+        ({"observation_scales": (1.0,)}, "observation_scales: 1 found, expected 8"),
+    ],
+    ids=lambda value: "-".join(value) if isinstance(value, dict) else "",
+)
+def test_a_field_that_does_not_fit_is_named(more, message):
+    with pytest.raises(InputError, match=message):
+        random_policy(**more)
+
+
+def test_a_state_of_other_ships_is_refused():
+    policy = random_policy(history=2)
+    _, state = policy.predict(SEEN)
+    with pytest.raises(InputError, match=r"state: shape \(30, 1, 8\) found, expected \(4, 1, 8\)"):
+        policy.predict(SEEN[:4], state)
+    with pytest.raises(InputError, match="episode_start: 3 found, expected one for each of 30 ships"):
+        policy.predict(SEEN, state, np.zeros(3, bool))
+
+
+def test_the_public_name():
+    import agents
+
+    assert agents.LearnedPolicy is LearnedPolicy

@@ -1,0 +1,243 @@
+"""Training: what is learned, evaluated, kept and resumed."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import load_agent
+from agents.cli import app
+from agents.learning import training
+from agents.learning.algorithms import make_agent
+from agents.learning.evaluation import episode_costs
+from agents.learning.plan import EVALUATION_SEED, Given, make_plan, training_options
+from agents.learning.training import train
+from shipgym.errors import InputError
+
+TINY = {
+    "ppo": {"ships": 8, "n_steps": 32, "batch_size": 64, "n_epochs": 2, "total_steps": 768},
+    "sac": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
+    "td3": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
+    "tqc": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
+}
+SHORT = {"episode_steps": 20, "change_interval_steps": 10}
+OPTIONS = [f"--option={name}={value}" for name, value in SHORT.items()]
+SETTINGS = [f"--set={name}={value}" for name, value in {**TINY["ppo"], "net_arch": [8]}.items()]
+COMMAND = ["train", "ppo", *OPTIONS, *SETTINGS]
+
+
+@pytest.fixture(autouse=True)
+def few_episodes(monkeypatch):
+    monkeypatch.setattr(training, "N_EVALUATIONS", 10)
+
+
+def tiny(algorithm="ppo", **settings):
+    every = TINY[algorithm]["total_steps"] // 3
+    own = {**TINY[algorithm], "net_arch": [8], "evaluate_every": every, **settings}
+    return make_plan(Given(algorithm, options=SHORT, settings=own))
+
+
+def learned(folder):
+    return {name: (folder / name).read_bytes() for name in ("agent.safetensors", "last.safetensors")}
+
+
+def costs(result):
+    return [(row["steps"], row["cost"]) for row in result.curve]
+
+
+class StopError(Exception):
+    pass
+
+
+def stopping_at(steps):
+    def tell(now):
+        if now.steps >= steps:
+            raise StopError
+
+    return tell
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "settings"),
+    [
+        ("ppo", {"history": 2, "base": "lqg", "authority": 0.5}),
+        ("sac", {"reward_scale": 10.0}),
+        ("td3", {"buffer_size": 80}),
+        ("tqc", {"base": "lq", "ent_coef": 0.1}),
+    ],
+)
+def test_a_killed_run_ends_as_one_that_was_not(algorithm, settings, tmp_path, monkeypatch):
+    plan = tiny(algorithm, **settings)
+    whole = train(plan, tmp_path / "whole")
+    monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)
+    with pytest.raises(StopError):
+        train(plan, tmp_path / "killed", tell=stopping_at(2 * plan.settings.total_steps // 3))
+    resumed = train(plan, tmp_path / "killed", resume=True)
+    assert 0 < resumed.resumed_from < plan.settings.total_steps
+    assert learned(tmp_path / "whole") == learned(tmp_path / "killed")
+    assert costs(whole) == costs(resumed)
+
+
+def test_the_same_seed_learns_the_same_and_another_does_not(tmp_path):
+    plan = tiny()
+    for name, own in (("a", plan), ("b", plan), ("c", replace(plan, seed=1))):
+        train(own, tmp_path / name)
+    assert learned(tmp_path / "a") == learned(tmp_path / "b")
+    assert (tmp_path / "a" / "agent.json").read_text() == (tmp_path / "b" / "agent.json").read_text()
+    assert learned(tmp_path / "a") != learned(tmp_path / "c")
+
+
+def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
+    plan = tiny(base="lq", authority=0.3)
+    result = train(plan, tmp_path / "run")
+    seeds = EVALUATION_SEED + np.arange(10)
+    flown = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
+    assert flown.mean() == result.best_cost == min(row["cost"] for row in result.curve)
+    progress = json.loads((tmp_path / "run" / "progress.json").read_text())
+    assert progress["best_cost"] == result.best_cost
+    assert progress["lq_cost"] == result.lq_cost
+    assert [row["steps"] for row in progress["curve"]] == [0, 256, 512, 768]
+
+
+def test_the_residual_of_nothing_costs_what_its_base_does():
+    plan = tiny(base="lq", authority=1e-9, total_steps=1)
+    result = train(plan)
+    assert result.curve[0]["cost"] == pytest.approx(result.lq_cost, rel=1e-5)
+
+
+def test_time_that_is_up_is_made_up_for(tmp_path):
+    plan = tiny()
+    stopped = train(plan, tmp_path / "run", max_seconds=0.0)
+    assert not stopped.finished
+    finished = train(plan, tmp_path / "run", resume=True)
+    assert (finished.finished, finished.steps, finished.resumed_from) == (True, 768, 0)
+    assert costs(finished) == costs(train(plan))
+
+
+def test_randomised_ships_sail_all_seas_at_many_speeds():
+    plan = make_plan(Given("ppo", task="mariner-current", randomise=True))
+    options = training_options(plan)
+    assert [sea.name for sea in options["sea"]] == ["weather", "calm", "slight", "moderate", "rough"]
+    assert {sea.current for sea in options["sea"]} == {plan.task.task.weather.current}
+    assert options["speed_range"] == (0.8, 1.1)
+    assert "model_uncertainty" not in options  # a reference ship has no covariance
+    assert plan.task.task.seas == make_plan(Given("ppo", task="mariner-current")).task.task.seas
+
+
+def test_agents_have_the_settings():
+    agent = make_agent(tiny("tqc", gamma=0.9, tau=0.1, activation="tanh"), None)
+    assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (0.9, 0.1, [8])
+    assert agent.policy_kwargs["activation_fn"].__name__ == "Tanh"
+    assert agent.top_quantiles_to_drop_per_net == 2
+    assert agent.lr_schedule(0.5) == pytest.approx(0.5 * agent.lr_schedule(1.0))
+
+
+def test_a_diverged_training_says_so(monkeypatch):
+    def broken(plan, base):
+        agent = make_agent(plan, base)
+        agent.policy.action_net.bias.data[:] = np.nan
+        return agent
+
+    monkeypatch.setattr(training, "make_agent", broken)
+    with pytest.raises(InputError, match=r"diverged after 0 steps.*lower learning_rate"):
+        train(tiny())
+
+
+def shipgym(*words):
+    outcome = CliRunner().invoke(app, [str(word) for word in words])
+    return outcome.exit_code, outcome.output
+
+
+def test_the_command_trains_and_resumes(tmp_path):
+    run = tmp_path / "deep" / "run"
+    code, printed = shipgym(*COMMAND, "--out", run, "--json")
+    assert code == 0
+    told = json.loads(printed)
+    assert told["finished"]
+    assert told["configuration"]["settings"]["n_steps"] == 32
+    written = json.loads((run / "run.json").read_text())
+    assert written["configuration"] == told["configuration"]
+    assert {path.suffix for path in run.iterdir() if path.is_file()} == {".json", ".safetensors"}
+    before = learned(run)
+    code, printed = shipgym("train", "ppo", "--resume", "--out", run)
+    assert (code, learned(run)) == (0, before)
+    assert "resumed at step 768" in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["train", "pqo"], "Did you mean 'ppo'?"),
+        (["train", "ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'?"),
+        (["train", "ppo", "--env", "curse-keeping"], "Did you mean 'course-keeping'?"),
+        (["train", "ppo", "--set", "gama=0.9"], "Did you mean 'gamma'?"),
+        (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
+        (
+            ["train", "ppo", "--set", "batch_size=1000"],
+            "a divisor above 1 of ships x n_steps, 16384",
+        ),
+        (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
+        (["train", "ppo", "--set", "base=los"], "a task without a path"),
+        (["train", "ppo", "--set", "authority=0.5"], "without a base"),
+        (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
+        (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),
+        (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),
+        (["train", "ppo", "--settings", "none.toml"], "there is no such settings file"),
+        (["train", "ppo", "--resume"], "no run of training is there"),
+    ],
+)
+def test_wrong_input_is_one_message_and_nothing_written(words, expected, tmp_path):
+    code, printed = shipgym(*words, "--out", tmp_path / "run")
+    assert code == 2
+    assert expected in printed
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_in_use_is_not_written_over(tmp_path):
+    run = tmp_path / "run"
+    train(tiny(total_steps=1), run)
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    for words, expected in (
+        ([], "--resume, or name another folder"),
+        (["--resume", "--set", "gamma=0.5"], "settings.gamma is 0.99 there, 0.5 here"),
+        (["--resume", "--seed", "3"], "seed is 0 there, 3 here"),
+        (["--resume", "--model", "kvlcc2"], "model is 'mariner' there, 'kvlcc2' here"),
+    ):
+        code, printed = shipgym("train", "ppo", "--out", run, *words)
+        assert code == 2
+        assert expected in printed
+    code, printed = shipgym("train", "sac", "--resume", "--out", run)
+    assert (code, "algorithm is 'ppo' there, 'sac' here" in printed) == (2, True)
+    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+
+
+def test_a_checkpoint_cut_short_is_refused(tmp_path):
+    plan, run = tiny(total_steps=1), tmp_path / "run"
+    train(plan, run)
+    whole = (run / "checkpoint.safetensors").read_bytes()
+    (run / "checkpoint.safetensors").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="cut short"):
+        train(plan, run, resume=True)
+
+
+def test_a_process_that_is_killed_is_resumed(tmp_path):
+    run, whole = tmp_path / "run", tmp_path / "whole"
+    words = [*COMMAND, "--total-steps", "1000000", "--out", str(run)]
+    process = subprocess.Popen([sys.executable, "-m", "agents.cli", *words], env={**os.environ})
+    deadline = time.monotonic() + 60.0
+    while not (run / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    code, printed = shipgym("train", "ppo", "--resume", "--max-seconds", "0", "--out", run)
+    assert code == 0
+    assert "resumed at step" in printed
+    assert "go on with --resume" in printed.replace("\n", " ")
+    assert not whole.exists()

@@ -1,0 +1,178 @@
+"""Tuning proposes valid settings, goes on after any end as if nothing had happened, stops what is worse."""
+
+import random
+import sys
+
+import pytest
+from typer.testing import CliRunner
+
+from agents.cli import app
+from agents.learning.plan import Given, make_plan
+from agents.learning.search_space import SPACES, Choice, Wholes, with_parameters
+from agents.learning.settings import ALGORITHMS, load_settings
+from agents.learning.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
+from agents.monte_carlo import Engine
+from shipgym.errors import InputError
+
+optuna = pytest.importorskip("optuna", reason="optuna is not installed")
+
+TRAININGS = '''
+import math
+from pathlib import Path
+
+LOG = Path(__file__).with_name("log")
+ENDS_AT = []
+
+
+def bowl(job):
+    """A training whose cost depends on two settings only; it stops early as a real one does."""
+    with LOG.open("a") as log:
+        log.write("x")
+    if LOG.read_text().count("x") in ENDS_AT:
+        raise KeyboardInterrupt
+    settings = job["configuration"]["settings"]
+    cost = 5.0 + (math.log10(settings["learning_rate"]) + 3.3) ** 2 + abs(settings["clip_range"] - 0.15)
+    if cost > min((limit for _, limit in job["limits"]), default=math.inf):
+        return {"cost": None, "curve": [(10, cost)], "ended": "stopped early"}
+    return {"cost": cost, "curve": [(5, 2 * cost), (10, cost)], "ended": "finished"}
+
+
+def diverges(job):
+    return {"cost": None, "curve": [], "ended": "diverged", "why": "not finite"}
+'''
+
+
+@pytest.fixture
+def trainings(tmp_path, monkeypatch):
+    (tmp_path / "stand_in_trainings.py").write_text(TRAININGS)
+    monkeypatch.syspath_prepend(tmp_path)
+    import stand_in_trainings
+
+    yield stand_in_trainings
+    del sys.modules["stand_in_trainings"]
+
+
+def plan(**settings):
+    return make_plan(Given("ppo", settings={"total_steps": 10} | settings))
+
+
+def test_better_settings_are_found_and_written_for_training(trainings, tmp_path):
+    folder = tmp_path / "study"
+    found = tune(plan(), folder, 14, training=trainings.bowl)
+    assert found.best.cost < found.trials[0].cost
+    assert found.best.cost == min(trial.cost for trial in found.trials if trial.cost is not None)
+    settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
+    assert settings.to_dict() == dict(found.best.settings)
+    assert found.trials[0].settings == plan().settings.to_dict()
+    study = optuna.load_study(study_name="shipgym", storage=f"sqlite:///{folder / 'study.db'}")
+    assert len(study.trials) == 14
+    assert study.best_value == found.best.cost
+    stopped = [trial for trial in found.trials if trial.ended == "stopped early"]
+    assert stopped
+    states = [trial.state for trial in study.trials]
+    assert states.count(optuna.trial.TrialState.PRUNED) == len(stopped)
+
+
+def test_interrupted_study_goes_on_as_if_nothing_had_happened(trainings, tmp_path):
+    whole = tune(plan(), tmp_path / "whole", 9, training=trainings.bowl)
+    trainings.LOG.write_text("")
+    trainings.ENDS_AT.append(7)
+    with pytest.raises(KeyboardInterrupt):
+        tune(plan(), tmp_path / "study", 9, training=trainings.bowl)
+    assert tune(plan(), tmp_path / "study", 9, training=trainings.bowl) == whole
+    assert trainings.LOG.read_text() == "x" * 10  # nine, and the one that was interrupted
+    (tmp_path / "study" / "study.db").unlink()
+    assert tune(plan(), tmp_path / "study", 9, training=trainings.bowl) == whole
+    assert trainings.LOG.read_text() == "x" * 10
+
+
+def test_two_workers_find_the_same(trainings, tmp_path):
+    one = tune(plan(), tmp_path / "one", 5, training=trainings.bowl)
+    assert tune(plan(), tmp_path / "two", 5, training=trainings.bowl, where=Engine(workers=2)) == one
+
+
+def test_settings_that_are_given_are_not_varied(trainings, tmp_path):
+    found = tune(
+        plan(gamma=0.9), tmp_path / "study", 5, fixed=("gamma", "batch_size"), training=trainings.bowl
+    )
+    assert {trial.settings["gamma"] for trial in found.trials} == {0.9}
+    assert not any("minibatches" in trial.parameters for trial in found.trials)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_whatever_is_proposed_are_valid_settings(algorithm):
+    settings = load_settings(algorithm)
+    draw = random.Random(1)
+    for _ in range(100):
+        parameters = {}
+        for name, dimension in SPACES[algorithm].items():
+            if isinstance(dimension, Choice):
+                parameters[name] = draw.choice(dimension.options)
+            elif isinstance(dimension, Wholes):
+                parameters[name] = draw.randint(dimension.low, dimension.high)
+            else:
+                parameters[name] = draw.uniform(dimension.low, dimension.high)
+        found = with_parameters(settings, parameters)
+        assert found.gamma == 1.0 - parameters["one_minus_gamma"]
+        assert len(found.net_arch) == 2
+
+
+def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
+    curves = [((100, 9.0 - k), (200, 8.0 - k), (300, 8.5 - k)) for k in range(4)]
+    trials = [Trial(k, {}, {}, 8.0 - k, curve, "finished") for k, curve in enumerate(curves)]
+    trials.append(Trial(4, {}, {}, None, ((100, 1.0),), "stopped early"))
+    assert limits(trials[:3], 400) == []
+    found = limits(trials, 400)
+    assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
+    assert allowed(found, 50) == float("inf")
+    assert allowed(found, 250) == 6.5
+
+
+def test_folder_of_something_else_is_refused(trainings, tmp_path):
+    tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
+    with pytest.raises(InputError, match=r"configuration\.settings\.gamma is 0\.99 there, 0\.9 here"):
+        tune(plan(gamma=0.9), tmp_path / "study", 1, training=trainings.bowl)
+    with pytest.raises(InputError, match="exists and is no study"):
+        tune(plan(), tmp_path, 1, training=trainings.bowl)
+    (tmp_path / "study" / "study.db").write_text("no database " * 100)
+    with pytest.raises(InputError, match="not a study of Optuna"):
+        tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
+    with pytest.raises(InputError, match="every trial diverged, the first: not finite"):
+        tune(plan(), tmp_path / "other", 5, training=trainings.diverges)
+
+
+def test_trials_are_trainings_that_stop_when_they_fall_behind():
+    pytest.importorskip("stable_baselines3")
+    small = {"total_steps": 256, "ships": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 1}
+    job = {"configuration": evaluated_evenly(plan(**small)).configuration(), "limits": []}
+    finished = train_trial(job)
+    assert finished["ended"] == "finished"
+    assert finished["cost"] == min(cost for _, cost in finished["curve"])
+    behind = train_trial({**job, "limits": [(100, 0.0)]})
+    assert behind["ended"] == "stopped early"
+    assert behind["curve"] == finished["curve"][: len(behind["curve"])]
+    assert len(behind["curve"]) < len(finished["curve"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["pppo"], "Did you mean 'ppo'"),
+        (["ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'"),
+        (["ppo", "--set", "gama=0.9"], "Did you mean 'gamma'"),
+        (["ppo", "--engine", "rays"], "Did you mean 'ray'"),
+        (["ppo", "--address", "h:1"], "it is for engine 'ray'"),
+        (["sac", "--env", "corse-keeping"], "Did you mean 'course-keeping'"),
+    ],
+)
+def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
+    answer = CliRunner().invoke(app, ["tune", *arguments, "--out", str(tmp_path / "study")])
+    assert answer.exit_code == 2
+    assert message in answer.stderr.replace("\n", " ")
+    assert not (tmp_path / "study").exists()
+
+
+def test_missing_optuna_is_told_with_its_extra(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.learning.tuning.find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"pip install 'shipgym\[tune\]'"):
+        tune(plan(), tmp_path / "study", 1)
