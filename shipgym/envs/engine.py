@@ -264,6 +264,7 @@ class Engine:
             _lanes_of(own)[here[0], :, here[1]] = _lanes_of(other)[there[0] % len(other), :, there[1]]
         self.shown.observations[:] = source.shown.observations[which]
         self.shown.outcomes[:] = source.shown.outcomes[:, which]
+        self.shown.flags[:] = source.shown.flags[:, which]
 
     def _check_alike(self, source: Engine) -> None:
         """Refuse an engine whose lanes cannot be taken over."""

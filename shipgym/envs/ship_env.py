@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar, SupportsFloat
 
@@ -183,7 +184,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         """
         self._order(action)
         if self._advance(False) == REFUSED:
-            raise InputError(f"action: {action} found, expected numbers in [-1, 1]: parts of the limit")
+            wrong = next(number for number in self._command.tolist() if not isfinite(number))
+            raise InputError(f"action: {wrong} found, expected numbers in [-1, 1]: parts of the limit")
         values = self._outcomes.tolist()
         info = self._info(values[STEP_OUTCOME:])
         if self._artist is not None:
