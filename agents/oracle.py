@@ -14,6 +14,7 @@ parallel); Bertsekas 2019, Reinforcement Learning and Optimal Control, 2.4 (roll
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -196,7 +197,7 @@ class _Search:
         costs, added, actions = self._nothing_yet()
         seen, state, starts = self.ships.reset(self.seeds), None, np.ones(self.n, dtype=np.bool_)
         course = np.full(self.n, np.nan)
-        for step in range(self.task.episode_steps):
+        for step in self._steps():
             self._ordered[:, step] = course != self.ships.outcome(rows.COURSE)
             course = self.ships.outcome(rows.COURSE)
             action, state = policy.predict(seen, state, starts, True)
@@ -211,11 +212,18 @@ class _Search:
         """Cost, plan and rudder of a plan that is kept to."""
         costs, _, actions = self._nothing_yet()
         self.ships.reset(self.seeds)
-        for step in range(self.task.episode_steps):
+        for step in self._steps():
             self._steer(self.ships, added[:, step])
             actions[:, step] = self.ships.command[0]
             costs -= self.ships.shown.outcomes[0]
         return costs, added, actions
+
+    def _steps(self) -> Iterator[int]:
+        """Control intervals until all episodes are over."""
+        for step in range(self.task.episode_steps):
+            if self.ships.outcome(rows.ENDED).all():
+                return
+            yield step
 
     def _nothing_yet(self) -> tuple[Floats, Floats, NDArray[np.float32]]:
         shape = (self.n, self.task.episode_steps)
@@ -226,10 +234,10 @@ class _Search:
         costs, added, actions = self._nothing_yet()
         self.ships.reset(self.seeds)
         next_plan = np.zeros(self.n, dtype=np.int64)
-        for step in range(self.task.episode_steps):
+        for step in self._steps():
             for lane in np.flatnonzero(self._ordered[:, step]) if self._changes_course or step == 0 else ():
                 added[lane, step:] = 0.0
-                end = self._next_order(lane, step)
+                end = self._next_order(int(lane), step)
                 added[lane, step:end] = last[lane, step:end]
                 next_plan[lane] = step
             due = np.flatnonzero((next_plan <= step) & (self.ships.outcome(rows.ENDED) == 0.0))
@@ -268,7 +276,7 @@ class _Search:
             elites = np.take_along_axis(knots, order[:, : asked.elites, None], axis=1)
             mean += LEARNING * (elites.mean(axis=1) - mean)
             spread += LEARNING * (np.maximum(elites.std(axis=1), LEAST_SPREAD) - spread)
-        added[which, step : step + shape.shape[1]] += change @ shape
+        added[which, step : step + shape.shape[1]] += (change[:, None] @ shape)[:, 0]
 
     def _shape(self, step: int) -> Floats:
         """Change of the plan per knot, shape (n_knots, n_steps): straight between knots, 0 at the end."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.page_figures import styles
 from agents.benchmarking.refly import SAME_COST, Flight, Reflown, cost_of
 from agents.benchmarking.results import BenchmarkResult
 from agents.replay import player
@@ -111,6 +112,7 @@ def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[s
     runs: list[dict[str, Any]] = []
     whole: list[dict[str, Any]] = []
     entries: dict[str, list[dict[str, Any]]] = {}
+    look = styles(result.ranking)
     for task in result.tasks:
         entries[task] = []
         for who, flights in entries_of(result, task, count):
@@ -121,7 +123,7 @@ def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[s
                 if flight not in kept:
                     kept[flight] = len(runs)
                     whole.append(thin(reflown.episodes[flight], _called(result, flight)))
-                    runs.append(short(whole[-1]))
+                    runs.append({**short(whole[-1]), "colour": look[flight.contestant][0]})
             entries[task].append(
                 {
                     "who": who,

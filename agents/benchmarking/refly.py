@@ -236,7 +236,7 @@ def _episode(task: BenchmarkTask, watch: _Watch, flown: Flown, lane: int) -> Epi
         info={name: values for name, values in info.items() if name not in {*parts, *SUCCESS}},
         waypoints=watch.waypoints[lane] if isinstance(task.task, PathFollowingTask) else None,
         corridor=None if corridor is None else corridor * ship.particulars["length"],
-        arguments=plain({"model": task.model, "options": task.options}),
+        arguments=plain({"model": task.model, **task.options}),
         seed=int(flown.seeds[lane]),
         terminated=lost or any(said),
         truncated=steps == task.task.episode_steps and not (lost or failed or any(said)),

@@ -15,7 +15,15 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from agents.controller import Controller
 from agents.learning.plan import Plan, training_options
 from agents.learning.residual import ResidualVecEnv
-from agents.learning.settings import RUNNING, PPOSettings, SACSettings, Settings, TD3Settings, TQCSettings
+from agents.learning.settings import (
+    LEARNED,
+    RUNNING,
+    PPOSettings,
+    SACSettings,
+    Settings,
+    TD3Settings,
+    TQCSettings,
+)
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
 from shipgym.kernels import layout
@@ -129,6 +137,16 @@ def _rate(settings: Settings) -> float | Callable[[float], float]:
     if settings.schedule == "constant":
         return settings.learning_rate
     return lambda left: settings.learning_rate * left
+
+
+def set_deviation(agent: Any, settings: Settings) -> None:
+    """Let PPO's exploration be what it shall be at this part of the training, unless it is learned."""
+    if not isinstance(settings, PPOSettings) or settings.log_std_end == LEARNED:
+        return
+    if hasattr(agent.policy, "log_std"):  # discrete orders have none
+        done = min(agent.num_timesteps / settings.total_steps, 1.0)
+        begin, end = settings.log_std_init, float(settings.log_std_end)
+        agent.policy.log_std.data.fill_(begin + done * (end - begin))
 
 
 def algorithm_class(name: str) -> Any:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import inspect
 from importlib import import_module
 
-from agents.benchmarking.suite import BenchmarkTask
+from agents.benchmarking.direct_search import tuned
+from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask
 from agents.controller import Controller
 from agents.controller_file import HOMES, load_agent
 from shipgym.envs.path_following_task import PathFollowingTask
@@ -18,7 +19,8 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     Parameters
     ----------
     name : str
-        "none", a kind of controller, which is designed on the task's ship, or a controller's file.
+        "none"; a kind of controller, which is designed on the task's ship; "tuned", the best of those that
+        were tuned for the suite's task; or a controller's file.
     task : BenchmarkTask
         The ship, the control interval and the path.
 
@@ -33,6 +35,8 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     """
     if name == "none":
         return None
+    if name == "tuned":
+        return tuned("best", task, DEFAULT_SUITE)
     if name.endswith(".json"):
         agent = load_agent(name, task.ship)
         if not isinstance(agent, Controller):

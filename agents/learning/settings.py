@@ -22,11 +22,13 @@ from shipgym.checks import check_choice, check_keys, check_number, check_table, 
 from shipgym.errors import InputError
 
 SCHEDULES = ("constant", "linear")
-RUNNING = "running"
+RUNNING, LEARNED = "running", "learned"
 ACTIVATIONS = ("relu", "tanh")
-#: Classical controllers that a policy may add to, by name; a path that ends in .json is a controller's file.
+#: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
+#: task, and a path that ends in .json is a controller's file.
 BASES = (
-    "none", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos", "alos",
+    "none", "tuned", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos",
+    "alos",
 )  # fmt: skip
 
 
@@ -141,6 +143,9 @@ class PPOSettings(Settings):
         Longest gradient.
     log_std_init : float
         Logarithm of the action's deviation at the beginning.
+    log_std_end : float or "learned"
+        To which it falls evenly over the training. A rudder that trembles costs more than steering does, and
+        what steers best while it trembles is not what steers best without.
     """
 
     n_steps: int
@@ -151,6 +156,7 @@ class PPOSettings(Settings):
     vf_coef: float
     max_grad_norm: float
     log_std_init: float
+    log_std_end: float | str
 
     WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {"n_steps": 1, "n_epochs": 1}
     NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {
@@ -163,6 +169,8 @@ class PPOSettings(Settings):
     }
 
     def _check_rollout(self) -> None:
+        if self.log_std_end != LEARNED:
+            check_number(self.log_std_end, "log_std_end", at_least=-10.0, at_most=3.0, hint=f"or '{LEARNED}'")
         samples = self.ships * self.n_steps
         if samples % self.batch_size or self.batch_size < 2:
             raise InputError(

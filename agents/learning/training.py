@@ -29,7 +29,7 @@ try:
     from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
 
     from agents.learning import checkpoints
-    from agents.learning.algorithms import make_agent
+    from agents.learning.algorithms import make_agent, set_deviation
 except ModuleNotFoundError as error:
     raise InputError(f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'") from None
 
@@ -259,6 +259,7 @@ class _Training:
             self.tell(self._progress(due))
         if time.monotonic() - self.kept_at >= CHECKPOINT_SECONDS:
             self.keep()
+        set_deviation(self.agent, self.plan.settings)
         if self.max_seconds is not None and time.monotonic() - self.started >= self.max_seconds:
             self.keep()
             raise _TimeIsUpError

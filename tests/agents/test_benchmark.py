@@ -272,24 +272,16 @@ def test_broken_results(copy, name, damage, said):
 
 def test_the_command_ranks_and_writes(tmp_path):
     answer = shipgym(
-        "--controllers",
-        "pid",
-        "--tasks",
-        "mariner-calm",
-        "--episodes",
-        2,
-        "--workers",
-        1,
-        "--out",
-        tmp_path / "r",
-    )
+        "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
+        "--out", tmp_path / "r", "--no-page",
+    )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     assert "1 tasks of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
     again = shipgym(
         "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
-        "--out", tmp_path / "r", "--resume", "--json",
+        "--out", tmp_path / "r", "--resume", "--json", "--no-page",
     )  # fmt: skip
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
 

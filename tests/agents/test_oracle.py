@@ -62,7 +62,7 @@ def test_its_costs_are_those_of_its_rudder_and_of_its_start() -> None:
     ships.reset(SEEDS)
     steered = sum(ships.step(found.actions[:, [step]])[1] for step in range(ONE_TURN.episode_steps))
     np.testing.assert_allclose(found.costs, -steered, rtol=1e-9)
-    seen, costs = ships.reset(SEEDS), 0.0
+    seen, costs = ships.reset(SEEDS), np.zeros(len(SEEDS))
     for _ in range(ONE_TURN.episode_steps):
         seen, rewards, *_ = ships.step(start.predict(seen)[0])
         costs -= rewards

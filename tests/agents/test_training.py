@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from agents import load_agent
 from agents.cli import app
 from agents.learning import training
-from agents.learning.algorithms import make_agent
+from agents.learning.algorithms import make_agent, make_ships, set_deviation
 from agents.learning.evaluation import episode_costs
 from agents.learning.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.learning.training import train
@@ -137,6 +137,32 @@ def test_agents_have_the_settings():
     assert agent.policy_kwargs["activation_fn"].__name__ == "Tanh"
     assert agent.top_quantiles_to_drop_per_net == 2
     assert agent.lr_schedule(0.5) == pytest.approx(0.5 * agent.lr_schedule(1.0))
+
+
+def test_ships_that_learn_begin_one_after_another():
+    ships = make_ships(tiny(ships=20, n_steps=32, batch_size=64), None)
+    ships.reset()
+    still = np.zeros((20, 1), np.float32)
+    ended = np.array([ships.step(still)[2] for _ in range(60)])
+    assert (ended.sum(axis=1) == 1).all()  # of 20 ships with episodes of 20 steps
+
+
+def test_exploration_falls_to_what_is_asked():
+    agent = make_agent(tiny(log_std_init=-1.0, log_std_end=-3.0), None)
+    agent.num_timesteps = 384
+    set_deviation(agent, tiny(log_std_init=-1.0, log_std_end=-3.0).settings)
+    assert agent.policy.log_std.item() == pytest.approx(-2.0)
+    set_deviation(agent, tiny(log_std_end="learned").settings)
+    assert agent.policy.log_std.item() == pytest.approx(-2.0)
+
+
+def test_rewards_are_divided_by_their_scale():
+    plain, scaled = (make_ships(tiny(reward_scale=scale), None) for scale in (1.0, 50.0))
+    for ships in (plain, scaled):
+        ships.seed(0)
+        ships.reset()
+        ships.step_async(np.ones((8, 1), np.float32))
+    np.testing.assert_allclose(scaled.step_wait()[1], plain.step_wait()[1] / 50.0, rtol=1e-6)
 
 
 def test_a_diverged_training_says_so(monkeypatch):

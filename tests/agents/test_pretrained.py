@@ -1,0 +1,46 @@
+"""The shipped agents are what their records say."""
+
+import numpy as np
+import pytest
+
+from agents import load_agent
+from agents.benchmarking.contestants import check_fits, pretrained
+from agents.benchmarking.suite import load_suite
+from agents.controller import model_hash
+from agents.learning.evaluation import episode_costs
+from agents.policy import LearnedPolicy
+
+SUITE = load_suite()
+PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode
+
+
+def agent_of(task):
+    paths = pretrained(task.name, "ppo")
+    assert len(paths) == 1
+    return paths[0], load_agent(paths[0])
+
+
+@pytest.mark.parametrize("task", SUITE.tasks, ids=lambda task: task.name)
+def test_each_task_has_an_agent_with_a_whole_record(task):
+    path, agent = agent_of(task)
+    assert isinstance(agent, LearnedPolicy)
+    check_fits(agent, task, task.name)
+    assert agent.model_sha256 == model_hash(task.ship)
+    assert path.stat().st_size + path.with_suffix(".safetensors").stat().st_size < 300_000
+    record = agent.training
+    assert record["task"] == task.name
+    assert f"--task {task.name} --seed {record['seed']}" in record["command"]
+    held_out = {run["seed"]: run["held_out_cost"] for run in record["runs"]}
+    assert record["seed"] == min(held_out, key=held_out.get)
+    for run in record["runs"]:
+        assert run["held_out_cost"] == pytest.approx(min(cost for _, cost in run["curve"]), abs=1e-3)
+    for first, last in (record["training_seeds"], record["evaluation_seeds"]):
+        assert first <= last < task.seeds[0]
+
+
+@pytest.mark.parametrize("name", ["mariner-calm", "container-path"])
+def test_the_score_is_what_is_flown(name):
+    task = SUITE.task(name)
+    _, agent = agent_of(task)
+    costs = episode_costs(agent, task.engine(len(task.seeds)), np.asarray(task.seeds))
+    assert costs.mean() == pytest.approx(agent.training["score"]["cost"], rel=PARTS)
