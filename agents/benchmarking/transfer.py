@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.direct_search import tune, tuned_controller
+from agents.benchmarking.designs import design
+from agents.benchmarking.direct_search import tune
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
@@ -203,7 +204,7 @@ def _tuned(case: TransferCase, folder: Path, engine: str, workers: int) -> Contr
     searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
     found = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
     best = min(found, key=lambda result: float(result["cost"]))
-    return tuned_controller(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
+    return design(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
 
 
 def tune_one(job: dict[str, Any]) -> dict[str, Any]:
