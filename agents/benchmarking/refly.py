@@ -16,8 +16,8 @@ from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controller import Policy
 from agents.engines import run_jobs
-from shipgym.envs.engine import STEP_OUTCOME
 from shipgym.envs.recording import SUCCESS, plain
+from shipgym.envs.screen import STEP_OUTCOME
 from shipgym.episode import Episode
 from shipgym.errors import InputError
 
