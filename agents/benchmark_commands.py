@@ -10,6 +10,7 @@ import typer
 from agents.command import FAILED, INTERRUPTED, Json, answered, fail
 
 if TYPE_CHECKING:
+    from agents.autopilot import Progress
     from agents.benchmarking.results import BenchmarkResult
 
 
@@ -24,7 +25,8 @@ def benchmark_command(
         ),
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Folder for results.json and episodes.parquet.")
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
     ] = None,
     suite: Annotated[str, typer.Option(help="Tasks by the name of their suite.")] = "shipgym-v1",
     tasks: Annotated[str | None, typer.Option(help="Only these tasks of it, separated by commas.")] = None,
@@ -39,6 +41,9 @@ def benchmark_command(
     episodes: Annotated[
         int, typer.Option(min=1, max=100, help="The first so many of each task: for a quick look.")
     ] = 100,
+    page: Annotated[
+        bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
+    ] = True,
     verify: Annotated[
         Path | None,
         typer.Option(metavar="RESULTS", help="Instead, fly a sample of these results again and compare."),
@@ -78,10 +83,24 @@ def benchmark_command(
                 resume=resume,
                 episodes=episodes,
             )
+            if page:
+                _write_page(result, out, workers, progress)
     except KeyboardInterrupt:
         fail(f"interrupted; what was flown is kept in {out}: go on with --resume", INTERRUPTED)
         return
     _told(result, out, as_json)
+
+
+def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progress: Progress | None) -> None:
+    """Write the page; the results are there even where it cannot be, without plotly."""
+    from agents.benchmarking.page import PAGE, write_page
+    from agents.terminal import warn
+    from shipgym.errors import InputError
+
+    try:
+        write_page(result, out / PAGE, workers=workers, progress=progress)
+    except InputError as error:
+        warn(f"there is no {PAGE}: {error}")
 
 
 def _told(result: BenchmarkResult, out: Path, as_json: bool) -> None:

@@ -74,8 +74,8 @@ def environments_table() -> None:
         "| ships | threads | steps each | million steps/s of processor | million steps/s by the clock, best |"
     )
     print("| ---: | ---: | ---: | ---: | ---: |")
-    for ships in (64, 256, 1024, 4096, 16384):
-        steps = max(20, 400_000 // ships)
+    for ships in (64, 256, 1024, 4096):
+        steps = max(20, 200_000 // ships)
         engines = {threads: task.engine(ships, threads=threads) for threads in WORKERS}
         action = np.zeros((ships, 1), dtype=np.float32)
         best = {threads: [np.inf, np.inf] for threads in WORKERS}
@@ -97,14 +97,14 @@ def benchmark_table() -> None:
     from agents.benchmarking.run import benchmark
     from agents.benchmarking.suite import load_suite
 
-    tasks = [task.name for task in load_suite().tasks]
+    tasks = [task.name for task in load_suite().tasks[:4]]
 
     def fly(episodes: int, workers: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
             benchmark("pid,lq", "shipgym-v1", tasks, f"{folder}/results", workers, episodes=episodes)
 
     fly(1, 1)  # compiles
-    head(f"shipgym benchmark --controllers pid,lq, {len(tasks)} tasks")
+    head("shipgym benchmark --controllers pid,lq, four tasks")
     for episodes in (10, 100):
         for workers in WORKERS:
             row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: fly(e, w))

@@ -51,6 +51,9 @@ from shipgym.whole_file import write_text
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
+    from agents.autopilot import Progress
+
+PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
 
 TITLES = {
@@ -65,7 +68,12 @@ TITLES = {
 
 
 def write_page(
-    result: BenchmarkResult, path: str | Path, controllers: Any = None, worst: int = WORST
+    result: BenchmarkResult,
+    path: str | Path,
+    controllers: Any = None,
+    worst: int = WORST,
+    workers: int | None = 1,
+    progress: Progress | None = None,
 ) -> None:
     """Write the page of a benchmark. The worst episodes are flown again for it.
 
@@ -79,6 +87,10 @@ def write_page(
         As `benchmark` was given them; needed to replay contestants that were given as objects.
     worst : int
         How many episodes of each contestant in each task may be replayed; fewer if they are too many.
+    workers : int or None
+        Processes that fly them; None for as many as there are cores.
+    progress : callable, optional
+        Told what is done, how many of it, and the total.
 
     Raises
     ------
@@ -89,7 +101,7 @@ def write_page(
     check_page(target)
     library = plotly_script()
     count, flights = replayable(result, worst)
-    reflown = refly(result, flights, controllers)
+    reflown = refly(result, flights, controllers, workers, progress)
     replays = as_json(replay_data(result, reflown, count))
     body = {
         "header": _header(result),
@@ -131,9 +143,11 @@ def _header(result: BenchmarkResult) -> Html:
     about = result.summary
     lead = (
         f"{len(about['contestants'])} contestants in {len(about['tasks'])} tasks, "
-        f"{about['seeds']['count']} episodes each, the same for all. Tables sort by a click on a head; figures may be zoomed."
+        f"{about['seeds']['count']} episodes each, the same for all. "
+        "Tables sort by a click on a head; figures may be zoomed."
     )
-    return Html(f"{header('shipgym benchmark', about['suite']['name'], lead)}{_warnings(result)}")
+    old = '<div class="note warn" id="old" hidden>Figures and replays need a browser of 2023 or later.</div>'
+    return Html(f"{header('shipgym benchmark', about['suite']['name'], lead)}{old}{_warnings(result)}")
 
 
 def _warnings(result: BenchmarkResult) -> Html:
@@ -156,11 +170,9 @@ def _warnings(result: BenchmarkResult) -> Html:
 
 
 def _ranking(result: BenchmarkResult) -> Html:
-    figure = late_figure(
-        scores_figure(result),
-        "scores",
-        "Each contestant's score, or cost where there are no scores, with its 95 % interval.",
-    )
+    scored = bool(result.summary["reference"])
+    caption = "Scores with their 95 % intervals." if scored else "Relative costs."
+    figure = late_figure(scores_figure(result), "scores", caption)
     return section("ranking", TITLES["ranking"], ranking_table(result), figure)
 
 
@@ -175,8 +187,8 @@ def _profile(result: BenchmarkResult) -> Html:
         said = note("There are no scores, so no profile: this suite has no reference costs.")
         return section("profile", TITLES["profile"], said)
     caption = (
-        "Share of all episodes that score more than the threshold; higher is better. Dotted: the best PID and "
-        "the oracle."
+        "Share of all episodes that score more than the threshold; higher is better. Dotted: the best PID "
+        "and the oracle."
     )
     return section(
         "profile",
@@ -214,14 +226,15 @@ def _tasks(result: BenchmarkResult, reflown: Reflown) -> Html:
 
 def _panel(result: BenchmarkResult, reflown: Reflown, task: str, k: int) -> Html:
     about = result.summary["suite"]["tasks"][task]
-    name, boxes = escape(task), "Cost of each episode, with the box of the middle half and the median."
+    name, replay = escape(task), "Replay the worst ones"
+    boxes = "Cost of each episode, with the box of the middle half and the median."
     parts = [
         Html(f"<h3>{html(task)}</h3>"),
         paragraph(f"{about['environment']}, {about['model']}: {about['why']}."),
         late_figure(costs_figure(result, task), f"costs-{k}", boxes),
         metrics_table(result, task, k),
         *_hardest(result, reflown, task, k),
-        Html(f'<p><button type="button" class="action" data-replay="{name}">Replay the worst ones</button></p>'),
+        Html(f'<p><button type="button" class="action" data-replay="{name}">{replay}</button></p>'),
     ]  # fmt: skip
     return Html(
         f'<div role="tabpanel" id="task-{name}" aria-labelledby="tab-{name}" tabindex="0">{join(parts)}</div>'

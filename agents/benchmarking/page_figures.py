@@ -19,8 +19,11 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
-# those of the replay player, in its order
-COLOURS = ("#1d5f9a", "#c2500c", "#0f766e", "#8b3fb8", "#946200", "#b5245c", "#48566a", "#4d7010")
+# those of the replay player
+COLOURS = (
+    "#1d5f9a", "#c2500c", "#0f766e", "#8b3fb8", "#946200", "#b5245c", "#48566a", "#4d7010",
+    "#5566d6", "#7a4b2a", "#0891b2", "#8f8a00",
+)  # fmt: skip
 DASHES = ("solid", "dash", "dot")
 MARGIN = {"l": 58, "r": 14, "t": 14, "b": 44}
 LOGARITHMIC = 20.0  # ratio of costs from which on their axis is logarithmic
@@ -101,9 +104,16 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     least, most = (every.min(), every.max()) if len(every) else (0.0, 0.0)
     kind = "log" if least > 0.0 and most > LOGARITHMIC * least else "linear"
     figure.update_layout(_layout(34 * len(who) + 70, hovermode="closest"))
-    figure.update_xaxes(axis("cost of an episode", type=kind, **({"dtick": "D2"} if kind == "log" else {})))
+    marks = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
+    figure.update_xaxes(axis("cost of an episode", type=kind, **marks))
     figure.update_yaxes(axis("", autorange="reversed", automargin=True))
     return figure
+
+
+def _one_two_five(least: float, most: float) -> list[float]:
+    """Marks of a logarithmic axis: 1, 2 and 5 times powers of ten."""
+    powers = range(int(np.floor(np.log10(least))), int(np.ceil(np.log10(most))) + 1)
+    return [number * 10.0**power for power in powers for number in (1, 2, 5)]
 
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:

@@ -113,7 +113,7 @@ def ranking_table(result: BenchmarkResult) -> Html:
     """Score, relative cost, what went wrong, and in how many tasks each is the best."""
     wins = [name for task in result.tasks for name in bests_of(result, task)]
     heads = [
-        Head("place", sorted="ascending"), Head("contestant", is_text=True), Head("score", descending=True),
+        Head("contestant", is_text=True), Head("place", sorted="ascending"), Head("score", descending=True),
         Head("relative cost"), Head("best in tasks", descending=True), Head("tasks", descending=True),
         Head("lost"), Head("failed"),
     ]  # fmt: skip
@@ -121,7 +121,7 @@ def ranking_table(result: BenchmarkResult) -> Html:
     for place, entry in enumerate(result.summary["ranking"], 1):
         name, score, relative = entry["name"], entry["score"], entry["relative_cost"]
         rows.append([
-            Cell(place, place), Cell(name_of(name), name), Cell(with_interval(score, two), score["value"]),
+            Cell(name_of(name), name), Cell(place, place), Cell(with_interval(score, two), score["value"]),
             Cell(two(relative), relative),
             Cell(NONE if name == ORACLE else wins.count(name), wins.count(name)),
             Cell(entry["tasks"], entry["tasks"]),
@@ -134,13 +134,13 @@ def _ranking_caption(result: BenchmarkResult) -> str:
     said = "No score: this suite has no reference costs. Sorted by relative cost. "
     if result.summary["reference"]:
         said = (
-            "Score: share of the way from the best constant-gain PID (0) to the oracle (1), interquartile mean "
-            "over tasks, with bootstrap 95 % interval. "
+            "Score: share of the way from the best constant-gain PID (0) to the oracle (1), interquartile "
+            "mean over tasks, with bootstrap 95 % interval. "
         )
     return (
-        f"{said}Relative cost: geometric mean over tasks of the cost over the lowest one. Best in tasks: has the "
-        "lowest cost, or the same. Lost: episodes in which control was lost. Failed: the controller gave no "
-        "command."
+        f"{said}Relative cost: geometric mean over tasks of the cost over the lowest one. Best in tasks: has "
+        "the lowest cost, or the same. Lost: episodes in which control was lost. Failed: the controller "
+        "gave no command."
     )
 
 
@@ -202,7 +202,8 @@ def improvement_table(result: BenchmarkResult) -> Html:
     ]
     caption = (
         "Probability that the contestant of the row costs less than the one of the column in the same "
-        "episode, ties by half, mean over tasks, in per cent with 95 % interval. Blue: the row is better; orange: the column."
+        "episode, ties by half, mean over tasks, in per cent with 95 % interval. Blue: the row is better; "
+        "orange: the column."
     )
     return sortable("improvement-table", caption, heads, rows)
 

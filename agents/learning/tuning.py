@@ -300,6 +300,7 @@ def _record(study: optuna.Study, found: Sequence[Trial], plan: Plan, fixed: Sequ
 
 
 def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
+    """Settings of the best trial; how often it was evaluated was for tuning only."""
     best = _best(found)
     cost = "no trial has finished" if best.cost is None else f"mean cost held out {best.cost:.6g}"
     head = (
@@ -308,7 +309,11 @@ def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
         f"# shipgym train {plan.algorithm} --settings {BEST} ...\n\n"
     )
     write_text(
-        head + "".join(f"{name} = {_toml(value)}\n" for name, value in best.settings.items()), folder / BEST
+        head
+        + "".join(
+            f"{name} = {_toml(value)}\n" for name, value in best.settings.items() if name != "evaluate_every"
+        ),
+        folder / BEST,
     )
 
 

@@ -6,7 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
-from agents.benchmarking.contestants import contestants, designed
+from agents.benchmarking.contestants import contestants
+from agents.benchmarking.designs import design
 from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
@@ -194,11 +195,12 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():
     keeping, path = (load_suite().task(name) for name in ("mariner-calm", "mariner-current"))
-    assert designed("lq", keeping) is designed("lq", path)  # the same ship and interval: designed once
-    guided = designed("ilos", path)
+    assert design("lq", keeping) is design("lq", path)  # the same ship and interval: designed once
+    guided = design("ilos", path)
     assert guided.design["dt"] == path.task.interval(path.ship)
     assert guided.observation_scales[8] == path.task.corridor * path.ship.particulars["length"]
-    assert designed("ilos", keeping).kind == "lq"
+    (led,) = contestants("ilos")[0].policies(keeping, "any")
+    assert led.kind == "lq"
 
 
 @pytest.mark.parametrize(
@@ -272,24 +274,16 @@ def test_broken_results(copy, name, damage, said):
 
 def test_the_command_ranks_and_writes(tmp_path):
     answer = shipgym(
-        "--controllers",
-        "pid",
-        "--tasks",
-        "mariner-calm",
-        "--episodes",
-        2,
-        "--workers",
-        1,
-        "--out",
-        tmp_path / "r",
-    )
+        "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
+        "--out", tmp_path / "r", "--no-page",
+    )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     assert "1 tasks of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
     again = shipgym(
         "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
-        "--out", tmp_path / "r", "--resume", "--json",
+        "--out", tmp_path / "r", "--resume", "--json", "--no-page",
     )  # fmt: skip
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
 

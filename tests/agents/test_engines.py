@@ -129,7 +129,7 @@ def test_wrong_input_of_a_job_is_told_with_the_job(functions, tmp_path):
     jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
     with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'):
         run_jobs(functions.logged, jobs)
-    with pytest.raises(WorkerDiedError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
+    with pytest.raises(JobError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
         run_jobs(functions.divides, [{"k": 1}, {"k": 0}])
     assert "return 1 / job" in caught.value.__notes__[0]
 

@@ -1,0 +1,379 @@
+"""The benchmark's page: what it holds, and in a browser what a person does with it."""
+
+import base64
+import gzip
+import json
+import re
+import sys
+
+import gymnasium
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import PID, benchmark
+from agents.benchmarking.page import command, write_page
+from agents.benchmarking.page_figures import COLOURS
+from agents.benchmarking.page_replays import (
+    bests_of,
+    differences,
+    entries_of,
+    hardest_of,
+    replayable,
+    worst_of,
+)
+from agents.benchmarking.refly import Flight, recorded, refly
+from agents.benchmarking.suite import load_suite
+from agents.cli import app
+from shipgym.errors import InputError
+from tests.agents.browser import COMMAND, Browser
+
+TASKS = ["mariner-calm", "mariner-current"]
+N, FIRST = 4, 1_000_000
+
+
+class Lazy:
+    """Leaves the rudder amidships."""
+
+    name = "a <b>lazy one"
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return np.zeros((len(observation), 1), dtype=np.float32), state
+
+
+@pytest.fixture(scope="module")
+def result():
+    """PID, the same again, and one that is given as an object; scores as if the suite had references."""
+    references = {"mariner-calm": (30.0, 20.0), "mariner-current": (3000.0, 900.0)}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("agents.benchmarking.summary.reference_costs", lambda suite: references)
+        return benchmark({"pid": "pid", "again": "pid", Lazy.name: Lazy()}, tasks=TASKS, episodes=N)
+
+
+@pytest.fixture(scope="module")
+def page(result, tmp_path_factory):
+    path = tmp_path_factory.mktemp("page") / "index.html"
+    write_page(result, path, worst=2)
+    return path
+
+
+def unpacked(page, name):
+    text = page.read_text(encoding="utf-8")
+    found = re.search(rf'<script type="text/plain" id="{name}">(.*?)</script>', text)
+    return gzip.decompress(base64.b64decode(found[1])).decode()
+
+
+def test_the_worst_come_first_and_the_hardest_is_hard_for_all(result):
+    costs = result.figures("pid", "mariner-calm")[0]
+    worst = worst_of(result, "pid", "mariner-calm", N)
+    assert [flight.seed - FIRST for flight in worst] == np.argsort(-costs).tolist()
+    medians = np.median([result.figures(name, "mariner-calm")[0] for name in result.ranking], axis=0)
+    assert hardest_of(result, "mariner-calm") == FIRST + np.argmax(medians)
+
+
+def test_equals_share_the_first_place(result):
+    assert sorted(bests_of(result, "mariner-calm")) == ["again", "pid"]
+
+
+def test_each_is_shown_beside_the_best_in_the_same_episode(result):
+    best = bests_of(result, "mariner-calm")[0]
+    (nobody, everybody), *others = entries_of(result, "mariner-calm", 2)
+    assert nobody == ""
+    assert {flight.contestant for flight in everybody} == set(result.ranking)
+    assert len(others) == 2 * 3
+    for who, flights in others:
+        assert flights[0].contestant == who
+        assert [flight.contestant for flight in flights[1:]] == ([] if who == best else [best])
+        assert len({flight.seed for flight in flights}) == 1
+
+
+def test_too_many_runs_are_cut_down(result, monkeypatch):
+    count, flights = replayable(result, 3)
+    assert count == 3
+    monkeypatch.setattr("agents.benchmarking.page_replays.MOST_RUNS", len(flights) - 1)
+    fewer, fewer_flights = replayable(result, 3)
+    assert fewer < 3
+    assert set(fewer_flights) < set(flights)
+
+
+def test_what_is_flown_again_costs_the_same(result):
+    flights = [Flight("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
+    reflown = refly(result, flights)
+    assert (reflown.different, reflown.refused) == ((), {})
+    for flight in flights:
+        flown = reflown.episodes[flight]
+        cost = result.figures("pid", flight.task)[0, flight.seed - FIRST]
+        lost = result.figures("pid", flight.task, "terminated")[0, flight.seed - FIRST]
+        assert flown.rewards.sum() == pytest.approx(-cost)
+        assert (flown.seed, flown.terminated) == (flight.seed, bool(lost) or bool(flown.success))
+        assert (flown.waypoints is None) == (flight.task == "mariner-calm")
+
+
+def test_an_episode_flown_again_is_that_of_the_single_environment():
+    task = load_suite().task("mariner-calm")
+    pilot = PID.from_model(task.ship, dt=task.task.interval(task.ship))
+    (flown,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
+    env = gymnasium.make(flown.environment, **flown.arguments).unwrapped
+    observation, _ = env.reset(seed=FIRST)
+    rewards, states, over = [], [env.physical_state()], False
+    while not over:
+        observation, reward, terminated, truncated, _ = env.step(pilot.predict(observation)[0])
+        rewards.append(reward)
+        states.append(env.physical_state())
+        over = terminated or truncated
+    assert (len(rewards), flown.n_steps, flown.dt) == (600, 200, 3.0 * env.dt)
+    assert flown.rewards == pytest.approx(np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9)
+    assert cost == pytest.approx(-sum(rewards))
+    for name in ("x", "y", "psi", "u", "delta", "set_point"):
+        assert flown.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
+
+
+def test_the_last_interval_is_filled_up():
+    task = load_suite().task("mariner-current")
+    (whole,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=task.task.episode_steps,
+    )
+    (flown,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=-(-task.task.episode_steps // 7),
+    )
+    assert whole.success
+    assert whole.n_steps < task.task.episode_steps
+    assert flown.n_steps == -(-whole.n_steps // 7)
+    assert flown.states["x"][-1] == whole.states["x"][-1]
+    assert flown.rewards.sum() == pytest.approx(whole.rewards.sum())
+    assert (flown.success, flown.terminated) == (True, True)
+
+
+def test_a_controller_that_fails_is_shown_up_to_then():
+    task = load_suite().task("mariner-calm")
+
+    class Fails(Lazy):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            if (state or 0) == 11:
+                raise ValueError
+            return super().predict(observation)[0], (state or 0) + 1
+
+    (flown,), (cost,) = recorded(Fails(), task, [FIRST], samples=300)
+    assert (flown.n_steps, flown.terminated, flown.truncated) == (5, False, False)
+    assert np.isnan(cost)
+
+
+def test_a_changed_result_is_told(result):
+    costs = result.episodes["cost"].copy()
+    result.episodes["cost"] = costs * 1.001
+    try:
+        flight = Flight("pid", "mariner-calm", 0, FIRST)
+        assert refly(result, [flight]).different == (flight,)
+    finally:
+        result.episodes["cost"] = costs
+
+
+def test_objects_are_replayed_where_they_are_given(result):
+    flight = Flight(Lazy.name, "mariner-calm", 0, FIRST)
+    assert "given as an object" in refly(result, [flight]).refused[Lazy.name, "mariner-calm"]
+    given = refly(result, [flight], {Lazy.name: Lazy()})
+    assert (given.refused, given.different) == ({}, ())
+    assert not given.episodes[flight].actions.any()
+
+
+def test_differences_add_up():
+    decimals, *steps = differences([1.04, -2.26, 300.0], 1)
+    assert np.cumsum(steps) / 10**decimals == pytest.approx([1.0, -2.3, 300.0])
+
+
+def test_the_command_names_what_is_not_the_default(result):
+    said = command(result)
+    assert "pid,again=pid" in said
+    assert "--tasks mariner-calm,mariner-current --episodes 4 --out results" in said
+
+
+def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
+    text = page.read_text(encoding="utf-8")
+    assert len(text) < 3e6
+    assert result.summary["suite"]["sha256"][:16] in text
+    assert result.summary["suite"]["tasks"]["mariner-calm"]["model_sha256"][:16] in text
+    assert result.summary["versions"]["numba"] in text
+    assert "1000000 to 1000003" in text
+    assert "a &lt;b&gt;lazy one" in text
+    assert "<b>lazy" not in text
+    assert not re.findall(r'(?:src|href)="(?!#)[^"]', text)  # it loads nothing
+
+
+def test_the_page_says_why_one_cannot_be_replayed(page):
+    assert "Not to be replayed: a &lt;b&gt;lazy one" in page.read_text(encoding="utf-8")
+    names = {entry["who"] for entry in json.loads(unpacked(page, "replay-data"))["entries"]["mariner-calm"]}
+    assert names == {"", "pid", "again"}
+
+
+def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):
+    with pytest.raises(InputError, match=r"ends in \.html"):
+        write_page(result, tmp_path / "page.txt")
+
+
+@pytest.mark.parametrize("there", [True, False])
+def test_the_command_writes_the_page_where_plotly_is_there(tmp_path, monkeypatch, there):
+    if not there:
+        monkeypatch.setitem(sys.modules, "plotly.offline", None)
+    out = tmp_path / "results"
+    words = [
+        "benchmark",
+        "--controllers",
+        "pid",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        "2",
+        "--workers",
+        "1",
+    ]
+    answer = CliRunner().invoke(app, [*words, "--out", str(out)])
+    assert answer.exit_code == 0, answer.stderr
+    assert (out / "results.json").exists()
+    assert (out / "index.html").exists() == there
+    assert ("there is no index.html: plotly is not installed" in answer.stderr) != there
+
+
+# --- in the browser
+
+
+@pytest.fixture(scope="module")
+def browser():
+    if COMMAND is None:
+        pytest.skip("no chromium is installed")
+    browser = Browser(1200, 900)
+    yield browser
+    browser.close()
+
+
+@pytest.fixture
+def opened(browser, page):
+    """The page at its beginning; after each test it must have kept quiet and stayed offline."""
+    browser.resize(1200, 900)
+    browser.open("about:blank")
+    browser.open(page.as_uri())
+    yield browser
+    assert browser.complaints == []
+    assert set(browser.requests) <= {page.as_uri(), "about:srcdoc"}
+
+
+def column(browser, table, number):
+    return browser.run(
+        f"[...document.querySelectorAll('#{table} tbody tr')]"
+        f".map((row) => row.cells[{number}].dataset.key ?? '')"
+    )
+
+
+def see(browser, name):
+    browser.run(f"document.getElementById('{name}').scrollIntoView({{ behavior: 'instant' }})")
+
+
+def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
+    head = "#costs-table thead th:nth-child(2)"
+    see(opened, "costs")
+    before = column(opened, "costs-table", 1)
+    opened.click(f"{head} button", 0.5)
+    up = [float(key) for key in column(opened, "costs-table", 1)]
+    assert up == sorted(map(float, before))
+    assert opened.run(f"document.querySelector('{head}').ariaSort") == "ascending"
+    opened.click(f"{head} button", 0.5)
+    assert [float(key) for key in column(opened, "costs-table", 1)] == up[::-1]
+    assert opened.run(f"document.querySelector('{head}').ariaSort") == "descending"
+    assert opened.run("document.querySelectorAll('#costs-table [aria-sort=none]').length") == 3
+
+
+def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
+    opened.run("document.querySelector('#ranking-table thead button').focus()")
+    opened.press(" ", "Space")
+    names = column(opened, "ranking-table", 0)
+    assert names == sorted(names)
+    table = "document.querySelector('#improvement-table')"
+    for _ in range(2):
+        opened.run(f"{table}.querySelector('thead th:nth-child(2) button').click()")
+        assert column(opened, "improvement-table", 1)[-1] == ""
+
+
+def test_scores_come_with_the_best_first(opened):
+    opened.run("document.querySelector('#ranking-table thead th:nth-child(3) button').click()")
+    scores = [float(key) for key in column(opened, "ranking-table", 2)]
+    assert scores == sorted(scores, reverse=True)
+
+
+def test_figures_are_drawn_when_they_come_into_sight_and_runs_can_be_hidden(opened):
+    see(opened, "tasks")
+    opened.wait("document.querySelector('#costs-0 .drawn .boxlayer .trace') !== null")
+    boxes = "document.querySelectorAll('#costs-0 .boxlayer .trace').length"
+    assert opened.run(boxes) == 3
+    opened.run("document.querySelector('#tasks .chips button').click()")
+    opened.wait(f"{boxes} === 2")
+
+
+def test_tabs_show_one_task_at_a_time(opened):
+    shown = "[...document.querySelectorAll('[role=tabpanel]')].filter((p) => !p.hidden).map((p) => p.id)"
+    assert opened.run(shown) == ["task-mariner-calm"]
+    opened.run("document.querySelector('[role=tab]').focus()")
+    opened.press("ArrowRight", "ArrowRight")
+    assert opened.run(shown) == ["task-mariner-current"]
+    opened.run("document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()")
+    opened.wait(f"{shown}[0] === 'task-mariner-calm'")
+
+
+def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
+    opened.run("document.querySelector('[data-replay=\"mariner-current\"]').click()")
+    ready = "document.getElementById('player').contentDocument?.querySelectorAll('.ship').length"
+    opened.wait(f"{ready} === 2")  # PID twice, in the hardest episode
+    assert opened.run("document.getElementById('replay-task').value") == "mariner-current"
+    other = result.ranking[1] if result.ranking[1] != Lazy.name else result.ranking[0]
+    opened.run(
+        f"(() => {{ const who = document.getElementById('replay-who'); who.value = '{other}';"
+        " who.dispatchEvent(new Event('change')); })()"
+    )
+    opened.wait(
+        f"{ready} === 2 && document.getElementById('player').contentDocument.readyState === 'complete'"
+    )
+    frame = "document.getElementById('player').contentDocument"
+    where = f"{frame}.querySelector('.ship').getAttribute('transform')"
+    begin = opened.run(where)
+    opened.run(
+        f"(() => {{ const slider = {frame}.getElementById('time'); slider.value = slider.max / 2;"
+        " slider.dispatchEvent(new Event('input', { bubbles: true })); })()"
+    )
+    opened.wait(f"{where} !== '{begin}'")
+    chip = f"[...document.querySelectorAll('.chips button')].find((each) => each.dataset.name === '{other}')"
+    assert opened.run(f"{chip}.style.getPropertyValue('--run')") == COLOURS[result.ranking.index(other)]
+    assert (
+        opened.run(f"{frame}.querySelector('#legend li').style.getPropertyValue('--run')")
+        == (COLOURS[result.ranking.index(other)])
+    )
+    legend = opened.run(f"{frame}.getElementById('legend').textContent")
+    assert other in legend
+    worst = worst_of(result, other, "mariner-current", 1)[0]
+    assert f"seed {worst.seed}" in opened.run(
+        "document.getElementById('replay-episode').selectedOptions[0].text"
+    )
+
+
+@pytest.mark.parametrize("width", [1200, 400])
+def test_nothing_sticks_out(opened, width):
+    opened.resize(width, 900, mobile=width < 500)
+    opened.wait(f"innerWidth === {width}")
+    for name in ("profile", "tasks", "replays"):
+        see(opened, name)
+    opened.wait("document.getElementById('player').contentDocument?.querySelector('.ship') != null")
+    assert opened.run("document.documentElement.scrollWidth") <= width
+    inner = "document.getElementById('player').contentDocument.documentElement"
+    assert opened.run(f"{inner}.scrollWidth <= {inner}.clientWidth")
+
+
+def test_everything_that_can_be_operated_has_a_name(opened):
+    tree = opened.ask("Accessibility.getFullAXTree")["nodes"]
+    roles = {"button", "combobox", "tab", "link"}
+    operated = [node for node in tree if node.get("role", {}).get("value") in roles and not node["ignored"]]
+    assert len(operated) > 40
+    unnamed = [node for node in operated if not node["name"]["value"].strip()]
+    assert len(unnamed) <= 1  # the corner of the matrix
