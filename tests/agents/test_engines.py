@@ -193,7 +193,7 @@ def test_address_that_does_not_answer():
 
 
 def test_nothing_is_left_where_no_cluster_answers(functions, tmp_path):
-    with pytest.raises(InputError, match="no ray cluster answers|not installed"):
+    with pytest.raises(InputError, match=r"no ray cluster answers|not installed"):
         run_jobs(
             functions.spectrum, [{"n": 1}], engine="ray", address="127.0.0.1:1", keep=tmp_path / "kept" / "in"
         )
