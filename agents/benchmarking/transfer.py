@@ -38,6 +38,8 @@ LEARNERS = ("identified", "posterior", "reference")
 IDENTIFIED, REFERENCE, TUNED = "identified", "reference", "tuned"
 N_RUNS = 5
 CLASSICAL = ("pid", "lq", "lqg", "ilos")
+#: Task whose settings of PPO all cases are learned with.
+SETTINGS_OF = "container-path"
 #: Tasks of the suite, and the identified model of their ship.
 CASES = {
     "mariner-sharp-turns": "mariner-tls-svm",
@@ -148,7 +150,7 @@ def transfer(
     learners : sequence of str
         Of `LEARNERS`.
     settings : mapping, optional
-        Of PPO, in place of those of the task.
+        Of PPO, in place of those of `SETTINGS_OF`.
     engine, workers
         See `agents.engines.run_jobs`.
     progress : callable, optional
@@ -193,7 +195,7 @@ def learn(job: dict[str, Any]) -> str:
 
     case = _case(job)
     task = case.learned_in(job["learner"])
-    settings = load_settings("ppo", task.environment, case.task.name, job["settings"])
+    settings = load_settings("ppo", task.environment, SETTINGS_OF, job["settings"])
     folder = Path(job["out"])
     train(Plan("ppo", task, settings, seed=job["seed"]), folder, resume=folder.exists())
     return str(folder / "agent.json")

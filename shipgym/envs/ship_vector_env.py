@@ -224,12 +224,12 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
         assert self._keys is not None
-        own = {"row_keys": self._keys.copy(), "ended": self._ended.copy()}
+        own = {"row_keys": self._keys.copy(), "some_over": np.array(self._some_over)}
         return own | self._engine.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
-        self._keys, self._ended = memory["row_keys"].copy(), memory["ended"].copy()
+        self._keys, self._some_over = memory["row_keys"].copy(), bool(memory["some_over"])
         self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:
