@@ -84,6 +84,34 @@ class Contestant:
         return {str(path): file_hash(path) for path in _files(self.source, task)}
 
 
+def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
+    """Refuse, before anything is flown, files of agents that cannot be read, or fit none of the tasks.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is wrong with it.
+    """
+    from agents.controller_file import load_agent
+
+    if not one.is_text or _is_factory(one.source):
+        return
+    agents: dict[Path, Policy] = {}
+    refusals: list[str] = []
+    flying = 0
+    for task in tasks:
+        for path in _files(one.source, task):
+            if path not in agents:
+                agents[path] = load_agent(path)
+            try:
+                check_fits(agents[path], task, f"'{path}' on task '{task.name}'")
+                flying += 1
+            except InputError as error:
+                refusals.append(str(error))
+    if refusals and not flying:
+        raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
+
+
 def check_fits(policy: Any, task: BenchmarkTask, where: str) -> None:
     """Refuse a controller made for other observations than a task shows.
 

@@ -13,6 +13,7 @@ from agents.benchmarking.verification import verify
 from agents.cli import app
 from shipgym import load_model
 from shipgym.errors import InputError
+from tests.agents.policies import random_policy
 
 TASKS = ["mariner-calm"]
 N = 4
@@ -290,11 +291,21 @@ def test_the_command_ranks_and_writes(tmp_path):
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
     out = tmp_path / "r"
+    cut, weightless, other = (tmp_path / f"{name}.json" for name in ("cut", "weightless", "other"))
+    random_policy(load_model("kvlcc2")).save(other)
+    weightless.write_bytes(other.read_bytes())
+    cut.write_bytes(other.read_bytes()[:300])
     for arguments, said in (
         (["--controllers", "pdi", "--out", out], "Did you mean 'pid'"),
         (["--controllers", "pid"], "--out"),
         (["--controllers", "pid", "--out", out, "--engine", "rai"], "engine: 'rai' found"),
         (["--verify", out], "there is no such file of benchmark results"),
+        (["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out], "may be cut short"),
+        (["--controllers", f"pid,{weightless}", "--tasks", "mariner-calm", "--out", out], "no such file"),
+        (
+            ["--controllers", f"pid,{other}", "--tasks", "mariner-calm", "--out", out],
+            "fits no task asked for",
+        ),
     ):
         answer = shipgym(*arguments)
         assert (answer.exit_code, answer.stdout) == (2, "")
