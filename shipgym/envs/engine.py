@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -15,16 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.envs.screen import STEP_OUTCOME, Screen
 from shipgym.envs.stability import refuse_unstable
 from shipgym.envs.task import Task
-from shipgym.envs.variety import SmallFleet, Variety
+from shipgym.envs.tiles import REFUSED, Team, addresses, lanes_of, ship_columns, ship_tiles
+from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.kernels import layout, weather_rows
 from shipgym.kernels import voyage_rows as rows
 from shipgym.models import ShipModel
-from shipgym.simulation.weather_column import weather_column
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
-REFUSED = -1  # the kernel's answer to commands that are no numbers
 MOST_SCREENS = 4  # that are looked at whether they are free; more are held by users who keep what they get
 
 
@@ -82,7 +79,7 @@ class Engine:
         self.windy = any(not sea.calm for _, sea in self.pool)
         self._kernel = self.model.kernel("episodes", self.windy, task.kernel)
         self._settings = task.settings(self.model)
-        self._team = _Team(-(-num_envs // layout.LANES), threads)
+        self._team = Team(-(-num_envs // layout.LANES), threads)
         self._allocate(fleet, drawn)
         self.reset(np.arange(num_envs))
 
@@ -90,9 +87,9 @@ class Engine:
         """Arrays that the kernels work on."""
         tiles = -(-self.num_envs // layout.LANES)
         own = self.pool if drawn else [(model, self.task.seas[0]) for model in fleet]
-        columns = _ship_columns(own, self.windy, self.task, self.model, drawn)
+        columns = ship_columns(own, self.windy, self.task, self.model, drawn)
         self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        self._ships = _ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
+        self._ships = ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
         self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
         self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
         self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
@@ -102,7 +99,7 @@ class Engine:
         self._fixed = (
             self._states, self._keys, self._settings, self._pool, self._ships, self._actions
         )  # fmt: skip
-        self._fixed_words = _words(self._fixed)
+        self._fixed_words = addresses(self._fixed)
         self._screens: list[Screen] = []
         self.show_anew()
 
@@ -125,7 +122,7 @@ class Engine:
         shown = (screen.observations, screen.outcomes, screen.flags)
         if not hasattr(self._kernel.step_at, "signatures"):  # run as plain Python
             return self._team.shared(partial(partial, self._kernel.step, *self._fixed, *shown))
-        words = [*self._fixed_words, *_words(shown)]
+        words = [*self._fixed_words, *addresses(shown)]
         return self._team.shared(
             lambda *tiles: partial(self._kernel.step_at, np.array([*words, *tiles], dtype=np.int64))
         )
@@ -261,7 +258,7 @@ class Engine:
         if len(self._ships) == len(self._states):
             pairs.append((self._ships, source._ships))
         for own, other in pairs:
-            _lanes_of(own)[here[0], :, here[1]] = _lanes_of(other)[there[0] % len(other), :, there[1]]
+            lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
         self.shown.observations[:] = source.shown.observations[which]
         self.shown.outcomes[:] = source.shown.outcomes[:, which]
         self.shown.flags[:] = source.shown.flags[:, which]
@@ -400,40 +397,6 @@ class Engine:
         return self._states[tile, rows.END :].reshape(count // 2, 2, layout.LANES)[:, :, lane].copy()
 
 
-def _lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
-    """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
-    return tiles.reshape(len(tiles), -1, layout.LANES)
-
-
-class _Team:
-    """Threads that share the tiles of an engine; the first share is done by the thread that asks."""
-
-    def __init__(self, tiles: int, threads: int) -> None:
-        count = min(threads, tiles)
-        bounds = np.linspace(0, tiles, count + 1).astype(int).tolist()
-        self._own, *self._others = list(pairwise(bounds))
-        self._pool = ThreadPoolExecutor(len(self._others), "shipgym") if self._others else None
-
-    def shared(self, stepping: Callable[..., Callable[[bool], int]]) -> Callable[[bool], int]:
-        """The step of all tiles, given that of the tiles from one up to another; its counts are summed."""
-        own = stepping(*self._own)
-        if self._pool is None:
-            return own
-        submit, others = self._pool.submit, [stepping(*bounds) for bounds in self._others]
-
-        def run(next_ones: bool) -> int:
-            waiting = [submit(share, next_ones) for share in others]
-            counts = [own(next_ones), *(share.result() for share in waiting)]
-            return REFUSED if REFUSED in counts else sum(counts)
-
-        return run
-
-
-def _words(arrays: Sequence[NDArray[Any]]) -> list[int]:
-    """Addresses and shapes of arrays, by turns; the caller keeps the arrays alive."""
-    return [word for array in arrays for word in (array.ctypes.data, *array.shape[:2])]
-
-
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
     """Keys of the kernels' random numbers for seeds of environments, of the same shape."""
     array = np.asarray(seeds)
@@ -449,31 +412,3 @@ def episode_key(random: np.random.Generator) -> int:
 def _check_count(count: Any, name: str) -> None:
     if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
         raise InputError(f"{name}: {count!r} found, expected a whole number of at least 1")
-
-
-def _ship_columns(own: SmallFleet, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:
-    """Ships and their weather as the kernels read them, a row each; the weather worked out once a kind.
-
-    Ships that are drawn for an episode are seen in the scales of the environment's model.
-    """
-    known: dict[tuple[int, int], Floats] = {}
-    columns = []
-    for model, sea in own:
-        kind = (id(model.particulars), id(sea))
-        if windy and kind not in known:
-            known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
-        column = model.ship_column(task.water_depth, known.get(kind))
-        if drawn and model.particulars["length"] == base.particulars["length"]:
-            column[layout.row(layout.SCALE_SPEED)] = base.particulars["speed"]
-        columns.append(column)
-    return np.stack(columns)
-
-
-def _ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
-    """One tile for all lanes, or a column for each."""
-    if len(columns) == 1:
-        tile = np.repeat(columns[0], layout.LANES)[None]
-        return np.tile(tile, (tiles, 1)) if own else tile
-    rest = np.tile(columns[:1], (tiles * layout.LANES - len(columns), 1))
-    lanes = np.concatenate([columns, rest])
-    return np.ascontiguousarray(lanes.reshape(tiles, layout.LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)

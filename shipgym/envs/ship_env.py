@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys
-from shipgym.envs.engine import REFUSED, Engine, episode_key
+from shipgym.envs.engine import Engine, episode_key
 from shipgym.envs.screen import STEP_OUTCOME
 from shipgym.envs.task import RUDDER_ORDERS, Task
+from shipgym.envs.tiles import REFUSED
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.models import ShipModel, load_model
