@@ -10,7 +10,7 @@ PACKAGES := shipgym identification agents
 .PHONY: demo test lint format type bench soak docs clean
 
 demo: $(VENV)/demo-installed
-	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
+	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
 
 test: lint type
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile
