@@ -282,11 +282,14 @@ def test_the_command_ranks_and_writes(tmp_path):
     assert "1 tasks of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
+    page = tmp_path / "r" / "index.html"
+    page.touch()
     again = shipgym(
         "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
         "--out", tmp_path / "r", "--resume", "--json", "--no-page",
     )  # fmt: skip
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
+    assert not page.exists()  # it would be of what was flown before
 
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):

@@ -244,12 +244,16 @@ def test_a_folder_in_use_is_not_written_over(tmp_path):
     assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
 
 
-def test_a_checkpoint_cut_short_is_refused(tmp_path):
+def test_a_checkpoint_cut_short_or_of_another_network_is_refused(tmp_path):
     plan, run = tiny(total_steps=1), tmp_path / "run"
     train(plan, run)
     whole = (run / "checkpoint.safetensors").read_bytes()
     (run / "checkpoint.safetensors").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="cut short"):
+        train(plan, run, resume=True)
+    train(tiny(total_steps=1, net_arch=[4]), tmp_path / "other")
+    (tmp_path / "other" / "checkpoint.safetensors").replace(run / "checkpoint.safetensors")
+    with pytest.raises(InputError, match=r"^[^\n]*does not fit this run [^\n]*begin the run anew$"):
         train(plan, run, resume=True)
 
 
