@@ -83,12 +83,19 @@ def benchmark_command(
                 resume=resume,
                 episodes=episodes,
             )
+            _remove_page(out)  # of other results, where these were gone on with
             if page:
                 _write_page(result, out, workers, progress)
     except KeyboardInterrupt:
         fail(f"interrupted; what was flown is kept in {out}: go on with --resume", INTERRUPTED)
         return
     _told(result, out, as_json)
+
+
+def _remove_page(out: Path) -> None:
+    from agents.benchmarking.page import PAGE
+
+    (out / PAGE).unlink(missing_ok=True)
 
 
 def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progress: Progress | None) -> None:

@@ -69,17 +69,14 @@ def run_jobs(
     engine : {"local", "ray"}
         Processes of this machine, or ray (`pip install 'shipgym[ray]'`).
     workers : int or None
-        Jobs done at once; None for as many as there are cores. With one worker the local engine works in
-        this process, so without guard against a job that kills it.
+        Jobs done at once; None for as many as there are cores. One local worker is this process itself.
     address : str, optional
         Of a ray cluster, such as ``"10.0.0.1:6379"``, ``"ray://10.0.0.1:10001"`` or ``"auto"``; by default
         ray is started on this machine. shipgym must be installed on the machines of the cluster.
     keep : str or Path, optional
-        Folder in which the result of each job is kept as soon as it is there. Jobs whose results are
-        there are not done again: whatever was interrupted goes on where it was.
+        Folder in which each result is kept as soon as it is there; such jobs are not done again.
     retries : int
-        How often a job is done again whose worker died (killed, out of memory). The last time it is done
-        alone, so that the job that is named is the one at fault.
+        How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
     progress : callable, optional
         Told the number of jobs done and their total.
 

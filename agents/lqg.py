@@ -104,16 +104,12 @@ class LQG(Stateful):
         noise : float
             Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
         disturbance_deg : float
-            How much the sea pushes the ship: standard deviation of a rudder angle, drawn anew each control
-            interval, that would do the same. More makes the filter trust what is measured.
+            How much the sea pushes the ship: standard deviation of a rudder angle, drawn anew each interval,
+            that would do the same. More makes the filter trust what is measured.
         wave_period : float, optional
             Of the first-order motion, s, as it is met; by default none is modelled.
         wave_heading_deg : float
             Standard deviation of the heading in it, degrees.
-
-        Returns
-        -------
-        LQG
 
         Raises
         ------

@@ -50,8 +50,7 @@ def benchmark(
     tasks : sequence of str, optional
         By default all of it.
     out : str or Path, optional
-        Folder for `results.json`, `episodes.parquet` and, as soon as it is there, what each contestant did in
-        each task. By default nothing is written.
+        Folder for the results and for what each contestant did in each task; by default nothing is written.
     workers : int or None
         Processes; None for as many as there are cores. Controllers that are given as objects, not by a text,
         fly in this process.

@@ -20,7 +20,7 @@ from agents.benchmarking.statistics import (
     performance_profile,
     score,
 )
-from agents.benchmarking.suite import BenchmarkTask, suite_file
+from agents.benchmarking.suite import N_EPISODES, BenchmarkTask, suite_file
 from shipgym.checks import check_number, check_table
 from shipgym.json_file import read_json
 
@@ -71,8 +71,6 @@ def summary_of(
     flown : dict of (contestant, task) to dict
         See `agents.benchmarking.run.flown_by`.
     """
-    known = reference_costs(suite)
-    reference = {task.name: known[task.name] for task in tasks if task.name in known}
     costs = {
         (name, k): np.stack([run["episodes"]["cost"] for run in flown[name, task.name]["runs"]])
         for name in names
@@ -80,6 +78,8 @@ def summary_of(
         if flown[name, task.name]["runs"]
     }
     n_episodes = next((cost.shape[1] for cost in costs.values()), 1)
+    known = reference_costs(suite) if n_episodes == N_EPISODES else {}  # which are of all scored episodes
+    reference = {task.name: known[task.name] for task in tasks if task.name in known}
     draws = Draws(len(tasks), n_episodes)
     by_task = {
         task.name: _of_task(task.name, k, names, flown, costs, draws, reference)

@@ -339,7 +339,8 @@ class _Training:
             self.curve, self.best_cost, self.best_steps = own["curve"], own["best_cost"], own["best_steps"]
             self.seconds_before = own["seconds"]
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
-            raise InputError(f"{checkpoint}: does not fit this run ({error}); begin the run anew") from None
+            why = str(error).partition("\n")[0].rstrip(" :")  # torch lists every network's layer after it
+            raise InputError(f"{checkpoint}: does not fit this run ({why}); begin the run anew") from None
         self.resumed_from = self.agent.num_timesteps
 
 

@@ -177,6 +177,9 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     monkeypatch.setattr(
         "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
     )
+    look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
+    assert look.summary["reference"] == {}  # costs of all episodes say nothing of the first two
+    monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
     result = benchmark("tuned-best,tuned-lq,tuned-mpc,oracle", tasks=TASKS, episodes=2)
     own = benchmark(
         {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}, tasks=TASKS, episodes=2
@@ -282,11 +285,14 @@ def test_the_command_ranks_and_writes(tmp_path):
     assert "1 tasks of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
+    page = tmp_path / "r" / "index.html"
+    page.touch()
     again = shipgym(
         "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
         "--out", tmp_path / "r", "--resume", "--json", "--no-page",
     )  # fmt: skip
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
+    assert not page.exists()  # it would be of what was flown before
 
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):

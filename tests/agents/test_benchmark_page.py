@@ -47,6 +47,7 @@ def result():
     references = {"mariner-calm": (30.0, 20.0), "mariner-current": (3000.0, 900.0)}
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("agents.benchmarking.summary.reference_costs", lambda suite: references)
+        patch.setattr("agents.benchmarking.summary.N_EPISODES", N)
         return benchmark({"pid": "pid", "again": "pid", Lazy.name: Lazy()}, tasks=TASKS, episodes=N)
 
 

@@ -244,21 +244,26 @@ def test_a_folder_in_use_is_not_written_over(tmp_path):
     assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
 
 
-def test_a_checkpoint_cut_short_is_refused(tmp_path):
+def test_a_checkpoint_cut_short_or_of_another_network_is_refused(tmp_path):
     plan, run = tiny(total_steps=1), tmp_path / "run"
     train(plan, run)
     whole = (run / "checkpoint.safetensors").read_bytes()
     (run / "checkpoint.safetensors").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match="cut short"):
         train(plan, run, resume=True)
+    train(tiny(total_steps=1, net_arch=[4]), tmp_path / "other")
+    (tmp_path / "other" / "checkpoint.safetensors").replace(run / "checkpoint.safetensors")
+    with pytest.raises(InputError, match=r"^[^\n]*does not fit this run [^\n]*begin the run anew$"):
+        train(plan, run, resume=True)
 
 
 def test_a_process_that_is_killed_is_resumed(tmp_path):
-    run, whole = tmp_path / "run", tmp_path / "whole"
+    run = tmp_path / "run"
     words = [*COMMAND, "--total-steps", "1000000", "--out", str(run)]
     process = subprocess.Popen([sys.executable, "-m", "agents.cli", *words], env={**os.environ})
     deadline = time.monotonic() + 60.0
     while not (run / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
+        assert process.poll() is None
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
@@ -266,4 +271,3 @@ def test_a_process_that_is_killed_is_resumed(tmp_path):
     assert code == 0
     assert "resumed at step" in printed
     assert "go on with --resume" in printed.replace("\n", " ")
-    assert not whole.exists()

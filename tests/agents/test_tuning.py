@@ -58,14 +58,14 @@ def plan(**settings):
 
 def test_better_settings_are_found_and_written_for_training(trainings, tmp_path):
     folder = tmp_path / "study"
-    found = tune(plan(), folder, 14, training=trainings.bowl)
+    found = tune(plan(), folder, 10, training=trainings.bowl)
     assert found.best.cost < found.trials[0].cost
     assert found.best.cost == min(trial.cost for trial in found.trials if trial.cost is not None)
     settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
     assert settings.to_dict() == dict(found.best.settings)
     assert found.trials[0].settings == plan().settings.to_dict()
     study = optuna.load_study(study_name="shipgym", storage=f"sqlite:///{folder / 'study.db'}")
-    assert len(study.trials) == 14
+    assert len(study.trials) == 10
     assert study.best_value == found.best.cost
     stopped = [trial for trial in found.trials if trial.ended == "stopped early"]
     assert stopped
@@ -74,16 +74,16 @@ def test_better_settings_are_found_and_written_for_training(trainings, tmp_path)
 
 
 def test_interrupted_study_goes_on_as_if_nothing_had_happened(trainings, tmp_path):
-    whole = tune(plan(), tmp_path / "whole", 9, training=trainings.bowl)
+    whole = tune(plan(), tmp_path / "whole", 6, training=trainings.bowl)
     trainings.LOG.write_text("")
-    trainings.ENDS_AT.append(7)
+    trainings.ENDS_AT.append(6)
     with pytest.raises(KeyboardInterrupt):
-        tune(plan(), tmp_path / "study", 9, training=trainings.bowl)
-    assert tune(plan(), tmp_path / "study", 9, training=trainings.bowl) == whole
-    assert trainings.LOG.read_text() == "x" * 10  # nine, and the one that was interrupted
+        tune(plan(), tmp_path / "study", 6, training=trainings.bowl)
+    assert tune(plan(), tmp_path / "study", 6, training=trainings.bowl) == whole
+    assert trainings.LOG.read_text() == "x" * 7  # six, and the one that was interrupted
     (tmp_path / "study" / "study.db").unlink()
-    assert tune(plan(), tmp_path / "study", 9, training=trainings.bowl) == whole
-    assert trainings.LOG.read_text() == "x" * 10
+    assert tune(plan(), tmp_path / "study", 6, training=trainings.bowl) == whole
+    assert trainings.LOG.read_text() == "x" * 7
 
 
 def test_two_workers_find_the_same(trainings, tmp_path):
@@ -144,7 +144,8 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path):
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
     pytest.importorskip("stable_baselines3")
     small = {"total_steps": 256, "ships": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 1}
-    job = {"configuration": evaluated_evenly(plan(**small)).configuration(), "limits": []}
+    short = make_plan(Given("ppo", options={"episode_steps": 20}, settings=small))
+    job = {"configuration": evaluated_evenly(short).configuration(), "limits": []}
     finished = train_trial(job)
     assert finished["ended"] == "finished"
     assert finished["cost"] == min(cost for _, cost in finished["curve"])
