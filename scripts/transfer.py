@@ -10,6 +10,8 @@ import argparse
 from functools import cache, partial
 from pathlib import Path
 
+import numpy as np
+
 from agents.benchmarking.transfer import CASES, N_RUNS, Transfer, save_transfer, transfer, transfer_case
 from agents.terminal import progress_bars
 from identification.real_ships.data import Data
@@ -47,7 +49,8 @@ def table(result: Transfer) -> str:
         gains = [result.gain(who, ship) for ship in ("identified", "reference")]
         cells = [f"{cost.value:.1f} ({cost.low:.1f} to {cost.high:.1f})" for cost in costs]
         cells += [f"{100 * gain.value:.1f} %" for gain in gains]
-        rows.append([who, *cells, f"{100 * result.gain_kept(who):.0f} %"])
+        kept = result.gain_kept(who)
+        rows.append([who, *cells, f"{100 * kept:.0f} %" if np.isfinite(kept) else ""])
     return "\n".join("| " + " | ".join(row) + " |" for row in rows)
 
 
