@@ -104,7 +104,7 @@ def build_autopilot(
             result.model.save(draft / "model.json")
             for pilot in result.verification.pilots:
                 if isinstance(pilot.controller, Controller):  # the others are files already
-                    pilot.controller.save(draft / f"{pilot.controller.name}.json")
+                    pilot.controller.save(draft / f"{pilot.key}.json")
         write_report(result, draft / "report.html")
         _tell(progress, "writing the report", 1, 1)
     return result
@@ -134,8 +134,8 @@ def examine(
     instability = why_unstable(identification)
     verification = None
     if instability is None:
-        for guest in guests:
-            guest.check_fits_model(identification.model)
+        for guest, agent in zip(guests, agents, strict=True):
+            _check_fits(guest, identification.model, f"agent '{agent}'")
         try:
             verification = verify(identification.model, draws, seed, progress, where, guests)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
@@ -195,9 +195,11 @@ def verify(
     lost = found.manoeuvres.unstable
     stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
     pilots, flown = [], [*controllers, *guests]
+    keys = _told_apart([str(one.name) for one in flown])
     for k, (controller, flight) in enumerate(zip(flown, flights, strict=True)):
         _tell(progress, "step responses", k, len(flown))
-        pilots.append(Pilot(controller, flight, step_response(controller, [model, *stable], STEP_DEG)))
+        step = step_response(controller, [model, *stable], STEP_DEG)
+        pilots.append(Pilot(keys[k], controller, flight, step))
     _tell(progress, "step responses", len(flown), len(flown))
     return Verification(
         draws=draws,
@@ -208,6 +210,22 @@ def verify(
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
         refused=refused,
     )
+
+
+def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
+    """Refuse a guest that was not made for keeping this ship's course."""
+    from shipgym.envs.course_keeping_task import CourseKeepingTask
+
+    shown = CourseKeepingTask().observed(model)
+    guest.check_fits([one.name for one in shown], [one.scale for one in shown], where)
+
+
+def _told_apart(names: Sequence[str]) -> list[str]:
+    """Names, those that were there before with a number."""
+    return [
+        name if name not in names[:k] else f"{name}-{names[:k].count(name) + 1}"
+        for k, name in enumerate(names)
+    ]
 
 
 def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:

@@ -31,14 +31,17 @@ class Pilot:
 
     Attributes
     ----------
+    key : str
+        Its name in metrics, no other's: that of the controller, with a number where there are several.
     controller : Controller, LearnedPolicy or Shielded
-        With a name, and gains and margins if it is a Controller.
+        With gains and margins if it is a Controller.
     flights : Flights
         One episode on each model drawn.
     step : StepResponses
         Of the identified model, first, and of the stable models drawn.
     """
 
+    key: str
     controller: Agent
     flights: Flights
     step: StepResponses
@@ -46,7 +49,7 @@ class Pilot:
     @property
     def name(self) -> str:
         """Short name, in capitals as the field writes it."""
-        return str(self.controller.name).upper()
+        return self.key.upper()
 
     @property
     def design(self) -> Controller | None:
@@ -145,8 +148,8 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         },
         "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
         "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
-        "controllers": {pilot.controller.name: pilot_metrics(pilot) for pilot in found.pilots},
-        "ranking": [pilot.controller.name for pilot in found.pilots],
+        "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
+        "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
     }
 

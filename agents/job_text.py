@@ -96,23 +96,21 @@ class KeptResults:
     Parameters
     ----------
     folder : str or Path
-        Made where it does not exist.
+        Made with the first result where it does not exist, so that nothing is left of a call that does none.
     function : callable
         That does the jobs: results of another function, or of another version of shipgym, are not taken.
 
     Raises
     ------
     InputError
-        If the folder cannot be made.
+        If there is a file of that name.
     """
 
     def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
         self.folder = Path(folder)
         self.function = f"{function.__module__}.{function.__qualname__}"
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: no folder can be made there ({error.strerror})") from None
+        if self.folder.exists() and not self.folder.is_dir():
+            raise InputError(f"{folder}: is no folder, expected one for results; choose another")
 
     def load(self, text: str) -> dict[str, Any] | None:
         """The packed result of a job, None where there is none yet or its file is broken."""
@@ -125,7 +123,17 @@ class KeptResults:
         return result if same and isinstance(result, dict) else None
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
-        """Keep the packed result of a job; the file is written whole or not at all."""
+        """Keep the packed result of a job; the file is written whole or not at all.
+
+        Raises
+        ------
+        InputError
+            If it cannot be written.
+        """
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{self.folder}: no folder can be made there ({error.strerror})") from None
         write_json({**self._key(text), "result": packed}, self._path(text))
 
     def _key(self, text: str) -> dict[str, Any]:

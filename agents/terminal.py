@@ -247,18 +247,25 @@ def ranking_table(result: AutopilotResult) -> Table:
         table.add_column(heading, justify="right")
     for name in metrics["ranking"]:
         found = metrics["controllers"][name]
-        margins = found["margins"]
+        margins = found["margins"] or {}
         table.add_row(
             name.upper(),
             _number(found["cost_mean"], 2),
             _number(found["cost_quantile_95"], 2),
             _number(found["heading_rmse_deg_mean"], 2),
             _number(found["rudder_travel_deg_min_mean"], 1),
-            "inf" if margins["gain_margin"] is None else _number(margins["gain_margin"], 2),
-            "inf" if margins["phase_margin_deg"] is None else _number(margins["phase_margin_deg"], 1),
+            _margin(margins, "gain_margin", 2),
+            _margin(margins, "phase_margin_deg", 1),
             str(found["lost_control"]),
         )
     return table
+
+
+def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
+    """A margin of an autopilot: without bound where null, and none where it is learned."""
+    if name not in margins:
+        return "-"
+    return "inf" if margins[name] is None else _number(margins[name], decimals)
 
 
 def _number(value: float | None, decimals: int) -> str:

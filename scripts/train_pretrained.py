@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.controller_file import load_agent
 from agents.learning import run_folder
-from agents.learning.evaluation import episode_costs
 from agents.learning.plan import Given, make_plan
 from agents.learning.training import Progress, train
 from agents.policy import LearnedPolicy

@@ -18,17 +18,17 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
     CLASSICAL,
     EPISODES,
     EVALUATIONS,
     FIRST_SEED,
-    episode_costs,
     load_tuned,
     tune,
-    tuned_controller,
     tuned_file,
 )
+from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.los_autopilot import LAWS
 from agents.oracle import OracleSettings, fly_oracle
@@ -86,14 +86,15 @@ def refer(task: BenchmarkTask, asked: argparse.Namespace) -> None:
     if same and known["oracle_episodes"] >= asked.oracle_episodes and not asked.again:
         return
     began = time.process_time()
-    start = tuned_controller(best, task, tuned[best]["settings"])
-    pid = tuned_controller("pid", task, tuned["pid"]["settings"])
+    start = design(best, task, tuned[best]["settings"])
+    pid = design("pid", task, tuned["pid"]["settings"])
     seeds = task.seeds[: asked.oracle_episodes]
     flight = fly_oracle(task.ship, task.task, seeds, start, OracleSettings(), task.parts[2])
-    cost = float(episode_costs(start, task, task.seeds).mean())
+    engine = task.engine(len(task.seeds))
+    cost = float(episode_costs(start, engine, task.seeds).mean())
     part = float(flight.costs.mean() / flight.start_costs.mean())
     found[task.name] = {
-        "pid": float(episode_costs(pid, task, task.seeds).mean()),
+        "pid": float(episode_costs(pid, engine, task.seeds).mean()),
         "best_classical": {"name": best, "cost": cost},
         "oracle": part * cost,
         "oracle_episodes": len(seeds),

@@ -22,20 +22,19 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from agents.benchmarking.designs import design
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Controller, Policy, model_hash
-from agents.controller_file import HOMES, controller_content
+from agents.controller import Controller, Policy
+from agents.controller_file import controller_content
 from agents.los_autopilot import LAWS
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
 
 CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
 LEARNED = ("ppo", "sac", "td3", "tqc")
@@ -83,6 +82,34 @@ class Contestant:
         if not self.is_text:
             return {}
         return {str(path): file_hash(path) for path in _files(self.source, task)}
+
+
+def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
+    """Refuse, before anything is flown, files of agents that cannot be read, or fit none of the tasks.
+
+    Raises
+    ------
+    InputError
+        Naming the file and what is wrong with it.
+    """
+    from agents.controller_file import load_agent
+
+    if not one.is_text or _is_factory(one.source):
+        return
+    agents: dict[Path, Policy] = {}
+    refusals: list[str] = []
+    flying = 0
+    for task in tasks:
+        for path in _files(one.source, task):
+            if path not in agents:
+                agents[path] = load_agent(path)
+            try:
+                check_fits(agents[path], task, f"'{path}' on task '{task.name}'")
+                flying += 1
+            except InputError as error:
+                refusals.append(str(error))
+    if refusals and not flying:
+        raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
 
 
 def check_fits(policy: Any, task: BenchmarkTask, where: str) -> None:
@@ -244,7 +271,8 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
         runs = source if isinstance(source, Sequence) else [source]
         return [run if hasattr(run, "predict") else _from_factory(run, task) for run in runs]
     if source in CLASSICAL:
-        return [designed(source, task)]
+        on_path = isinstance(task.task, PathFollowingTask)
+        return [design("lq" if source in LAWS and not on_path else source, task)]
     if source.startswith(TUNED):
         from agents.benchmarking.direct_search import tuned
 
@@ -269,53 +297,6 @@ def _from_factory(factory: Factory, task: BenchmarkTask) -> Policy:
             f"controller with `predict`"
         )
     return made
-
-
-def designed(kind: str, task: BenchmarkTask, **options: Any) -> Policy:
-    """A classical controller for the ship of a task.
-
-    Parameters
-    ----------
-    kind : str
-        Of `CLASSICAL`. A guidance law is, where no path is followed, its heading autopilot.
-    task : BenchmarkTask
-        Its ship and control interval, and its path's lookahead and corridor.
-    **options
-        Of the class's `from_model`.
-
-    Raises
-    ------
-    InputError
-        If there is no such design for the ship.
-    """
-    if kind in LAWS:
-        if not isinstance(task.task, PathFollowingTask):
-            return designed("lq", task)
-        return LAWS[kind].from_model(task.ship, task=task.task, **options)
-    return _designed(
-        kind, _Ship(task.ship), task.task.interval(task.ship), json.dumps(options, sort_keys=True)
-    )
-
-
-@lru_cache(maxsize=256)
-def _designed(kind: str, ship: _Ship, dt: float, options: str) -> Policy:
-    home, name = HOMES[kind]
-    design: Any = getattr(import_module(home), name)
-    made: Policy = design.from_model(ship.model, dt=dt, **json.loads(options))
-    return made
-
-
-@dataclass(frozen=True)
-class _Ship:
-    """A ship that equals another of the same numbers."""
-
-    model: ShipModel
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Ship) and hash(self) == hash(other)
-
-    def __hash__(self) -> int:
-        return hash(model_hash(self.model))
 
 
 def file_hash(path: str | Path) -> str:

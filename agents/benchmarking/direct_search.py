@@ -12,22 +12,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from agents.benchmarking.designs import INNER, design, no_path
+from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Controller, Policy
-from agents.controller_file import HOMES
+from agents.controller import Controller
 from agents.linear_loop import rate_weight
 from agents.los_autopilot import CRITICAL, LAWS
 from agents.pid import PID
 from shipgym.checks import check_choice, check_table, check_whole
-from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
@@ -167,12 +166,12 @@ def tune(
 
     def cost(asked: Mapping[str, float]) -> float:
         try:
-            controller = tuned_controller(kind, task, {**_prefixed(autopilot, kind), **asked})
+            controller = design(kind, task, {**_prefixed(autopilot, kind), **asked})
         except InputError:
             return REFUSED
         if not is_sane(controller):
             return REFUSED
-        return float(episode_costs(controller, task, seeds, engine).mean())
+        return float(episode_costs(controller, engine, seeds).mean())
 
     found = search(cost, search_spaces(kind, task), evaluations)
     return replace(found, settings={**_prefixed(autopilot, kind), **found.settings})
@@ -180,7 +179,7 @@ def tune(
 
 def _prefixed(autopilot: Mapping[str, float], kind: str) -> dict[str, float]:
     """Settings of the autopilot that a guidance law leads, beside its own."""
-    return {f"lq_{name}": value for name, value in autopilot.items()} if kind in LAWS else {}
+    return {INNER + name: value for name, value in autopilot.items()} if kind in LAWS else {}
 
 
 def is_sane(controller: Controller) -> bool:
@@ -193,7 +192,7 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     """What is searched of a controller: alternatives, each a list of settings, the design's own first."""
     if kind in LAWS:
         if not isinstance(task.task, PathFollowingTask):
-            raise _no_path(kind, task)
+            raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
         if kind != "los":
@@ -218,70 +217,6 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     if kind not in ("pid-filtered", "lqg") or waves is None:
         return [own]
     return [own, [*own, Setting("wave_period", waves.peak_period, 0.3, 3.0)]]
-
-
-def tuned_controller(kind: str, task: BenchmarkTask, settings: Mapping[str, float]) -> Controller:
-    """A classical controller with settings as they stand in the file of those found.
-
-    Parameters
-    ----------
-    kind : str
-        Of the controller file's kinds.
-    task : BenchmarkTask
-        Its ship, control interval and path.
-    settings : mapping of str to float
-        Keywords of `from_model`; of a guidance law also those of the LQ that it leads, with `lq_` before
-        them.
-
-    Raises
-    ------
-    InputError
-        If there is no such design.
-    """
-    home, name = HOMES[check_choice(kind, HOMES, "controller")]
-    design: Any = getattr(import_module(home), name)
-    interval = task.task.interval(task.ship)
-    if kind not in LAWS:
-        made: Controller = design.from_model(task.ship, dt=interval, **settings)
-        return made
-    if not isinstance(task.task, PathFollowingTask):
-        raise _no_path(kind, task)
-    inner = {key.removeprefix("lq_"): value for key, value in settings.items() if key.startswith("lq_")}
-    own = {key: value for key, value in settings.items() if not key.startswith("lq_")}
-    autopilot = tuned_controller("lq", task, inner)
-    law: Controller = design.from_model(task.ship, autopilot=autopilot, task=task.task, **own)
-    return law
-
-
-def _no_path(kind: str, task: BenchmarkTask) -> InputError:
-    return InputError(f"controller: '{kind}' found, but task '{task.name}' has no path to be led along")
-
-
-def episode_costs(
-    controller: Policy, task: BenchmarkTask, seeds: ArrayLike, engine: Engine | None = None
-) -> Floats:
-    """Cost of each episode, minus the sum of its rewards, shape (n_episodes,).
-
-    Parameters
-    ----------
-    controller : Policy
-    task : BenchmarkTask
-    seeds : array-like of int, shape (n_episodes,)
-    engine : Engine, optional
-        Of the task, with as many lanes, to be used again.
-    """
-    numbers = np.asarray(seeds)
-    ships = task.engine(len(numbers)) if engine is None else engine
-    seen, state = ships.reset(numbers), None
-    starts, none = np.ones(len(numbers), dtype=np.bool_), np.zeros(len(numbers), dtype=np.bool_)
-    costs, over = np.zeros(len(numbers)), none.copy()
-    while not over.all():
-        actions, state = controller.predict(seen, state, starts, True)
-        seen, rewards, terminated, truncated = ships.step(actions)
-        over |= terminated | truncated
-        costs -= rewards
-        starts = none
-    return costs
 
 
 def tuned_file(suite: str) -> Path:
@@ -324,4 +259,4 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
             f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
             f"{', '.join(found) or 'none'}"
         )
-    return tuned_controller(kind, task, found[kind]["settings"])
+    return design(kind, task, found[kind]["settings"])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -57,7 +56,6 @@ def fly_task(
     task: BenchmarkTask,
     seeds: ArrayLike | None = None,
     model: ShipModel | None = None,
-    watch: Callable[[Engine], None] | None = None,
 ) -> Flown:
     """Fly the episodes of a task, all at once.
 
@@ -74,8 +72,6 @@ def fly_task(
         By default those that are scored.
     model : ShipModel, optional
         Another ship than the task's own.
-    watch : callable, optional
-        Shown the engine at the beginning and after each interval.
 
     Returns
     -------
@@ -87,8 +83,6 @@ def fly_task(
     log = _Log(engine)
     observations, state = engine.reset(numbers), None
     log.begin()
-    watched = watch or (lambda _: None)
-    watched(engine)
     starts = np.ones(len(numbers), dtype=np.bool_)
     spent, asked, failure = 0.0, 0, ""
     while log.sailing.any():
@@ -108,10 +102,43 @@ def fly_task(
                 break
         observations, _, terminated, truncated = engine.step(command)
         log.note(_shielded(state, len(numbers)), terminated, truncated)
-        watched(engine)
         starts = np.zeros(len(numbers), dtype=np.bool_)
     recording = log.recording()
     return Flown(metrics(recording), numbers, failure, spent / max(asked, 1), recording)
+
+
+def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
+    """Cost of each episode: minus the sum of its rewards.
+
+    Parameters
+    ----------
+    policy : Policy
+        Anything with `predict`; it is given the observations of all ships together.
+    engine : Engine
+        With a lane for each seed.
+    seeds : int array of shape (n,)
+
+    Returns
+    -------
+    array of shape (n,)
+
+    Raises
+    ------
+    InputError
+        If the policy answers with something that is not a finite command for each ship.
+    """
+    observations = engine.reset(seeds)
+    total, sailing = np.zeros(len(seeds)), np.ones(len(seeds), dtype=np.bool_)
+    starts, state = sailing.copy(), None
+    while sailing.any():
+        actions, state = policy.predict(observations, state, starts, True)
+        commands = np.array(actions, dtype=np.float32)
+        commands[~sailing] = 0.0  # of no effect any more
+        observations, rewards, terminated, truncated = engine.step(commands)
+        total += rewards
+        sailing &= ~(terminated | truncated)
+        starts[:] = False
+    return -total
 
 
 def commands(actions: Any, engine: Engine, sailing: Flags) -> tuple[NDArray[np.float32], Flags, str]:

@@ -15,11 +15,9 @@ from agents.benchmarking.refly import SAME_COST, Flight, Reflown, cost_of
 from agents.benchmarking.results import BenchmarkResult
 from agents.replay import player
 from agents.replay_series import quantities, run
-from shipgym.episode import Episode
 
 Floats = NDArray[np.float64]
 
-SAMPLES = 240  # of a history at most
 MOST_RUNS = 300  # in a page, 5 kB each
 MARK = "@episodes@"  # what the page's script puts its runs in the place of
 DECIMALS = {
@@ -122,7 +120,7 @@ def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[s
             for flight in there:
                 if flight not in kept:
                     kept[flight] = len(runs)
-                    whole.append(thin(reflown.episodes[flight], _called(result, flight)))
+                    whole.append(run(_called(result, flight), reflown.episodes[flight]))
                     runs.append({**short(whole[-1]), "colour": look[flight.contestant][0]})
             entries[task].append(
                 {
@@ -142,37 +140,15 @@ def _called(result: BenchmarkResult, flight: Flight) -> str:
     return f"{flight.contestant}, run {flight.run + 1}" if several else flight.contestant
 
 
-def thin(episode: Episode, name: str, samples: int = SAMPLES) -> dict[str, Any]:
-    """An episode for the player, with fewer samples; rewards are summed in between.
-
-    The last interval is filled up: the ship stays where the episode ended.
-    """
-    whole = run(name, episode)
-    stride = -(-episode.n_steps // samples)
-    at = np.minimum(np.arange(0, episode.n_steps + stride, stride), episode.n_steps)
-
-    def summed(values: Sequence[float]) -> list[float]:
-        together: list[float] = np.diff(np.cumsum(values)[at], prepend=0.0).tolist()
-        return together
-
-    return {
-        **whole,
-        "dt": whole["dt"] * stride,
-        "steps": len(at) - 1,
-        "series": {key: np.asarray(values)[at].tolist() for key, values in whole["series"].items()},
-        "parts": {key: summed(values) for key, values in whole["parts"].items() if np.any(values)},
-        "rewards": summed(whole["rewards"]),
-        "other": {},
-    }
-
-
 def short(whole: dict[str, Any]) -> dict[str, Any]:
     """A run with its histories as whole numbers, each the difference to the one before; see `DECIMALS`."""
+    parts = {key: values for key, values in whole["parts"].items() if np.any(values)}
     return {
         **whole,
         "series": {key: differences(values, DECIMALS[key]) for key, values in whole["series"].items()},
-        "parts": {key: differences(values, REWARD_DECIMALS) for key, values in whole["parts"].items()},
+        "parts": {key: differences(values, REWARD_DECIMALS) for key, values in parts.items()},
         "rewards": differences(whole["rewards"], REWARD_DECIMALS),
+        "other": {},
     }
 
 

@@ -11,14 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import Contestant, contestants
-from agents.benchmarking.flying import Flown, fly_task
+from agents.benchmarking.flying import commands
 from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controller import Policy
 from agents.engines import run_jobs
-from shipgym.envs.engine import Engine
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.recording import REWARD, SUCCESS, plain
+from shipgym.envs.recording import SUCCESS, plain
+from shipgym.envs.screen import STEP_OUTCOME
 from shipgym.episode import Episode
 from shipgym.errors import InputError
 
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 
 Floats = NDArray[np.float64]
 
+SAMPLES = 300  # of a history at most
 SAME_COST = 1e-9  # relative difference of the cost that is rounding
 
 _suite = lru_cache(maxsize=4)(load_suite)
@@ -150,7 +150,7 @@ def _gathered(result: BenchmarkResult, found: Mapping[tuple[str, str], Mapping[s
             for flight, cost, content in zip(flights, flown["costs"], flown["episodes"], strict=True):
                 if content is not None:
                     episodes[flight] = Episode(**content)
-                if not np.isclose(cost, cost_of(result, flight), rtol=SAME_COST, equal_nan=True):
+                if np.isfinite(cost) and not np.isclose(cost, cost_of(result, flight), rtol=SAME_COST):
                     different.append(flight)
     refused = {pair: one["refused"] for pair, one in found.items() if one["refused"]}
     return Reflown(episodes, refused, tuple(different))
@@ -163,88 +163,121 @@ def cost_of(result: BenchmarkResult, flight: Flight) -> float:
 
 
 class Recorded(NamedTuple):
-    """Episodes of one controller: what happened, what each cost, and its seed."""
+    """Episodes of one controller: what happened, None where not even one sample, and what each cost.
+
+    What an episode cost in which the controller failed is not known here: NaN.
+    """
 
     episodes: list[Episode | None]
     costs: Floats
-    seeds: NDArray[np.int64]
 
 
-def recorded(controller: Policy, task: BenchmarkTask, seeds: Sequence[int]) -> Recorded:
-    """Fly episodes of a task side by side, and keep all that happened.
+def recorded(
+    controller: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = SAMPLES
+) -> Recorded:
+    """Fly episodes of a task side by side as `fly_task` does, and keep their histories.
 
     Parameters
     ----------
     controller : Policy
     task : BenchmarkTask
     seeds : sequence of int
+    samples : int
+        Of an episode of full length at most: the histories have every so many control intervals, in which
+        rewards are summed. The last one is filled up: the ship stays where her episode ended.
 
     Returns
     -------
     Recorded
-        No episode where the controller failed before the first step.
     """
-    watch = _Watch()
-    flown = fly_task(controller, task, seeds, watch=watch)
-    episodes = [_episode(task, watch, flown, lane) for lane in range(len(seeds))]
-    return Recorded(episodes, flown.episodes["cost"], flown.seeds)
+    stride = -(-task.task.episode_steps // samples)
+    engine, states, outcomes, actions = task.engine(len(seeds)), [], [], []
+    observations, memory = engine.reset(np.asarray(seeds)), None
+    waypoints = [engine.waypoints(lane) for lane in range(len(seeds))]
+    states.append(engine.physical_state())
+    began = engine.shown.outcomes.copy()
+    sailing = np.ones(len(seeds), dtype=np.bool_)
+    starts, failed, steps = sailing.copy(), ~sailing, np.zeros(len(seeds), dtype=np.int64)
+    while sailing.any():
+        try:
+            answer, memory = controller.predict(observations, memory, starts, True)
+        except Exception:  # as in the benchmark: the controller's failure
+            answer = None
+        command, bad, _ = commands(answer, engine, sailing)
+        failed, sailing = failed | bad, sailing & ~bad
+        if not sailing.any():
+            break
+        observations, _, terminated, truncated = engine.step(command)
+        outcomes.append(engine.shown.outcomes.copy())
+        steps += sailing
+        sailing, starts = sailing & ~(terminated | truncated), np.zeros_like(starts)
+        actions.append(command)
+        if len(outcomes) % stride == 0:
+            states.append(engine.physical_state())
+    states.append(engine.physical_state())  # of those whose last interval is not a whole one
+    log = _Log(task, stride, states, np.array([began, *outcomes]), np.array(actions), failed, steps)
+    episodes = [_episode(log, lane, int(seed), waypoints[lane]) for lane, seed in enumerate(seeds)]
+    costs = -log.outcomes[1:, 0].sum(axis=0)
+    return Recorded(episodes, np.where(failed, np.nan, costs))
 
 
-class _Watch:
-    """Keeps what an engine shows after each interval, of all lanes."""
+class _Log(NamedTuple):
+    """What was kept of all lanes: states at samples, outcomes at the beginning and after each interval."""
 
-    def __init__(self) -> None:
-        self.states: list[dict[str, Floats]] = []
-        self.info: list[dict[str, Floats]] = []
-        self.actions: list[Floats] = []
-        self.waypoints: list[Floats | None] = []
-
-    def __call__(self, engine: Engine) -> None:
-        if not self.states:
-            self.waypoints = [engine.waypoints(lane) for lane in range(engine.num_envs)]
-        else:
-            self.actions.append(engine.command.T.astype(np.float64))
-        self.states.append(engine.physical_state())
-        self.info.append({name: engine.info(name).copy() for name in engine.task.info_names})
+    task: BenchmarkTask
+    stride: int
+    states: list[dict[str, Floats]]
+    outcomes: Floats
+    actions: NDArray[np.float32]
+    failed: NDArray[np.bool_]
+    steps: NDArray[np.int64]
 
 
-def _episode(task: BenchmarkTask, watch: _Watch, flown: Flown, lane: int) -> Episode | None:
-    recording, ship = flown.recording, task.ship
-    steps = int(recording.steps[lane])
-    if not steps:
+def _episode(log: _Log, lane: int, seed: int, waypoints: Floats | None) -> Episode | None:
+    task, ship, failed, steps = log.task.task, log.task.ship, bool(log.failed[lane]), int(log.steps[lane])
+    count = (
+        steps // log.stride if failed else -(-steps // log.stride)
+    )  # one that failed drifts on in the engine
+    if not count:
         return None
-    states = _of_lane(watch.states[: steps + 1], lane)
-    info = _of_lane(watch.info[: steps + 1], lane)
-    parts = {name: values[1:] for name, values in info.items() if name.startswith(REWARD)}
-    said = [bool(info[name][-1] > 0.0) for name in SUCCESS if name in info]
-    lost, failed = bool(recording.lost[lane]), bool(recording.failed[lane])
-    beam, corridor = ship.particulars.get("beam"), getattr(task.task, "corridor", None)
+    at = np.minimum(log.stride * np.arange(count + 1), steps)
+    outcomes = log.outcomes[: steps + 1, :, lane]
+    rows = {name: outcomes[:, STEP_OUTCOME + k] for k, name in enumerate(task.info_names)}
+    states = {
+        name: np.array([state[name][lane] for state in log.states[: count + 1]]) for name in log.states[0]
+    }
+    said = [bool(np.any(rows[name][1:] > 0.0)) for name in SUCCESS if name in rows]
+    corridor = getattr(task, "corridor", None)
+
+    def summed(values: Floats) -> Floats:
+        together: Floats = np.diff(np.append(0.0, np.cumsum(values[1:]))[at])
+        return together
+
     return Episode(
-        environment=task.env_id,
+        environment=log.task.env_id,
         model=ship.name,
-        dt=recording.dt,
+        dt=task.interval(ship) * log.stride,
         length=ship.particulars["length"],
-        beam=beam,
+        beam=ship.particulars.get("beam"),
         rudder_limit=ship.steering.limit,
-        states=states,
-        actions=np.array([actions[lane] for actions in watch.actions[:steps]]),
-        rewards=np.sum(list(parts.values()), axis=0),
+        states=_finite(states),
+        actions=log.actions[at[:-1], lane],
+        rewards=summed(outcomes[:, 0]),
         commands={
             name: states[f"{name}_command"][1:] for name in ship.command_names if f"{name}_command" in states
         },
-        reward_parts=parts,
-        info={name: values for name, values in info.items() if name not in {*parts, *SUCCESS}},
-        waypoints=watch.waypoints[lane] if isinstance(task.task, PathFollowingTask) else None,
+        reward_parts={name: summed(rows[name]) for name in task.reward_parts},
+        info=_finite({name: rows[name][at] for name in rows if name not in {*task.reward_parts, *SUCCESS}}),
+        waypoints=waypoints,
         corridor=None if corridor is None else corridor * ship.particulars["length"],
-        arguments=plain({"model": task.model, **task.options}),
-        seed=int(flown.seeds[lane]),
-        terminated=lost or any(said),
-        truncated=steps == task.task.episode_steps and not (lost or failed or any(said)),
+        arguments=plain({"model": log.task.model, **log.task.options}),
+        seed=seed,
+        terminated=not failed and bool(outcomes[-1, 1] > 0.0),
+        truncated=not failed and bool(outcomes[-1, 2] > 0.0),
         success=said[0] if said else None,
     )
 
 
-def _of_lane(rows: Sequence[Mapping[str, Floats]], lane: int) -> dict[str, Floats]:
-    """Values over time of one lane, by name; those that were not finite throughout are left out."""
-    found = {name: np.array([row[name][lane] for row in rows]) for name in rows[0]}
-    return {name: values for name, values in found.items() if np.isfinite(values).all()}
+def _finite(histories: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Those that are finite throughout."""
+    return {name: values for name, values in histories.items() if np.isfinite(values).all()}

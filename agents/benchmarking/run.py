@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.contestants import ORACLE, Contestant, contestants, policy_hash
+from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.oracle_costs import oracle_costs
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
 from agents.benchmarking.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
-from agents.engines import run_jobs
+from agents.engines import check_engine, run_jobs
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
@@ -74,15 +74,19 @@ def benchmark(
     Raises
     ------
     InputError
-        For an unknown contestant, suite or task, with the nearest known one, or a folder that is in use.
+        For an unknown contestant, suite or task, with the nearest known one, the file of an agent that is
+        broken or fits none of the tasks, or a folder that is in use.
     """
     found = _suite(suite)
     chosen = found.tasks if tasks is None else tuple(found.task(name) for name in _once(tasks))
     who = contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)
+    check_engine(engine, workers, address)
     folder = None if out is None else Path(out)
     if folder is not None:
         check_new(folder, resume)
+    for one in who:
+        check_agents(one, chosen)
     jobs = [fly_job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
     flown = run_jobs(
         fly_job,

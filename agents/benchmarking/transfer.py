@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.direct_search import tune, tuned_controller
+from agents.benchmarking.designs import design
+from agents.benchmarking.direct_search import tune
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
@@ -37,6 +38,8 @@ LEARNERS = ("identified", "posterior", "reference")
 IDENTIFIED, REFERENCE, TUNED = "identified", "reference", "tuned"
 N_RUNS = 5
 CLASSICAL = ("pid", "lq", "lqg", "ilos")
+#: Task whose settings of PPO all cases are learned with.
+SETTINGS_OF = "container-path"
 #: Tasks of the suite, and the identified model of their ship.
 CASES = {
     "mariner-sharp-turns": "mariner-tls-svm",
@@ -147,7 +150,7 @@ def transfer(
     learners : sequence of str
         Of `LEARNERS`.
     settings : mapping, optional
-        Of PPO, in place of those of the task.
+        Of PPO, in place of those of `SETTINGS_OF`.
     engine, workers
         See `agents.engines.run_jobs`.
     progress : callable, optional
@@ -192,7 +195,7 @@ def learn(job: dict[str, Any]) -> str:
 
     case = _case(job)
     task = case.learned_in(job["learner"])
-    settings = load_settings("ppo", task.environment, case.task.name, job["settings"])
+    settings = load_settings("ppo", task.environment, SETTINGS_OF, job["settings"])
     folder = Path(job["out"])
     train(Plan("ppo", task, settings, seed=job["seed"]), folder, resume=folder.exists())
     return str(folder / "agent.json")
@@ -203,7 +206,7 @@ def _tuned(case: TransferCase, folder: Path, engine: str, workers: int) -> Contr
     searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
     found = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
     best = min(found, key=lambda result: float(result["cost"]))
-    return tuned_controller(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
+    return design(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
 
 
 def tune_one(job: dict[str, Any]) -> dict[str, Any]:

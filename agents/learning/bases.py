@@ -1,15 +1,12 @@
-"""Classical controllers by name, designed on a task's ship: what policies add to and are compared with."""
+"""What policies add to: a classical controller by name, as tuned for the task, or from a file."""
 
 from __future__ import annotations
 
-import inspect
-from importlib import import_module
-
+from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import tuned
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask
 from agents.controller import Controller
-from agents.controller_file import HOMES, load_agent
-from shipgym.envs.path_following_task import PathFollowingTask
+from agents.controller_file import load_agent
 from shipgym.errors import InputError
 
 
@@ -42,13 +39,4 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
         if not isinstance(agent, Controller):
             raise InputError(f"base: {name} holds a learned policy, expected a classical controller")
         return agent
-    home, kind = HOMES[name]
-    design = getattr(import_module(home), kind)
-    known = inspect.signature(design.from_model).parameters
-    if "task" in known:
-        if not isinstance(task.task, PathFollowingTask):
-            raise InputError(f"base: '{name}' found on a task without a path, expected a course autopilot")
-        guide: Controller = design.from_model(task.ship, task=task.task)
-        return guide
-    autopilot: Controller = design.from_model(task.ship, dt=task.task.interval(task.ship))
-    return autopilot
+    return design(name, task)

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shipgym.envs.screen import STEP_OUTCOME, Screen
 from shipgym.envs.stability import refuse_unstable
 from shipgym.envs.task import Task
 from shipgym.envs.variety import SmallFleet, Variety
@@ -23,21 +24,8 @@ from shipgym.simulation.weather_column import weather_column
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
-STEP_OUTCOME = 3  # reward, terminated, truncated come before what is in `info`
-
-
-class Shown(NamedTuple):
-    """What a step of all lanes shows.
-
-    Attributes
-    ----------
-    observations : float32 array of shape (num_envs, n_observations)
-    outcomes : float64 array of shape (n_outcomes, num_envs)
-        Reward, terminated, truncated, then what is in `info`.
-    """
-
-    observations: Observation
-    outcomes: Floats
+REFUSED = -1  # the kernel's answer to commands that are no numbers
+MOST_SCREENS = 4  # that are looked at whether they are free; more are held by users who keep what they get
 
 
 class Engine:
@@ -107,22 +95,70 @@ class Engine:
         self._ships = _ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
         self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
         self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
-        self._least = np.array(self.task.least_commands(self.model), dtype=np.float32)[:, None]
-        self._actions = np.zeros((len(self._least), self.num_envs), np.float32)
-        self._n_shown = int(self._settings[rows.N_SHOWN])
-        self._n_outcomes = STEP_OUTCOME + len(self.task.info_names)
+        self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
+        self._orders = self._actions.T
+        self.everyone = np.ones(self.num_envs, dtype=np.bool_)
+        self.everyone.flags.writeable = False
+        self._fixed = (
+            self._states, self._keys, self._settings, self._pool, self._ships, self._actions
+        )  # fmt: skip
+        self._fixed_words = _words(self._fixed)
+        self._screens: list[Screen] = []
         self.show_anew()
 
-    #: One control interval with the commands as they stand, shown in `shown`.
-    advance: Callable[[], None]
-
     def show_anew(self) -> None:
-        """Let what comes next be shown in new arrays, so that the last ones may be kept."""
-        observations = np.empty((self.num_envs, self._n_shown), dtype=np.float32)
-        self.shown = Shown(observations, np.empty((self._n_outcomes, self.num_envs)))
-        self.advance = self._team.shared(self._kernel.step, (
-            self._states, self._keys, self._settings, self._ships, self._actions, *self.shown,
-        ))  # fmt: skip
+        """Let what comes next be shown where nobody looks, so that what was shown may be kept."""
+        self.shown = self._free_screen()
+
+    def _free_screen(self) -> Screen:
+        for screen in self._screens:
+            if screen.is_free:
+                return screen
+        names = self.task.info_names
+        flags = [name for name in names if name in self.task.flags]
+        screen = Screen(self.everyone, int(self._settings[rows.N_SHOWN]), names, flags)
+        screen.shown_by(self._advance_on(screen))
+        self._screens = [screen, *self._screens[: MOST_SCREENS - 1]]
+        return screen
+
+    def _advance_on(self, screen: Screen) -> Callable[[bool], int]:
+        shown = (screen.observations, screen.outcomes, screen.flags)
+        if not hasattr(self._kernel.step_at, "signatures"):  # run as plain Python
+            return self._team.shared(partial(partial, self._kernel.step, *self._fixed, *shown))
+        words = [*self._fixed_words, *_words(shown)]
+        return self._team.shared(
+            lambda *tiles: partial(self._kernel.step_at, np.array([*words, *tiles], dtype=np.int64))
+        )
+
+    def advance(self, next_ones: bool = False, anew: bool = False) -> int:
+        """One control interval with the commands as they stand.
+
+        Parameters
+        ----------
+        next_ones : bool
+            Whether lanes whose episode was over begin the next one, or stay.
+        anew : bool
+            Whether it is shown where nobody looks, so that what was shown may be kept.
+
+        Returns
+        -------
+        int
+            Number of episodes that ended.
+
+        Raises
+        ------
+        InputError
+            If a command is not a number; nothing is changed then.
+        """
+        screen = self._free_screen() if anew else self.shown
+        ended = screen.advance(next_ones)
+        if ended == REFUSED:
+            lane, which = np.argwhere(~np.isfinite(self._orders))[0]
+            raise InputError(
+                f"actions: {self._orders[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
+            )
+        self.shown = screen
+        return ended
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -161,25 +197,24 @@ class Engine:
         for row, words in enumerate((keys, episodes)):
             all_words = np.broadcast_to(np.asarray(words).astype(np.uint64), (self.num_envs,))
             self._keys[lanes // layout.LANES, row, lanes % layout.LANES] = all_words[lanes]
-        self._begin(which, True)
+        self._begin(which, next_one=False)
         return self.observations
 
     def begin_next(self, which: NDArray[np.bool_]) -> None:
-        """Begin the next episode in some lanes; rewards and flags stay those of the last step.
+        """Begin the next episode in some lanes; what `step` answers of the last one stays.
 
         Parameters
         ----------
         which : bool array of shape (num_envs,)
             The lanes.
         """
-        lanes = np.flatnonzero(which)
-        self._keys[lanes // layout.LANES, 1, lanes % layout.LANES] += np.uint64(1)
-        self._begin(which, False)
+        self._begin(which, next_one=True)
 
-    def _begin(self, which: NDArray[np.bool_], all_anew: bool) -> None:
+    def _begin(self, which: NDArray[np.bool_], next_one: bool) -> None:
         self._kernel.reset(
-            self._states, self._keys, self._settings, self._pool, self._ships, which, *self.shown, all_anew
-        )
+            self._states, self._keys, self._settings, self._pool, self._ships, which,
+            self.shown.observations, self.shown.outcomes, self.shown.flags, next_one,
+        )  # fmt: skip
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
@@ -229,6 +264,7 @@ class Engine:
             _lanes_of(own)[here[0], :, here[1]] = _lanes_of(other)[there[0] % len(other), :, there[1]]
         self.shown.observations[:] = source.shown.observations[which]
         self.shown.outcomes[:] = source.shown.outcomes[:, which]
+        self.shown.flags[:] = source.shown.flags[:, which]
 
     def _check_alike(self, source: Engine) -> None:
         """Refuse an engine whose lanes cannot be taken over."""
@@ -248,28 +284,22 @@ class Engine:
         self._states[:, row : row + layout.LANES] = value
 
     def order(self, actions: ArrayLike) -> None:
-        """Set the commands for the next step.
+        """Set the commands for the next step, which refuses those that are no numbers.
 
         Parameters
         ----------
-        actions : array-like of shape (num_envs, n_commands), or (num_envs,) of int for discrete ones
+        actions : array-like of shape (num_envs, n_commands)
             Commanded rudder, and shaft speed, parts of their limits, clipped to [-1, 1].
 
         Raises
         ------
         InputError
-            If an action is not a number or their shape is another.
+            If their shape is another.
         """
         array = np.asarray(actions, dtype=np.float32)
-        expected = (self.num_envs, len(self._actions))
-        if array.shape != expected:
-            raise InputError(f"actions: shape {array.shape} found, expected {expected}")
-        if not np.isfinite(array).all():
-            lane, which = np.argwhere(~np.isfinite(array))[0]
-            raise InputError(
-                f"actions: {array[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
-            )
-        np.maximum(array.T, self._least, out=self._actions)
+        if array.shape != self._orders.shape:
+            raise InputError(f"actions: shape {array.shape} found, expected {self._orders.shape}")
+        self._orders[...] = array
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
         """One control interval; a lane whose episode is over stays as it is and earns 0.
@@ -292,8 +322,8 @@ class Engine:
         """
         self.order(actions)
         self.advance()
-        rewards, terminated, truncated = self.shown.outcomes[:STEP_OUTCOME]
-        return self.observations, rewards.copy(), terminated > 0.0, truncated > 0.0
+        shown = self.shown
+        return self.observations, shown.outcomes[0].copy(), shown.terminated.copy(), shown.truncated.copy()
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""
@@ -384,20 +414,24 @@ class _Team:
         self._own, *self._others = list(pairwise(bounds))
         self._pool = ThreadPoolExecutor(len(self._others), "shipgym") if self._others else None
 
-    def shared(self, step: Any, world: tuple[Any, ...]) -> Callable[[], None]:
-        """A kernel that releases the interpreter, to be run on all tiles."""
-        own = partial(step, *world, *self._own)
+    def shared(self, stepping: Callable[..., Callable[[bool], int]]) -> Callable[[bool], int]:
+        """The step of all tiles, given that of the tiles from one up to another; its counts are summed."""
+        own = stepping(*self._own)
         if self._pool is None:
             return own
-        submit, others = self._pool.submit, [partial(step, *world, *bounds) for bounds in self._others]
+        submit, others = self._pool.submit, [stepping(*bounds) for bounds in self._others]
 
-        def run() -> None:
-            waiting = [submit(share) for share in others]
-            own()
-            for share in waiting:
-                share.result()
+        def run(next_ones: bool) -> int:
+            waiting = [submit(share, next_ones) for share in others]
+            counts = [own(next_ones), *(share.result() for share in waiting)]
+            return REFUSED if REFUSED in counts else sum(counts)
 
         return run
+
+
+def _words(arrays: Sequence[NDArray[Any]]) -> list[int]:
+    """Addresses and shapes of arrays, by turns; the caller keeps the arrays alive."""
+    return [word for array in arrays for word in (array.ctypes.data, *array.shape[:2])]
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys
-from shipgym.envs.engine import STEP_OUTCOME, Engine, episode_key
+from shipgym.envs.engine import REFUSED, Engine, episode_key
+from shipgym.envs.screen import STEP_OUTCOME
 from shipgym.envs.task import RUDDER_ORDERS, Task
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
@@ -51,8 +52,7 @@ def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
         np.array([getattr(quantity, bound) for quantity in observed], dtype=np.float32)
         for bound in ("low", "high")
     )
-    commands = 2 if task.action == "rudder-shaft" else 1
-    actions: Space = gymnasium.spaces.Box(-1.0, 1.0, (commands,), dtype=np.float32)
+    actions: Space = gymnasium.spaces.Box(-1.0, 1.0, (task.n_commands,), dtype=np.float32)
     if task.action == "rudder-discrete":
         actions = gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
     return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
@@ -98,8 +98,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
         self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
+        self._advance = self._engine.shown.advance
         self._command = self._engine.command[:, 0]
-        self._least = self.task.least_commands(self.model)
         self._discrete = self.task.action == "rudder-discrete"
         self._names = self.task.info_names
         self._flags = [(name, k) for k, name in enumerate(self._names) if name in self.task.flags]
@@ -183,16 +183,19 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
             If the action is not a finite number for each command.
         """
         self._order(action)
-        self._engine.advance()
-        reward, terminated, truncated, *rest = self._outcomes.tolist()
+        if self._advance(False) == REFUSED:
+            wrong = next(number for number in self._command.tolist() if not isfinite(number))
+            raise InputError(f"action: {wrong} found, expected numbers in [-1, 1]: parts of the limit")
+        values = self._outcomes.tolist()
+        info = self._info(values[STEP_OUTCOME:])
         if self._artist is not None:
             self._artist.note(self._engine)
             if self.render_mode == "human":
                 self.render()
-        return self._seen.copy(), reward, terminated > 0.0, truncated > 0.0, self._info(rest)
+        return self._seen.copy(), values[0], values[1] > 0.0, values[2] > 0.0, info
 
     def _info(self, values: list[float]) -> dict[str, Any]:
-        info: dict[str, Any] = dict(zip(self._names, values, strict=True))
+        info: dict[str, Any] = dict(zip(self._names, values))  # noqa: B905 - as many, by construction
         for flag, k in self._flags:
             info[flag] = values[k] > 0.0
         return info
@@ -206,10 +209,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         if array.shape != self._command.shape:
             what = "the commanded rudder" + (" and shaft speed" if len(self._command) > 1 else "")
             raise InputError(f"action: shape {array.shape} found, expected {self._command.shape}: {what}")
-        for k, number in enumerate(array.tolist()):
-            if not isfinite(number):
-                raise InputError(f"action: {number} found, expected numbers in [-1, 1]: parts of the limit")
-            self._command[k] = max(number, self._least[k])
+        self._command[...] = array
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""

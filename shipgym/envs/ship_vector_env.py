@@ -12,7 +12,8 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys, quoted
-from shipgym.envs.engine import STEP_OUTCOME, Engine, episode_key, episode_keys
+from shipgym.envs.engine import Engine, episode_key, episode_keys
+from shipgym.envs.screen import named_rows
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options, spaces
 from shipgym.envs.task import RUDDER_ORDERS, Task
 from shipgym.errors import InputError
@@ -78,10 +79,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._mode = mode
-        self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        self._everyone = np.ones(self.num_envs, dtype=np.bool_)
-        self._everyone.flags.writeable = False
-        self._masks = {f"_{name}": self._everyone for name in self.task.info_names}
+        self._discrete = self.task.action == "rudder-discrete"
+        self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keys: NDArray[np.uint64] | None = None
 
     @property
@@ -124,19 +123,19 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
                 self._keys[row], episodes[row] = episode_keys(number), 0
         self._engine.show_anew()
         self._engine.begin(self._keys, episodes, mask)
-        self._ended[mask] = False
         for artist, begun in zip(self._artists, mask, strict=False):
             if begun:
                 artist.begin(self._engine)
-        observations, outcomes = self._engine.shown
-        return observations, self._infos(outcomes, mask)
+        shown = self._engine.shown
+        masks = {name: mask.copy() for name in shown.infos if name.startswith("_")}
+        return shown.observations, {**shown.infos, **masks}
 
     def _drawn_keys(self) -> NDArray[np.uint64]:
         return np.array([episode_key(self.np_random) for _ in range(self.num_envs)], dtype=np.uint64)
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         check_keys(options or {}, ["reset_mask"], "options")
-        mask = (options or {}).get("reset_mask", self._everyone)
+        mask = (options or {}).get("reset_mask", self._engine.everyone)
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise InputError(f"options: reset_mask {mask!r} found, expected a bool array of {self.num_envs}")
         if not mask.any():
@@ -176,27 +175,21 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         InputError
             If an action is not a number or their shape is another.
         """
-        self._engine.order(self._commands(actions))
-        self._engine.show_anew()
-        self._engine.advance()
-        observations, outcomes = self._engine.shown
-        rewards, terminated, truncated = outcomes[0].copy(), outcomes[1] > 0.0, outcomes[2] > 0.0
-        ended, self._ended = self._ended, terminated | truncated
-        infos = self._infos(outcomes, self._everyone)
-        if self._mode is AutoresetMode.SAME_STEP and self._ended.any():
-            final = self._final(self._ended)
-            self._engine.begin_next(self._ended)
-            infos = self._infos(outcomes, self._everyone) | final
-        elif self._mode is AutoresetMode.NEXT_STEP and ended.any():
-            self._engine.begin_next(ended)
-            infos = self._infos(outcomes, self._everyone)
+        engine = self._engine
+        engine.order(self._commands(actions) if self._discrete else actions)
+        ended = engine.advance(self._some_over, anew=True)
+        shown = engine.shown
+        rewards, infos = shown.outcomes[0].copy(), shown.infos.copy()
+        if self._mode is AutoresetMode.NEXT_STEP:
+            self._some_over = ended > 0
+        elif ended and self._mode is AutoresetMode.SAME_STEP:
+            infos |= self._final()
+            engine.begin_next(shown.terminated | shown.truncated)
         if self._artists:
             self._note()
-        return observations, rewards, terminated, truncated, infos
+        return shown.observations, rewards, shown.terminated, shown.truncated, infos
 
     def _commands(self, actions: Any) -> Any:
-        if self.task.action != "rudder-discrete":
-            return actions
         array = np.asarray(actions)
         if array.shape != (self.num_envs,) or array.dtype.kind not in "iu":
             raise InputError(
@@ -207,24 +200,19 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
             raise InputError(f"actions: {array} found, expected 0 to {len(ORDERS) - 1}: rudder orders")
         return ORDERS[array][:, None]
 
-    def _infos(self, outcomes: Floats, mask: Flags) -> Infos:
-        """Rows of the outcome by name, with the mask of the rows that they are of."""
-        infos: Infos = dict(zip(self.task.info_names, outcomes[STEP_OUTCOME:], strict=True))
-        for flag in self.task.flags:
-            infos[flag] = infos[flag] > 0.0
-        infos.update(self._masks if mask is self._everyone else dict.fromkeys(self._masks, mask))
-        return infos
-
-    def _final(self, ended: Flags) -> Infos:
+    def _final(self) -> Infos:
         """What episodes that ended showed last."""
-        observations, outcomes = self._engine.shown
+        shown = self._engine.shown
+        ended = shown.terminated | shown.truncated
         final_obs = np.full(self.num_envs, None, dtype=object)
-        for row in np.flatnonzero(ended):
-            final_obs[row] = observations[row].copy()
-        kept = np.where(ended, outcomes, 0.0)
+        for row in np.flatnonzero(ended).tolist():
+            final_obs[row] = shown.observations[row].copy()
+        flags = [name for name in self.task.info_names if name in self.task.flags]
+        kept = np.where(ended, shown.outcomes, 0.0), shown.flags & ended
+        final_info = named_rows(*kept, self.task.info_names, flags)
         return {
             "final_obs": final_obs, "_final_obs": ended,
-            "final_info": self._infos(kept, ended), "_final_info": ended,
+            "final_info": final_info | {f"_{name}": ended for name in final_info}, "_final_info": ended,
         }  # fmt: skip
 
     def _note(self) -> None:
@@ -236,12 +224,12 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
         assert self._keys is not None
-        own = {"row_keys": self._keys.copy(), "ended": self._ended.copy()}
+        own = {"row_keys": self._keys.copy(), "some_over": np.array(self._some_over)}
         return own | self._engine.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
-        self._keys, self._ended = memory["row_keys"].copy(), memory["ended"].copy()
+        self._keys, self._some_over = memory["row_keys"].copy(), bool(memory["some_over"])
         self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:

@@ -205,10 +205,14 @@ class Task(ABC):
         )
         return steering + self.observed_of_task(model) + self._observed_extras(model)
 
-    def least_commands(self, model: ShipModel) -> tuple[float, ...]:
-        """Least command of each, parts of the limits: a shaft that may not turn astern is stopped instead."""
-        shaft = (-1.0 if turns_astern(model) else 0.0,) if self.action == "rudder-shaft" else ()
-        return (-1.0, *shaft)
+    @property
+    def n_commands(self) -> int:
+        """Number of commands: rudder, and shaft."""
+        return 2 if self.action == "rudder-shaft" else 1
+
+    def least_shaft(self, model: ShipModel) -> float:
+        """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
+        return -1.0 if turns_astern(model) else 0.0
 
     def observed_of_task(self, model: ShipModel) -> tuple[Observed, ...]:
         """What the task itself adds to what is observed."""
@@ -252,6 +256,7 @@ class Task(ABC):
         settings[rows.SHOWN : rows.SHOWN + len(shown)] = shown
         own = self.own_settings(model)
         settings[rows.TASK_SETTINGS : rows.TASK_SETTINGS + len(own)] = own
+        settings[rows.LEAST_SHAFT] = self.least_shaft(model)
         settings[rows.N_LIST], settings[rows.LIST :] = len(listed), listed
         return settings
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from numba import njit
+from numba import carray, njit, types
+from numba.extending import intrinsic
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -40,6 +41,22 @@ def kernel(signature: str) -> Callable[[_Function], _Function]:
     """Compile a loop for one signature when its file is imported, or read it from the on-disk cache."""
     compiled: Callable[[_Function], _Function] = njit(signature, cache=True, nogil=True, **_SEMANTICS)
     return compiled
+
+
+@intrinsic  # type: ignore[untyped-decorator]
+def _pointer(_: Any, address: Any) -> Any:
+    """A number as a pointer to what lies at that address."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.inttoptr(arguments[0], context.get_value_type(types.voidptr))
+
+    return types.voidptr(address), generate
+
+
+@inlined
+def matrix_at(address: int, rows: int, columns: int, dtype: Any) -> Any:
+    """The contiguous array of shape (rows, columns) at an address; whoever gives it keeps the array alive."""
+    return carray(_pointer(address), (rows, columns), dtype)
 
 
 @inlined

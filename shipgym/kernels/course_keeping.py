@@ -24,7 +24,7 @@ LARGEST_CHANGE, CHANGE_INTERVAL, LARGEST_ERROR = range(TASK_SETTINGS, TASK_SETTI
 
 NEXT_CHANGE, CHANGES = TASK_STATE, TASK_STATE + LANES  # step of the next new set-point; how many there were
 HEADING_REWARD = TASK_INFO
-N_INFO = 1
+N_INFO, N_FLAGS = 1, 0
 
 
 @rare
@@ -78,5 +78,5 @@ def misread(state: Any, settings: Any, ship: Any, lane: int) -> None:
 
 
 @exact
-def look(state: Any, settings: Any, ship: Any, lanes: int) -> None:
+def look(state: Any, settings: Any, ship: Any, begin: int, end: int) -> None:
     """Nothing beyond what every autopilot sees."""

@@ -2,7 +2,8 @@
 
 The task is `task.py`, replaced by that of an environment when the kernels are compiled. What every step
 needs is vectorised over lanes; what comes seldom (a new set-point, the next leg, the end of an episode) is
-done lane by lane afterwards.
+done lane by lane afterwards. Arrays that are not tiles are indexed by unsigned numbers: an index that could
+be negative, and would count from the end, keeps a loop from being vectorised.
 """
 
 from __future__ import annotations
@@ -12,22 +13,24 @@ from typing import Any
 import numpy as np
 
 from .accelerations import ROLL, SHAFT
-from .compiling import inlined, kernel, rare
-from .instruments import add_noise, filter_waves, read_waves
+from .compiling import inlined, kernel, matrix_at, rare
+from .instruments import add_noise, filter_waves, keeps_reading, read_waves
 from .layout import DELTA, LANES, LENGTH, PHI, PSI, RUDDER_LIMIT, SCALE_SPEED, SERVICE_SHAFT, N, P, R, U, V
 from .motion import clip
 from .random import uniform
-from .task import N_INFO, is_due, judge, look, misread, set_out, turn
+from .task import N_FLAGS, N_INFO, is_due, judge, look, misread, set_out, turn
 from .trigonometry import sin_cos, wrap
 from .voyage import launch, meet_weather, order, voyage
 from .voyage_rows import (
     COURSE,
     DT,
     END,
+    EXTRAPOLATING,
     HEADING_ERROR,
     INTEGRAL,
     INTEGRAL_LENGTHS,
     INTEGRAL_ZONE,
+    LEAST_SHAFT,
     MISREAD_COURSE,
     MISREAD_PSI,
     MISREAD_R,
@@ -46,6 +49,8 @@ from .voyage_rows import (
     SHOWN,
     SUBSTEPS,
     TASK_INFO,
+    TERMINATED,
+    TRUNCATED,
     WAVE_FILTERED,
 )
 from .weather import WEATHER
@@ -53,19 +58,22 @@ from .weather_rows import P_WAVE, PHI_WAVE
 
 N_OUTCOME = (TASK_INFO - OUTCOME) // LANES + N_INFO
 N_STEP = 3  # of the outcome, what `step` answers: reward, terminated, truncated
+N_STEP_FLAGS = 2  # of the flags, what `step` answers
+FLAGS_OF_TASK = TASK_INFO + (N_INFO - N_FLAGS) * LANES
+REFUSED = -1  # what `step` answers to commands that are no numbers
 POOL_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
 LARGEST_ROLL, LARGEST_ROLL_RATE = 0.5235987755982988, 0.1  # rad, rad/s: scales of what is seen
 
 
 @rare
-def observe(state: Any, settings: Any, ship: Any, lanes: int) -> None:
-    """Work out what the autopilots see, within the bounds of the observation space."""
+def observe(state: Any, settings: Any, ship: Any, begin: int, end: int) -> None:
+    """Work out what the autopilots of some lanes see, within the bounds of the observation space."""
     sine, cosine, yaw_rate, sway, surge, rudder, command, integral = (
         OBSERVED, OBSERVED + LANES, OBSERVED + 2 * LANES, OBSERVED + 3 * LANES,
         OBSERVED + 4 * LANES, OBSERVED + 5 * LANES, OBSERVED + 6 * LANES, OBSERVED + 7 * LANES,
     )  # fmt: skip
     per_lengths = 1.0 / (settings[INTEGRAL_ZONE] * settings[INTEGRAL_LENGTHS])
-    for lane in range(lanes):
+    for lane in range(begin, end):
         length, speed = ship[LENGTH + lane], ship[SCALE_SPEED + lane]
         per_speed = 1.0 / speed
         heading, rate = (
@@ -81,8 +89,8 @@ def observe(state: Any, settings: Any, ship: Any, lanes: int) -> None:
         state[rudder + lane] = clip(state[DELTA + lane] / ship[RUDDER_LIMIT + lane], -1.0, 1.0)
         state[command + lane] = state[RUDDER_COMMAND + lane]
         state[integral + lane] = clip(state[INTEGRAL + lane] * speed * per_lengths / length, -1.0, 1.0)
-    look(state, settings, ship, lanes)
-    for lane in range(lanes):
+    look(state, settings, ship, begin, end)
+    for lane in range(begin, end):
         observe_extras(state, ship, lane)
 
 
@@ -101,20 +109,36 @@ def observe_extras(state: Any, ship: Any, lane: int) -> None:
 
 
 @rare
-def show(state: Any, settings: Any, observations: Any, first: int, lanes: int) -> None:
-    """Hand the observations over, one row a ship."""
+def show(state: Any, settings: Any, observations: Any, first: int, begin: int, end: int) -> None:
+    """Hand the observations of some lanes over, one row a ship."""
     for k in range(int(settings[N_SHOWN])):
         row = int(settings[SHOWN + k])
-        for lane in range(lanes):
-            observations[first + lane, k] = state[row + lane]
+        for lane in range(begin, end):
+            observations[np.uintp(first + lane), k] = state[np.uintp(row + lane)]
 
 
 @rare
-def hand_over(state: Any, outcomes: Any, first_row: int, first: int, lanes: int) -> None:
-    """Hand the outcome over, one column a ship."""
-    for k in range(first_row, N_OUTCOME):
-        for lane in range(lanes):
-            outcomes[k, first + lane] = state[OUTCOME + k * LANES + lane]
+def hand_over(
+    state: Any, outcomes: Any, flags: Any, all_rows: bool, first: int, begin: int, end: int
+) -> None:
+    """Hand the outcome of some lanes over, one column a ship: all rows, or all but what `step` answers."""
+    for k in range(0 if all_rows else N_STEP, N_OUTCOME):
+        row = OUTCOME + k * LANES
+        for lane in range(begin, end):
+            outcomes[k, np.uintp(first + lane)] = state[np.uintp(row + lane)]
+    if all_rows:
+        raise_flags(state, TERMINATED, flags, 0, first, begin, end)
+        raise_flags(state, TRUNCATED, flags, 1, first, begin, end)
+    raise_flags(state, EXTRAPOLATING, flags, N_STEP_FLAGS, first, begin, end)
+    for k in range(N_FLAGS):
+        raise_flags(state, FLAGS_OF_TASK + k * LANES, flags, N_STEP_FLAGS + 1 + k, first, begin, end)
+
+
+@inlined
+def raise_flags(state: Any, row: int, flags: Any, k: int, first: int, begin: int, end: int) -> None:
+    """Hand one row over as flags."""
+    for lane in range(begin, end):
+        flags[k, np.uintp(first + lane)] = state[np.uintp(row + lane)] > 0.0
 
 
 @inlined
@@ -164,6 +188,30 @@ def begin(state: Any, lane: int, keys: Any, tile: int, settings: Any, pool: Any,
 
 
 @rare
+def begin_next(
+    state: Any, lane: int, keys: Any, tile: int, settings: Any, pool: Any, ship: Any, observations: Any,
+    outcomes: Any, flags: Any,
+) -> None:  # fmt: skip
+    """Begin the next episode of a lane and show it; reward and flags stay those of the last step."""
+    first = tile * LANES
+    keys[tile, 1, lane] += np.uint64(1)
+    begin(state, lane, keys, tile, settings, pool, ship)
+    observe(state, settings, ship, lane, lane + 1)
+    show(state, settings, observations, first, lane, lane + 1)
+    hand_over(state, outcomes, flags, False, first, lane, lane + 1)
+
+
+@inlined
+def are_numbers(actions: Any) -> bool:
+    """Whether all commands are finite."""
+    wrong = 0
+    for row in range(actions.shape[0]):
+        for lane in range(actions.shape[1]):
+            wrong += 0 if abs(actions[row, lane]) < np.inf else 1
+    return wrong == 0
+
+
+@rare
 def turn_due(state: Any, keys: Any, tile: int, settings: Any, ship: Any, lanes: int) -> None:
     """Let the ships turn for which it is time."""
     for lane in range(lanes):
@@ -173,11 +221,11 @@ def turn_due(state: Any, keys: Any, tile: int, settings: Any, ship: Any, lanes: 
 
 @kernel(
     "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float64[:, ::1], boolean[::1],"
-    " float32[:, ::1], float64[:, ::1], boolean)"
+    " float32[:, ::1], float64[:, ::1], boolean[:, ::1], boolean)"
 )
 def reset(
     states: Any, keys: Any, settings: Any, pool: Any, ships: Any, which: Any, observations: Any,
-    outcomes: Any, all_anew: bool,
+    outcomes: Any, flags: Any, next_one: bool,
 ) -> None:  # fmt: skip
     """Begin an episode in the lanes of `which`.
 
@@ -199,51 +247,82 @@ def reset(
         Taken by what autopilots see.
     outcomes : float64 array of shape (N_OUTCOME, n)
         Taken by reward, flags and info.
-    all_anew : bool
-        Whether everything is shown, or what the last step showed stays: its rewards and flags everywhere,
-        and all of it in tiles where no episode begins.
+    flags : bool array of shape (n_flags, n)
+        Taken by those rows of the outcome that are flags: terminated, truncated, extrapolating, then the
+        task's.
+    next_one : bool
+        Whether the next episode begins under the key, and is shown in its lane alone, where rewards and
+        flags stay those of the last step; or the one of `keys`, and everything is shown.
     """
     n = which.shape[0]
     for tile in range(states.shape[0]):
         state, ship, first = states[tile], ships[tile % ships.shape[0]], tile * LANES
         lanes = min(n - first, LANES)
-        begun = 0
         for lane in range(lanes):
             if which[first + lane]:
-                begin(state, lane, keys, tile, settings, pool, ship)
-                begun += 1
-        if all_anew or begun > 0:
-            observe(state, settings, ship, lanes)
-            show(state, settings, observations, first, lanes)
-            hand_over(state, outcomes, 0 if all_anew else N_STEP, first, lanes)
+                if next_one:
+                    begin_next(state, lane, keys, tile, settings, pool, ship, observations, outcomes, flags)
+                else:
+                    begin(state, lane, keys, tile, settings, pool, ship)
+        if not next_one:
+            observe(state, settings, ship, 0, lanes)
+            show(state, settings, observations, first, 0, lanes)
+            hand_over(state, outcomes, flags, True, first, 0, lanes)
 
 
-@kernel(
-    "void(float64[:, ::1], uint64[:, :, ::1], float64[::1], float64[:, ::1], float32[:, ::1],"
-    " float32[:, ::1], float64[:, ::1], int64, int64)"
-)
+@inlined
 def step(
-    states: Any, keys: Any, settings: Any, ships: Any, actions: Any, observations: Any, outcomes: Any,
-    first_tile: int, end_tile: int,
-) -> None:  # fmt: skip
+    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, actions: Any, observations: Any,
+    outcomes: Any, flags: Any, first_tile: int, end_tile: int, next_ones: bool,
+) -> int:  # fmt: skip
     """One control interval of the tiles from `first_tile` up to `end_tile`.
 
-    A lane whose episode is over stays as it is and earns nothing. `actions` holds rows of commands, of the
-    rudder and, if there is a second, of the shaft; for the others see `reset`.
+    `actions` holds rows of commands, of the rudder and, if there is a second, of the shaft; for the others
+    see `reset`. A lane whose episode was over stays as it is and earns nothing, or, with `next_ones`, begins
+    its next episode. Returns the number of episodes that ended, or `REFUSED`, nothing changed, if one of
+    all commands is no number.
     """
-    n = observations.shape[0]
+    if not are_numbers(actions):
+        return REFUSED
+    n, ended = observations.shape[0], 0
     for tile in range(first_tile, end_tile):
         state, ship, first = states[tile], ships[tile % ships.shape[0]], tile * LANES
         lanes = min(n - first, LANES)
-        order(state, actions, first, lanes)
+        order(state, actions, settings[LEAST_SHAFT], first, lanes)
         voyage(state, keys[tile, 2], settings[DT], int(settings[SUBSTEPS]), ship, lanes)
         judge(state, settings, ship, lanes)
         due = 0
         for lane in range(lanes):
             due += 1 if is_due(state, settings, ship, lane) else 0
+            ended += 1 if state[TERMINATED + lane] + state[TRUNCATED + lane] > 0.0 else 0
         if due > 0:
             turn_due(state, keys, tile, settings, ship, lanes)
         measure_all(state, keys, tile, settings, ship, lanes)
-        observe(state, settings, ship, lanes)
-        show(state, settings, observations, first, lanes)
-        hand_over(state, outcomes, 0, first, lanes)
+        observe(state, settings, ship, 0, lanes)
+        show(state, settings, observations, first, 0, lanes)
+        hand_over(state, outcomes, flags, True, first, 0, lanes)
+        if next_ones:
+            for lane in range(lanes):
+                if keeps_reading(state, lane):
+                    begin_next(state, lane, keys, tile, settings, pool, ship, observations, outcomes, flags)
+    return ended
+
+
+@kernel("int64(int64[::1], boolean)")
+def step_at(world: Any, next_ones: bool) -> int:
+    """`step` of arrays that are given by their addresses and shapes, by turns, and the two tiles.
+
+    To look at nine arrays takes the interpreter longer than to sail a ship.
+    """
+    return step(
+        matrix_at(world[0], world[1], world[2], np.float64),
+        matrix_at(world[3], world[4], 3 * LANES, np.uint64).reshape((world[4], 3, LANES)),
+        matrix_at(world[6], 1, world[7], np.float64)[0],
+        matrix_at(world[8], world[9], world[10], np.float64),
+        matrix_at(world[11], world[12], world[13], np.float64),
+        matrix_at(world[14], world[15], world[16], np.float32),
+        matrix_at(world[17], world[18], world[19], np.float32),
+        matrix_at(world[20], world[21], world[22], np.float64),
+        matrix_at(world[23], world[24], world[25], np.bool_),
+        world[26], world[27], next_ones,
+    )  # fmt: skip

@@ -42,7 +42,7 @@ SAILED, TO_GO = offsets(TASK_STATE + 9 * LANES, 2)  # path made good; to the end
 
 CROSS_REWARD, PROGRESS_REWARD, CROSS_TRACK, MADE_GOOD = offsets(TASK_INFO, 4)
 SUCCESS, IN_CORRIDOR, GROUNDED = offsets(TASK_INFO + 4 * LANES, 3)
-N_INFO = 7
+N_INFO, N_FLAGS = 7, 3
 CROSS_SEEN, COURSE_SINE_SEEN, COURSE_COSINE_SEEN, TURN_DISTANCE_SEEN, TURN_SEEN = offsets(TASK_SEEN, 5)
 
 START_OFFSET = 0.5  # of the corridor: furthest start from the path
@@ -179,10 +179,10 @@ def misread(state: Any, settings: Any, ship: Any, lane: int) -> None:
 
 
 @exact
-def look(state: Any, settings: Any, ship: Any, lanes: int) -> None:
+def look(state: Any, settings: Any, ship: Any, begin: int, end: int) -> None:
     """Distance from the path, course over ground against that to steer, and the turn ahead."""
     per_corridor = 1.0 / settings[CORRIDOR]
-    for lane in range(lanes):
+    for lane in range(begin, end):
         cosine, sine = state[LEG_COSINE + lane], state[LEG_SINE + lane]
         cross = state[CROSS_TRACK + lane] + state[MISREAD_Y + lane] * cosine - state[MISREAD_X + lane] * sine
         per_length = 1.0 / ship[LENGTH + lane]

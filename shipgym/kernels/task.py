@@ -6,7 +6,7 @@ from typing import Any
 
 from .compiling import inlined, rare
 
-N_INFO = 0  # rows of the task's own among the outcome
+N_INFO, N_FLAGS = 0, 0  # rows of the task's own among the outcome, the last of them flags
 
 
 @rare
@@ -52,5 +52,5 @@ def is_due(state: Any, settings: Any, ship: Any, lane: int) -> bool:
 
 
 @inlined
-def look(state: Any, settings: Any, ship: Any, lanes: int) -> None:
-    """Work out the task's own observations."""
+def look(state: Any, settings: Any, ship: Any, begin: int, end: int) -> None:
+    """Work out the task's own observations of the lanes from `begin` up to `end`."""

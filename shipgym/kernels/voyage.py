@@ -101,11 +101,11 @@ def meet_weather(state: Any, lane: int, keys: Any, tile: int, ship: Any) -> None
 
 
 @inlined
-def order(state: Any, actions: Any, first: int, lanes: int) -> None:
+def order(state: Any, actions: Any, least_shaft: float, first: int, lanes: int) -> None:
     """Take the commands of ships whose episode is not over."""
     for lane in range(lanes):
         ended = state[ENDED + lane] != 0.0
-        command = clip(float(actions[0, first + lane]), -1.0, 1.0)
+        command = clip(float(actions[0, np.uintp(first + lane)]), -1.0, 1.0)
         state[RUDDER_COMMAND + lane] = pick(ended, state[RUDDER_COMMAND + lane], command)
         state[LAST_RUDDER + lane] = state[DELTA + lane]
         state[STEPS + lane] += 1.0 - state[ENDED + lane]
@@ -113,7 +113,7 @@ def order(state: Any, actions: Any, first: int, lanes: int) -> None:
     if actions.shape[0] > 1:
         for lane in range(lanes):
             ended = state[ENDED + lane] != 0.0
-            command = clip(float(actions[1, first + lane]), -1.0, 1.0)
+            command = clip(float(actions[1, np.uintp(first + lane)]), least_shaft, 1.0)
             state[SHAFT_COMMAND + lane] = pick(ended, state[SHAFT_COMMAND + lane], command)
 
 

@@ -38,4 +38,5 @@ NOISE, NOISE_PSI, NOISE_R, NOISE_SPEED, NOISE_POSITION = range(12, 17)  # 0 or 1
 WAVE_FILTERED = 17  # 1: heading and yaw rate are shown without the waves' frequencies
 N_SHOWN, SHOWN = 18, 19  # number of rows that are observed, and their offsets, at most 17
 TASK_SETTINGS = 36  # 8 settings of the task's own
-N_LIST, LIST = 44, 45  # length of a list of the task's own, and the list
+LEAST_SHAFT = 44  # least command of the shaft, part of service speed
+N_LIST, LIST = 45, 46  # length of a list of the task's own, and the list

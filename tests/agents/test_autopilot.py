@@ -4,11 +4,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, fly
+from agents import LQ, LineOfSight, fly
 from agents.autopilot import build_autopilot, verify
 from agents.autopilot_result import verification_metrics
 from agents.report import write_report
 from agents.spread import manoeuvre_spread
+from agents.terminal import ranking_table
 from identification import identify
 from identification.concerns import concerns
 from shipgym import InputError, ShipFile, load_model
@@ -63,6 +64,33 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
     write_report(replace(result, verification=found), tmp_path / "report.html")
     assert "LEARNED was learned before, on another model" in (tmp_path / "report.html").read_text()
+    table = ranking_table(replace(result, verification=found))
+    rows = dict(zip(table.columns[0].cells, table.columns[5].cells, strict=True))
+    assert rows["LEARNED"] == "-"
+    assert float(rows["LQ"]) > 1.0
+
+
+def test_guests_of_one_name_are_told_apart(chain):
+    model = chain[1].model
+    guests = [LQ.from_model(model, integral_lengths=20.0), LQ.from_model(model, integral_lengths=80.0)]
+    told = verification_metrics(verify(model, 4, 1, guests=guests))
+    assert set(told["controllers"]) == set(told["ranking"]) == {"pid", "lq", "lq-2", "lq-3"}
+    assert told["controllers"]["lq-2"]["gains"] == guests[0].gains
+
+
+@pytest.mark.parametrize("made_for", ["paths", "another ship"])
+def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, made_for):
+    path = tmp_path / "guest.json"
+    if made_for == "paths":
+        LineOfSight.from_model(load_model("mariner"), autopilot=LQ.from_model(load_model("mariner"))).save(
+            path
+        )
+    else:
+        random_policy(load_model("kvlcc2")).save(path)
+    said = "cross_track" if made_for == "paths" else "the scale of '.*' is"
+    with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
+        build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
+    assert not (tmp_path / "out").exists()
 
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):

@@ -6,12 +6,14 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
-from agents.benchmarking.contestants import contestants, designed
+from agents.benchmarking.contestants import contestants
+from agents.benchmarking.designs import design
 from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from shipgym import load_model
 from shipgym.errors import InputError
+from tests.agents.policies import random_policy
 
 TASKS = ["mariner-calm"]
 N = 4
@@ -194,11 +196,12 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():
     keeping, path = (load_suite().task(name) for name in ("mariner-calm", "mariner-current"))
-    assert designed("lq", keeping) is designed("lq", path)  # the same ship and interval: designed once
-    guided = designed("ilos", path)
+    assert design("lq", keeping) is design("lq", path)  # the same ship and interval: designed once
+    guided = design("ilos", path)
     assert guided.design["dt"] == path.task.interval(path.ship)
     assert guided.observation_scales[8] == path.task.corridor * path.ship.particulars["length"]
-    assert designed("ilos", keeping).kind == "lq"
+    (led,) = contestants("ilos")[0].policies(keeping, "any")
+    assert led.kind == "lq"
 
 
 @pytest.mark.parametrize(
@@ -288,11 +291,21 @@ def test_the_command_ranks_and_writes(tmp_path):
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
     out = tmp_path / "r"
+    cut, weightless, other = (tmp_path / f"{name}.json" for name in ("cut", "weightless", "other"))
+    random_policy(load_model("kvlcc2")).save(other)
+    weightless.write_bytes(other.read_bytes())
+    cut.write_bytes(other.read_bytes()[:300])
     for arguments, said in (
         (["--controllers", "pdi", "--out", out], "Did you mean 'pid'"),
         (["--controllers", "pid"], "--out"),
         (["--controllers", "pid", "--out", out, "--engine", "rai"], "engine: 'rai' found"),
         (["--verify", out], "there is no such file of benchmark results"),
+        (["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out], "may be cut short"),
+        (["--controllers", f"pid,{weightless}", "--tasks", "mariner-calm", "--out", out], "no such file"),
+        (
+            ["--controllers", f"pid,{other}", "--tasks", "mariner-calm", "--out", out],
+            "fits no task asked for",
+        ),
     ):
         answer = shipgym(*arguments)
         assert (answer.exit_code, answer.stdout) == (2, "")

@@ -6,11 +6,12 @@ import json
 import re
 import sys
 
+import gymnasium
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import benchmark
+from agents import PID, benchmark
 from agents.benchmarking.page import command, write_page
 from agents.benchmarking.page_figures import COLOURS
 from agents.benchmarking.page_replays import (
@@ -19,14 +20,13 @@ from agents.benchmarking.page_replays import (
     entries_of,
     hardest_of,
     replayable,
-    thin,
     worst_of,
 )
-from agents.benchmarking.refly import Flight, refly
+from agents.benchmarking.refly import Flight, recorded, refly
+from agents.benchmarking.suite import load_suite
 from agents.cli import app
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
-from tests.agents.test_replay import DT, STEPS, episode
 
 TASKS = ["mariner-calm", "mariner-current"]
 N, FIRST = 4, 1_000_000
@@ -109,18 +109,59 @@ def test_what_is_flown_again_costs_the_same(result):
         assert (flown.waypoints is None) == (flight.task == "mariner-calm")
 
 
-def test_an_episode_flown_again_is_that_of_the_single_environment(result):
-    import gymnasium
-
-    flight = Flight("pid", "mariner-calm", 0, FIRST)
-    flown = refly(result, [flight]).episodes[flight]
+def test_an_episode_flown_again_is_that_of_the_single_environment():
+    task = load_suite().task("mariner-calm")
+    pilot = PID.from_model(task.ship, dt=task.task.interval(task.ship))
+    (flown,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
     env = gymnasium.make(flown.environment, **flown.arguments).unwrapped
-    env.reset(seed=FIRST)
-    for k in range(50):
-        _, reward, *_ = env.step(flown.actions[k])
-        assert reward == pytest.approx(flown.rewards[k], abs=1e-12)
-    for name, value in env.physical_state().items():
-        assert flown.states[name][50] == pytest.approx(value, abs=1e-9)
+    observation, _ = env.reset(seed=FIRST)
+    rewards, states, over = [], [env.physical_state()], False
+    while not over:
+        observation, reward, terminated, truncated, _ = env.step(pilot.predict(observation)[0])
+        rewards.append(reward)
+        states.append(env.physical_state())
+        over = terminated or truncated
+    assert (len(rewards), flown.n_steps, flown.dt) == (600, 200, 3.0 * env.dt)
+    assert flown.rewards == pytest.approx(np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9)
+    assert cost == pytest.approx(-sum(rewards))
+    for name in ("x", "y", "psi", "u", "delta", "set_point"):
+        assert flown.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
+
+
+def test_the_last_interval_is_filled_up():
+    task = load_suite().task("mariner-current")
+    (whole,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=task.task.episode_steps,
+    )
+    (flown,), _ = recorded(
+        PID.from_model(task.ship, dt=task.task.interval(task.ship)),
+        task,
+        [FIRST],
+        samples=-(-task.task.episode_steps // 7),
+    )
+    assert whole.success
+    assert whole.n_steps < task.task.episode_steps
+    assert flown.n_steps == -(-whole.n_steps // 7)
+    assert flown.states["x"][-1] == whole.states["x"][-1]
+    assert flown.rewards.sum() == pytest.approx(whole.rewards.sum())
+    assert (flown.success, flown.terminated) == (True, True)
+
+
+def test_a_controller_that_fails_is_shown_up_to_then():
+    task = load_suite().task("mariner-calm")
+
+    class Fails(Lazy):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            if (state or 0) == 11:
+                raise ValueError
+            return super().predict(observation)[0], (state or 0) + 1
+
+    (flown,), (cost,) = recorded(Fails(), task, [FIRST], samples=300)
+    assert (flown.n_steps, flown.terminated, flown.truncated) == (5, False, False)
+    assert np.isnan(cost)
 
 
 def test_a_changed_result_is_told(result):
@@ -139,16 +180,6 @@ def test_objects_are_replayed_where_they_are_given(result):
     given = refly(result, [flight], {Lazy.name: Lazy()})
     assert (given.refused, given.different) == ({}, ())
     assert not given.episodes[flight].actions.any()
-
-
-def test_a_history_with_fewer_samples_ends_where_it_ended():
-    whole = episode()
-    run = thin(whole, "run", samples=7)
-    assert run["steps"] == len(run["series"]["x"]) - 1 == 7
-    assert run["dt"] * run["steps"] >= DT * STEPS
-    assert run["series"]["x"][-1] == pytest.approx(whole.states["x"][-1])
-    assert sum(run["rewards"]) == pytest.approx(whole.rewards.sum())
-    assert sum(run["parts"]["reward_rudder"]) == pytest.approx(-0.1 * STEPS)
 
 
 def test_differences_add_up():

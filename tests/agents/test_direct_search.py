@@ -9,19 +9,19 @@ import pytest
 
 from agents import PID
 from agents.benchmarking import direct_search
+from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
     CLASSICAL,
     REFUSED,
     Setting,
-    episode_costs,
     is_sane,
     load_tuned,
     search,
     search_spaces,
     tune,
     tuned,
-    tuned_controller,
 )
+from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.los_autopilot import LAWS
 from shipgym.errors import InputError
@@ -68,11 +68,13 @@ def test_tuning_is_reproducible_never_worse_than_the_design_and_sane() -> None:
     first, second = (tune("pid", NOISY, evaluations=8, episodes=4) for _ in range(2))
     assert first == second
     assert first.cost < first.start_cost
-    controller = tuned_controller("pid", NOISY, first.settings)
+    controller = design("pid", NOISY, first.settings)
     assert is_sane(controller)
     seeds = direct_search.FIRST_SEED + np.arange(4)
-    assert episode_costs(controller, NOISY, seeds).mean() == pytest.approx(first.cost, rel=1e-12)
-    assert episode_costs(PID.from_model(CALM.ship), NOISY, seeds).mean() == pytest.approx(first.start_cost)
+    assert episode_costs(controller, NOISY.engine(4), seeds).mean() == pytest.approx(first.cost, rel=1e-12)
+    assert episode_costs(PID.from_model(CALM.ship), NOISY.engine(4), seeds).mean() == pytest.approx(
+        first.start_cost
+    )
 
 
 def test_a_loop_with_little_margin_is_not_sane() -> None:
@@ -86,16 +88,16 @@ def test_a_loop_with_little_margin_is_not_sane() -> None:
 def test_the_search_of_every_controller_starts_at_its_own_design(kind: str) -> None:
     task = PATH if kind in LAWS else CALM
     start = {one.name: one.start for one in search_spaces(kind, task)[0]}
-    designed, plain = tuned_controller(kind, task, start), tuned_controller(kind, task, {})
+    designed, plain = design(kind, task, start), design(kind, task, {})
     for name, gain in plain.gains.items():
         assert designed.gains[name] == pytest.approx(gain, rel=1e-6), name
 
 
 def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
-    led = tuned_controller("los", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
-    inner = tuned_controller("lq", PATH, {"integral_lengths": 50.0})
+    led = design("los", PATH, {"lookahead_lengths": 3.0, "lq_integral_lengths": 50.0})
+    inner = design("lq", PATH, {"integral_lengths": 50.0})
     assert getattr(led, "autopilot").gains == inner.gains  # noqa: B009
-    for ask in (search_spaces, lambda kind, task: tuned_controller(kind, task, {})):
+    for ask in (search_spaces, lambda kind, task: design(kind, task, {})):
         with pytest.raises(InputError, match="no path"):
             ask("los", CALM)
 

@@ -192,6 +192,14 @@ def test_address_that_does_not_answer():
             check_answers(f"ray://127.0.0.1:{port}", patience_s=0.2)
 
 
+def test_nothing_is_left_where_no_cluster_answers(functions, tmp_path):
+    with pytest.raises(InputError, match=r"no ray cluster answers|not installed"):
+        run_jobs(
+            functions.spectrum, [{"n": 1}], engine="ray", address="127.0.0.1:1", keep=tmp_path / "kept" / "in"
+        )
+    assert not (tmp_path / "kept").exists()
+
+
 def test_web_server_is_not_taken_for_ray():
     class Page(BaseHTTPRequestHandler):
         def log_message(self, *args):

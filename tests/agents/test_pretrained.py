@@ -5,9 +5,9 @@ import pytest
 
 from agents import load_agent
 from agents.benchmarking.contestants import check_fits, pretrained
+from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import load_suite
 from agents.controller import model_hash
-from agents.learning.evaluation import episode_costs
 from agents.policy import LearnedPolicy
 
 SUITE = load_suite()

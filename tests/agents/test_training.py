@@ -13,10 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import load_agent
+from agents.benchmarking.flying import episode_costs
 from agents.cli import app
 from agents.learning import training
 from agents.learning.algorithms import make_agent, make_ships, set_deviation
-from agents.learning.evaluation import episode_costs
 from agents.learning.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.learning.training import train
 from shipgym.errors import InputError
@@ -210,7 +210,7 @@ def test_the_command_trains_and_resumes(tmp_path):
             "a divisor above 1 of ships x n_steps, 16384",
         ),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
-        (["train", "ppo", "--set", "base=los"], "a task without a path"),
+        (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
         (["train", "ppo", "--set", "authority=0.5"], "without a base"),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),

@@ -1,0 +1,78 @@
+"""Classical controllers by name, designed for the ship, the control interval and the path of a task."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib import import_module
+from typing import Any
+
+from agents.benchmarking.suite import BenchmarkTask
+from agents.controller import Controller, model_hash
+from agents.controller_file import HOMES
+from agents.los_autopilot import LAWS
+from shipgym.checks import check_choice
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+INNER = "lq_"  # before settings of the LQ that a guidance law leads
+
+
+def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = None) -> Controller:
+    """A classical controller for a task.
+
+    Parameters
+    ----------
+    kind : str
+        Of the controller file's kinds.
+    task : BenchmarkTask
+        Its ship and control interval; of a guidance law also its path's lookahead and corridor.
+    settings : mapping of str, optional
+        Keywords of `from_model`; of a guidance law also those of the LQ that it leads, after `lq_`.
+
+    Raises
+    ------
+    InputError
+        If there is no such design for the ship, or guidance has no path to follow.
+    """
+    home, name = HOMES[check_choice(kind, HOMES, "controller")]
+    given = settings or {}
+    if kind not in LAWS:
+        written = json.dumps(dict(given), sort_keys=True)
+        return _designed(home, name, _Ship(task.ship), task.task.interval(task.ship), written)
+    if not isinstance(task.task, PathFollowingTask):
+        raise no_path(kind, task)
+    inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
+    own = {key: value for key, value in given.items() if not key.startswith(INNER)}
+    law: Any = getattr(import_module(home), name)
+    guide: Controller = law.from_model(task.ship, autopilot=design("lq", task, inner), task=task.task, **own)
+    return guide
+
+
+def no_path(kind: str, task: BenchmarkTask) -> InputError:
+    """What is said where guidance has nothing to follow."""
+    where = task.name or task.environment
+    return InputError(f"controller: '{kind}' found, but '{where}' has no path to be led along")
+
+
+@lru_cache(maxsize=256)
+def _designed(home: str, name: str, ship: _Ship, dt: float, settings: str) -> Controller:
+    kind: Any = getattr(import_module(home), name)
+    made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
+    return made
+
+
+@dataclass(frozen=True)
+class _Ship:
+    """A ship that equals another of the same numbers."""
+
+    model: ShipModel
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Ship) and hash(self) == hash(other)
+
+    def __hash__(self) -> int:
+        return hash(model_hash(self.model))
