@@ -199,7 +199,7 @@ def learning(task: str) -> Row:
 
     frames, share = ppo_speed(f"shipgym/{task}-v0")
     return Row(
-        f"PPO, 64 {task}, two cores",
+        f"PPO, 256 {task}, two cores",
         f"{frames / 1e3:.1f} k frames/s",
         f"{100.0 * share:.1f} % of the time in the environment",
         None,

@@ -167,11 +167,11 @@ def tune(
     def cost(asked: Mapping[str, float]) -> float:
         try:
             controller = design(kind, task, {**_prefixed(autopilot, kind), **asked})
-        except InputError:
+            if not is_sane(controller):
+                return REFUSED
+            return float(episode_costs(controller, engine, seeds).mean())
+        except InputError:  # no such design, or one that commands no number
             return REFUSED
-        if not is_sane(controller):
-            return REFUSED
-        return float(episode_costs(controller, engine, seeds).mean())
 
     found = search(cost, search_spaces(kind, task), evaluations)
     return replace(found, settings={**_prefixed(autopilot, kind), **found.settings})
