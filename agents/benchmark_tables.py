@@ -29,7 +29,7 @@ def ranking_table(result: BenchmarkResult) -> Table:
         times = [
             by_name[name]["microseconds_per_action"]
             for by_name in summary["tasks"].values()
-            if name in by_name
+            if name in by_name and by_name[name]["microseconds_per_action"] is not None  # the oracle has none
         ]
         failed = entry["failed"]
         table.add_row(

@@ -6,6 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
+from agents.benchmark_tables import ranking_table
 from agents.benchmarking.contestants import contestants
 from agents.benchmarking.designs import design
 from agents.benchmarking.suite import load_suite
@@ -195,6 +196,7 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     cost = found["tuned-lq"]["cost"]["value"]
     assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
     assert result.ranking == ["oracle", "tuned-best", "tuned-lq", "tuned-mpc"]
+    assert ranking_table(result).row_count == 4  # the oracle, which acts in no time, too
 
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():
