@@ -138,8 +138,9 @@ def test_interrupt_ends_the_workers(functions, tmp_path):
     pids = tmp_path / "pids"
     pids.mkdir()
     script = (
-        "import sys, engine_jobs\nfrom agents.engines import run_jobs\n"
+        "import signal, sys, engine_jobs\nfrom agents.engines import run_jobs\n"
         "if __name__ == '__main__':\n"
+        "    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where it is begun with & \n"
         "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"
         "    try:\n        run_jobs(engine_jobs.sleeps, jobs, workers=2)\n"
         "    except KeyboardInterrupt:\n        sys.exit(130)\n"
@@ -153,7 +154,10 @@ def test_interrupt_ends_the_workers(functions, tmp_path):
         while len(list(pids.iterdir())) < 2 and time.monotonic() < end:
             time.sleep(0.05)
         parent.send_signal(2)
-        error = parent.communicate(timeout=30)[1]
+        try:
+            error = parent.communicate(timeout=30)[1]
+        finally:
+            parent.kill()
     assert parent.returncode == 130, error
     assert error == b""
     for entry in pids.iterdir():
