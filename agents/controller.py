@@ -234,13 +234,11 @@ class Controller:
         """
         n = len(self.observation_names)
         check_names(names[:n], self.observation_names, where)
-        for name, found, expected in zip(names[:n], scales[:n], self.observation_scales, strict=True):
-            if abs(found - expected) > SCALE_TOLERANCE * abs(expected):
-                raise InputError(
-                    f"{where}: the scale of '{name}' is {found:g}, but controller '{self.name}' was "
-                    f"designed for {expected:g} (model '{self.model_name}'): another ship or rudder limit; "
-                    f"design a controller on this model with {type(self).__name__}.from_model"
-                )
+        check_scales(
+            names[:n], scales[:n], self.observation_scales, where,
+            f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
+            f"rudder limit; design a controller on this model with {type(self).__name__}.from_model",
+        )  # fmt: skip
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
@@ -264,6 +262,16 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
             f"{where}: {len(found)} observations found, expected {len(expected)}; "
             f"in one and not in the other: {', '.join(difference)}"
         )
+
+
+def check_scales(
+    names: Sequence[str], found: Sequence[float], expected: Sequence[float], where: str, meant: str
+) -> None:
+    """Refuse observations in other scales, naming the first difference; `meant` has {} for what is meant."""
+    for name, one, other in zip(names, found, expected, strict=True):
+        if abs(one - other) > SCALE_TOLERANCE * abs(other):
+            said = meant.replace("{}", f"{other:g}")
+            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
 
 
 def model_hash(model: ShipModel) -> str:

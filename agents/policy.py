@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controller import SCALE_TOLERANCE, Action, Controller, check_names
+from agents.controller import Action, Controller, check_names, check_scales
 from agents.network import Network
 from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.envs.course_keeping_task import CourseKeepingTask
@@ -253,13 +253,11 @@ class LearnedPolicy:
         """
         n = len(self.observation_names)
         check_names(names[:n], self.observation_names, where)
-        for name, found, expected in zip(names[:n], scales[:n], self.observation_scales, strict=True):
-            if abs(found - expected) > SCALE_TOLERANCE * abs(expected):
-                raise InputError(
-                    f"{where}: the scale of '{name}' is {found:g}, but policy '{self.name}' learned with "
-                    f"{expected:g} (model '{self.model_name}', {self.env_id}): another ship or task; train "
-                    f"one in this environment"
-                )
+        check_scales(
+            names[:n], scales[:n], self.observation_scales, where,
+            f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
+            f"ship or task; train one in this environment",
+        )  # fmt: skip
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales in the environment that it learned in."""

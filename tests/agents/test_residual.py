@@ -6,7 +6,7 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents import LQ, LQG, IntegralLineOfSight
+from agents import LQ, LQG, IntegralLineOfSight, LearnedPolicy, load_agent
 from agents.learning.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -97,11 +97,24 @@ def test_an_output_beyond_its_limits_counts_as_the_limit():
     np.testing.assert_array_equal(beyond[0], limit[0])
 
 
-def test_an_agent_learns_beside_a_base():
+def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tmp_path):
     torch.set_num_threads(1)
     env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, history=2)
     scaled = VecNormalize(env, norm_obs=False, gamma=0.9)
-    PPO("MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu").learn(128)
+    agent = PPO("MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    before = agent.predict(scaled.reset(), deterministic=True)[0]
+    agent.learn(128)
+    LearnedPolicy.from_sb3(agent, scaled).save(tmp_path / "agent.json")
+    policy, bare = load_agent(tmp_path / "agent.json", MARINER), ships(COURSE, 8)
+    twin = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, history=2)
+    seen, shown, state, starts = bare.reset(), twin.reset(), None, np.ones(8, bool)
+    assert not np.array_equal(agent.predict(shown, deterministic=True)[0], before)
+    for _ in range(STEPS):
+        action, state = policy.predict(seen, state, starts)
+        seen, rewards, starts, _ = bare.step(action)
+        shown, expected, ends, _ = twin.step(agent.predict(shown, deterministic=True)[0])
+        np.testing.assert_allclose(rewards, expected, rtol=1e-4, atol=1e-7)
+        np.testing.assert_array_equal(starts, ends)
 
 
 @pytest.mark.parametrize(
