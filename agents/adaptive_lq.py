@@ -16,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.batched_lq import lq_rows, sampled_ships
-from agents.linear_loop import SIGNALS, length_time, rate_weight
+from agents.linear_loop import SIGNALS, length_time
 from agents.lq import LQ
 from agents.stateful import Flags, Stateful, heading_error
 from identification.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
+from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 from shipgym.models.linear import LARGEST_RUDDER, linearise, straight_running
@@ -79,6 +80,8 @@ class AdaptiveLQ(Stateful):
         *,
         dt: float | None = None,
         integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
         forgetting_lengths: float = 20.0,
         redesign_lengths: float = 1.0,
         noise: float = 1.0,
@@ -89,8 +92,8 @@ class AdaptiveLQ(Stateful):
         ----------
         model : ShipModel
             With sway.
-        dt, integral_lengths
-            As in `LQ.from_model`.
+        dt, integral_lengths, rudder_weight, rate_weight_s2
+            As in `LQ.from_model`, for the model and for what is identified.
         forgetting_lengths : float
             Time after which a sample counts 1/e, in times to travel one ship length. A sudden change of the
             ship is followed within about 10 such times of gentle course changes; a ship that only sails
@@ -113,9 +116,15 @@ class AdaptiveLQ(Stateful):
         check_number(forgetting_lengths, "forgetting_lengths", above=0.0)
         check_number(redesign_lengths, "redesign_lengths", above=0.0)
         check_number(noise, "noise", at_least=0.0)
-        if "v" not in model.state_names or "q" in model.state_names:
+        if not has_sway(model):
             raise InputError(f"model: {model.name!r} has no sway, expected one with surge, sway and yaw")
-        start = LQ.from_model(model, dt=dt, integral_lengths=integral_lengths)
+        start = LQ.from_model(
+            model,
+            dt=dt,
+            integral_lengths=integral_lengths,
+            rudder_weight=rudder_weight,
+            rate_weight_s2=rate_weight_s2,
+        )
         about = straight_running(model)
         interval, time = start.design["dt"], length_time(model)
         length, speed = model.particulars["length"], about.surge
@@ -135,7 +144,8 @@ class AdaptiveLQ(Stateful):
             design={
                 "dt": interval,
                 "integral_time": integral_lengths * time,
-                "rate_weight_s2": rate_weight(model),
+                "rudder_weight": start.design["rudder_weight"],
+                "rate_weight_s2": start.design["rate_weight_s2"],
                 "length": length,
                 "speed": speed,
                 "sway_error": float(errors[0]),
@@ -284,8 +294,14 @@ class AdaptiveLQ(Stateful):
         which = np.flatnonzero(solvable)
         neutral = np.linalg.solve(at_rest[which], -linear[which, :, 3:])[:, ::-1, 0]  # rudder, sway
         A, B = sampled_ships(linear[which, :, :3], self.design["gear_lag"], self.design["dt"])
-        weights = self.design["rate_weight_s2"], self.design["integral_time"]
-        rows = lq_rows(A, B, self.design["dt"], *weights)
+        rows = lq_rows(
+            A,
+            B,
+            self.design["dt"],
+            self.design["rate_weight_s2"],
+            self.design["integral_time"],
+            self.design.get("rudder_weight", RUDDER_WEIGHT),  # older files name none
+        )
         good = np.isfinite(rows).all(axis=1) & (np.abs(neutral[:, 0]) < LARGEST_RUDDER)
         which, neutral, rows, A, B = which[good], neutral[good], rows[good], A[good], B[good]
         good = _stable(A, B, rows) & _stable(*self._believed, rows)
@@ -297,6 +313,11 @@ class AdaptiveLQ(Stateful):
         """The ship of the model, sampled."""
         linear = self.prior * units(self.design["length"], self.design["speed"])
         return sampled_ships(linear[None, :, :3], self.design["gear_lag"], self.design["dt"])
+
+
+def has_sway(model: ShipModel) -> bool:
+    """Whether a ship's steering is that of sway and yaw, which is what is identified."""
+    return "v" in model.state_names and "q" not in model.state_names
 
 
 def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:

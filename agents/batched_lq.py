@@ -58,7 +58,14 @@ def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats
     return A, B
 
 
-def lq_rows(A: Floats, B: Floats, dt: float, rate_weight: float, integral_time: float) -> Floats:
+def lq_rows(
+    A: Floats,
+    B: Floats,
+    dt: float,
+    rate_weight: float,
+    integral_time: float,
+    rudder_weight: float = RUDDER_WEIGHT,
+) -> Floats:
     """Feedback rows of order = row x that minimise the environment's cost, one a ship.
 
     Parameters
@@ -67,7 +74,7 @@ def lq_rows(A: Floats, B: Floats, dt: float, rate_weight: float, integral_time: 
         Sampled ships.
     dt : float
         Control interval, s.
-    rate_weight, integral_time : float
+    rate_weight, integral_time, rudder_weight : float
         As in `agents.lq.lq_gain`.
 
     Returns
@@ -75,7 +82,7 @@ def lq_rows(A: Floats, B: Floats, dt: float, rate_weight: float, integral_time: 
     array of shape (n, 5)
         NaN where no stabilising gain was found.
     """
-    weights = np.array([1.0, np.sqrt(RUDDER_WEIGHT), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
+    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
     C, D = A[:, rows].copy(), B[:, rows]
     C[:, 2, RUDDER] -= 1.0

@@ -25,7 +25,7 @@ from agents.linear_loop import RUDDER, SIGNALS, length_time, sample_ship
 from agents.lq import LQ, lq_gain
 from agents.stateful import Flags, Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RATE_WEIGHT, control_interval
+from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.models import ShipModel
 
@@ -82,6 +82,7 @@ class MPC(Stateful):
         dt: float | None = None,
         integral_lengths: float = 20.0,
         horizon_lengths: float = 2.0,
+        rudder_weight: float = RUDDER_WEIGHT,
         rate_weight_s2: float | None = None,
     ) -> MPC:
         """Design on a model, about straight running.
@@ -92,7 +93,7 @@ class MPC(Stateful):
             Stable or unstable on its course.
         dt : float, optional
             Control interval, s; by default that of the environment.
-        integral_lengths : float
+        integral_lengths, rudder_weight : float
             As in `LQ.from_model`.
         horizon_lengths : float
             How far it plans within the limits, in times to travel one ship length; beyond, LQ's cost without
@@ -114,17 +115,19 @@ class MPC(Stateful):
         check_number(integral_lengths, "integral_lengths", above=0.0)
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        check_number(rudder_weight, "rudder_weight", above=0.0)
         weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
         check_number(weight, "rate_weight_s2", above=0.0)
         ship = sample_ship(model, interval)
         reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
-        gain = lq_gain(reduced, weight, integral_lengths * length_time(model))
+        gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
         return cls.designed(
             model,
             ship,
             gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
             design={
                 "integral_lengths": float(integral_lengths),
+                "rudder_weight": float(rudder_weight),
                 "rate_weight_s2": weight,
                 "horizon_steps": float(max(2, round(horizon_lengths * length_time(model) / interval))),
                 "rudder_rate_rad_s": model.steering.rate,

@@ -1,5 +1,6 @@
 """Adaptive LQ: it ends at the design of the ship that it steers, whatever it was designed on."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -31,8 +32,9 @@ def test_many_designs_at_once_are_those_made_one_by_one(name):
     A, B = sampled_ships(np.stack([linear, 0.5 * linear]), model.steering.time_constant, dt)
     np.testing.assert_allclose(A[0], ship.A, atol=1e-12)
     np.testing.assert_allclose(B[0], ship.B[:, 0], atol=1e-12)
-    wanted = -lq_gain(ship, rate_weight(model), time)
-    np.testing.assert_allclose(lq_rows(A, B, dt, rate_weight(model), time)[0], wanted, rtol=1e-9)
+    for weights in ((rate_weight(model), time), (2.0 * rate_weight(model), time, 0.3)):
+        wanted = -lq_gain(ship, *weights)
+        np.testing.assert_allclose(lq_rows(A, B, dt, *weights)[0], wanted, rtol=1e-9)
 
 
 def changed(**factors):
@@ -101,6 +103,36 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     adaptive.save(tmp_path / "adaptive.json")
     again = load_agent(tmp_path / "adaptive.json", MARINER)
     assert np.array_equal(*(sail(one, MARINER, 50) for one in (adaptive, again)))
+
+
+@pytest.mark.parametrize("weights", [{}, {"rudder_weight": 0.02, "rate_weight_s2": 30.0}])
+def test_designed_anew_for_the_same_ship_it_is_the_lq_of_the_same_weights(weights):
+    settings = {"integral_lengths": 15.0, **weights}
+    adaptive, lq = (kind.from_model(MARINER, **settings) for kind in (AdaptiveLQ, LQ))
+    assert adaptive.gains == lq.gains
+    (anew,) = adaptive._redesigned(adaptive._fresh()[None])[:, GAINS]
+    np.testing.assert_allclose(anew, [lq.gains[signal] for signal in SIGNALS], rtol=1e-8)
+
+
+def test_weights_go_through_the_file_and_an_older_one_has_the_environment_s(tmp_path):
+    path = tmp_path / "adaptive.json"
+    weighty = AdaptiveLQ.from_model(MARINER, rudder_weight=0.02, redesign_lengths=0.1, noise=0.0)
+    weighty.save(path)
+    again = load_agent(path, MARINER)
+    assert np.array_equal(*(sail(one, MARINER, 20) for one in (weighty, again)))
+    plain = AdaptiveLQ.from_model(MARINER, redesign_lengths=0.1, noise=0.0)
+    plain.save(path)
+    content = json.loads(path.read_text())
+    del content["design"]["rudder_weight"]
+    path.write_text(json.dumps(content))
+    older = load_agent(path, MARINER)
+    assert np.array_equal(*(sail(one, MARINER, 20) for one in (plain, older)))
+
+
+@pytest.mark.parametrize("name", ["rudder_weight", "rate_weight_s2"])
+def test_weights_must_be_above_zero(name):
+    with pytest.raises(InputError, match=f"{name}: 0.*expected"):
+        AdaptiveLQ.from_model(MARINER, **{name: 0.0})
 
 
 def test_a_ship_without_sway_is_refused():

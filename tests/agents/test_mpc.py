@@ -1,5 +1,6 @@
 """Model predictive control: LQ where no limit is near, the best plan within the limits where one is."""
 
+import json
 import sys
 from dataclasses import replace
 
@@ -27,7 +28,8 @@ def seen(error, yaw_rate, rudder, model=MARINER):
 
 
 def test_without_a_limit_in_reach_it_is_lq():
-    mpc, lq = MPC.from_model(MARINER, rate_weight_s2=rate_weight(MARINER)), LQ.from_model(MARINER)
+    weights = {"rudder_weight": 0.03, "rate_weight_s2": rate_weight(MARINER)}
+    mpc, lq = (kind.from_model(MARINER, **weights) for kind in (MPC, LQ))
     assert mpc.gains == lq.gains
     assert mpc.margins == lq.margins
     random = np.random.default_rng(0)
@@ -76,9 +78,10 @@ def test_the_plan_is_the_cheapest_within_the_limits():
         assert order[k] == pytest.approx(expected, abs=np.radians(0.1))
 
 
-def test_corrections_cost_their_squares_beside_lq():
+@pytest.mark.parametrize("rudder_weight", [0.1, 0.02])
+def test_corrections_cost_their_squares_beside_lq(rudder_weight):
     """J(x, v) - J(x, 0) = (R + B'PB) sum v^2, here by summing the cost of the linear ship."""
-    mpc = MPC.from_model(MARINER)
+    mpc = MPC.from_model(MARINER, rudder_weight=rudder_weight)
     row = np.array([mpc.gains[signal] for signal in SIGNALS])
     integral_time = mpc.design["integral_lengths"] * 160.93 / 7.7175
 
@@ -87,7 +90,7 @@ def test_corrections_cost_their_squares_beside_lq():
         for k in range(3000):
             order = row @ x + (corrections[k] if k < len(corrections) else 0.0)
             before, x = x[3], mpc.transition @ x + mpc.effect * order
-            total += x[2] ** 2 + 0.1 * x[3] ** 2 + (x[4] / integral_time) ** 2
+            total += x[2] ** 2 + rudder_weight * x[3] ** 2 + (x[4] / integral_time) ** 2
             total += mpc.design["rate_weight_s2"] * ((x[3] - before) / mpc.design["dt"]) ** 2
         return total
 
@@ -105,12 +108,23 @@ def test_a_slow_gear_costs_less_than_with_lq():
 
 
 def test_it_is_a_controller_and_a_file(tmp_path):
-    mpc = MPC.from_model(SLOW)
+    mpc = MPC.from_model(SLOW, rudder_weight=0.05)
     check_controller(mpc, SLOW, n_steps=20)
     mpc.save(tmp_path / "mpc.json")
     again = load_agent(tmp_path / "mpc.json", SLOW)
     shown = seen(*hard_questions(SLOW), SLOW)
     assert np.array_equal(again.predict(shown)[0], mpc.predict(shown)[0])
+    assert again.design == mpc.design
+
+
+def test_a_file_of_before_the_rudder_s_weight_was_a_setting_steers_the_same(tmp_path):
+    mpc, path = MPC.from_model(SLOW), tmp_path / "mpc.json"
+    mpc.save(path)
+    content = json.loads(path.read_text())
+    del content["design"]["rudder_weight"]
+    path.write_text(json.dumps(content))
+    shown = seen(*hard_questions(SLOW), SLOW)
+    assert np.array_equal(load_agent(path, SLOW).predict(shown)[0], mpc.predict(shown)[0])
 
 
 def test_without_the_solver_the_extra_is_named(monkeypatch):
