@@ -4,10 +4,10 @@
     python scripts/tune_controllers.py --tasks mariner-calm --again
 
 Both files are written after every controller and task: killed at any moment, it goes on where it was. The
-oracle flies again where another controller has become the best, or more episodes are asked for; its costs of
-all scored episodes are kept in a third file. Where
-the oracle flies fewer episodes than are scored, its cost is that of the best classical controller over all of
-them times the oracle's part of that controller's cost on those it flew.
+oracle's costs of all scored episodes are kept in a third file. It flies again where more episodes are asked
+for, or where another controller has become the best and costs less than it. Where it flies fewer episodes
+than are scored, its cost is that of the best classical controller over all of them times the oracle's part
+of that controller's cost on those it flew.
 """
 
 from __future__ import annotations
@@ -25,12 +25,13 @@ from agents.benchmarking.direct_search import (
     EVALUATIONS,
     FIRST_SEED,
     load_tuned,
+    tunable,
     tune,
     tuned_file,
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
-from agents.los_autopilot import LAWS
+from agents.controller import Controller
 from agents.oracle import OracleSettings, fly_oracle
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
@@ -61,8 +62,7 @@ def tune_task(task: BenchmarkTask, asked: argparse.Namespace) -> None:
     found = _tuned(asked.suite)
     own = found.setdefault(task.name, {})
     for kind in asked.controllers.split(","):
-        is_path = task.environment == "path-following"
-        if (kind in LAWS and not is_path) or (kind in own and not asked.again):
+        if kind not in tunable(task) or (kind in own and not asked.again):
             continue
         began = time.process_time()
         settings = {name: one["settings"] for name, one in own.items()}
@@ -78,38 +78,54 @@ def tune_task(task: BenchmarkTask, asked: argparse.Namespace) -> None:
 def refer(task: BenchmarkTask, asked: argparse.Namespace) -> None:
     """Fly the tuned controllers and the oracle on the scored seeds."""
     path = reference_file(asked.suite)
-    found = dict(read_json(path, "reference file", "delete it")) if path.exists() else {}
+    found = _written(path)
     tuned = _tuned(asked.suite)[task.name]
     best = min(tuned, key=lambda kind: float(tuned[kind]["cost"]))
     known = found.get(task.name, {})
-    same = known.get("best_classical", {}).get("name") == best
-    if same and known["oracle_episodes"] >= asked.oracle_episodes and not asked.again:
+    enough = known.get("oracle_episodes", 0) >= asked.oracle_episodes and not asked.again
+    if enough and known["best_classical"]["name"] == best:
         return
     began = time.process_time()
-    start = design(best, task, tuned[best]["settings"])
-    pid = design("pid", task, tuned["pid"]["settings"])
-    seeds = task.seeds[: asked.oracle_episodes]
-    flight = fly_oracle(task.ship, task.task, seeds, start, OracleSettings(), task.parts[2])
     engine = task.engine(len(task.seeds))
+    start, pid = (design(kind, task, tuned[kind]["settings"]) for kind in (best, "pid"))
     cost = float(episode_costs(start, engine, task.seeds).mean())
-    part = float(flight.costs.mean() / flight.start_costs.mean())
+    if enough and known["oracle"] <= cost:  # what it found from another start can still be sailed
+        oracle = {name: known[name] for name in ("oracle", "oracle_episodes")}
+    else:
+        oracle = fly(task, start, cost, asked)
     found[task.name] = {
         "pid": float(episode_costs(pid, engine, task.seeds).mean()),
         "best_classical": {"name": best, "cost": cost},
-        "oracle": part * cost,
-        "oracle_episodes": len(seeds),
+        **oracle,
     }
     write_json(found, path)
-    if len(seeds) == len(task.seeds):
-        kept = path.with_name(f"{asked.suite}-oracle.json")
-        all_costs = dict(read_json(kept, "file of the oracle's costs", "delete it")) if kept.exists() else {}
-        write_json({**all_costs, task.name: flight.costs.tolist()}, kept)
     print(f"{task.name:20s} {found[task.name]}   {time.process_time() - began:.0f} s", flush=True)
+
+
+def fly(task: BenchmarkTask, start: Controller, cost: float, asked: argparse.Namespace) -> dict[str, Any]:
+    """Fly the oracle: its cost over all scored seeds, and how many it flew, whose costs are kept if all."""
+    seeds = task.seeds[: asked.oracle_episodes]
+    flight = fly_oracle(task.ship, task.task, seeds, start, OracleSettings(), task.parts[2])
+    if len(seeds) == len(task.seeds):
+        path = oracle_file(asked.suite)
+        write_json({**_written(path), task.name: flight.costs.tolist()}, path)
+    part = float(flight.costs.mean() / flight.start_costs.mean())
+    return {"oracle": part * cost, "oracle_episodes": len(seeds)}
 
 
 def reference_file(suite: str) -> Path:
     """Where the suite's costs of reference are."""
     return tuned_file(suite).with_name(f"{suite}-reference.json")
+
+
+def oracle_file(suite: str) -> Path:
+    """Where the oracle's costs of each scored episode are."""
+    return tuned_file(suite).with_name(f"{suite}-oracle.json")
+
+
+def _written(path: Path) -> dict[str, Any]:
+    """What was written so far."""
+    return dict(read_json(path, "result file", "delete it")) if path.exists() else {}
 
 
 def _tuned(suite: str) -> dict[str, Any]:

@@ -17,7 +17,7 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     ----------
     name : str
         "none"; a kind of controller, which is designed on the task's ship; "tuned", the best of those that
-        were tuned for the suite's task; or a controller's file.
+        were tuned for the suite's task, without `NO_BASES`; or a controller's file.
     task : BenchmarkTask
         The ship, the control interval and the path.
 
@@ -33,7 +33,7 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name == "tuned":
-        return tuned("best", task, DEFAULT_SUITE)
+        return tuned("base", task, DEFAULT_SUITE)
     if name.endswith(".json"):
         agent = load_agent(name, task.ship)
         if not isinstance(agent, Controller):

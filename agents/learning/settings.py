@@ -25,7 +25,7 @@ SCHEDULES = ("constant", "linear")
 RUNNING, LEARNED = "running", "learned"
 ACTIVATIONS = ("relu", "tanh")
 #: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
-#: task, and a path that ends in .json is a controller's file.
+#: task (but `direct_search.NO_BASES`), and a path that ends in .json is a controller's file.
 BASES = (
     "none", "tuned", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos",
     "alos",

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +19,18 @@ from agents.benchmarking.direct_search import (
     load_tuned,
     search,
     search_spaces,
+    tunable,
     tune,
     tuned,
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask, load_suite
+from agents.learning.bases import design_base
 from agents.los_autopilot import LAWS
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
+from shipgym.models import load_model
+from shipgym.models.conversions import nomoto, nomoto2_ship
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
 NOISY = BenchmarkTask("noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0})
@@ -86,11 +91,23 @@ def test_a_loop_with_little_margin_is_not_sane() -> None:
 
 @pytest.mark.parametrize("kind", CLASSICAL)
 def test_the_search_of_every_controller_starts_at_its_own_design(kind: str) -> None:
+    if kind == "mpc":
+        pytest.importorskip("osqp", reason="extra mpc is not installed")
     task = PATH if kind in LAWS else CALM
     start = {one.name: one.start for one in search_spaces(kind, task)[0]}
     designed, plain = design(kind, task, start), design(kind, task, {})
+    assert designed.design == pytest.approx(plain.design, rel=1e-6)
     for name, gain in plain.gains.items():
         assert designed.gains[name] == pytest.approx(gain, rel=1e-6), name
+
+
+def test_guidance_needs_a_path_and_adaptation_a_ship_with_sway(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert tunable(PATH) == CLASSICAL
+    assert set(CLASSICAL) - set(tunable(CALM)) == set(LAWS)
+    mariner = load_model("mariner")
+    plain = nomoto2_ship(nomoto(mariner), mariner.particulars, mariner.steering)
+    monkeypatch.setattr(BenchmarkTask, "ship", plain)
+    assert set(CLASSICAL) - set(tunable(PATH)) == {"lq-adaptive"}
 
 
 def test_guidance_leads_the_lq_that_was_tuned_and_needs_a_path() -> None:
@@ -113,6 +130,25 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
     assert tuned("pid", CALM, "any").design["damping"] == 1.0
     with pytest.raises(InputError, match="no tuned settings of 'lqg' for task 'calm'"):
         tuned("lqg", CALM, "any")
+    with pytest.raises(InputError, match=r"no tuned settings of 'best' for task 'noisy'.*of: none"):
+        tuned("best", NOISY, "any")
+
+
+def test_policies_are_not_added_to_a_controller_that_needs_an_extra_unless_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "tuned.json"
+    monkeypatch.setattr(direct_search, "tuned_file", lambda suite: path)
+    found = {"mpc": {"settings": {}, "cost": 1.0}, "lq": {"settings": {}, "cost": 2.0}}
+    write_json({"tasks": {"calm": found}}, path)
+    base = design_base("tuned", CALM)
+    assert getattr(base, "kind", None) == "lq"
+    monkeypatch.setattr("agents.mpc._solver_library", lambda: None)
+    assert tuned("best", CALM, "any").kind == "mpc"
+    del found["lq"]
+    write_json({"tasks": {"calm": found}}, path)
+    with pytest.raises(InputError, match="no tuned settings of 'base' for task 'calm'"):
+        tuned("base", CALM, "any")
 
 
 def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
@@ -120,5 +156,6 @@ def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
     assert set(found) == {task.name for task in suite.tasks}
     for task in suite.tasks:
         best = min(found[task.name], key=lambda kind: float(found[task.name][kind]["cost"]))
-        assert is_sane(tuned(best, task, suite.name))
+        for kind in {"base"} if best == "mpc" and find_spec("osqp") is None else {"base", "best"}:
+            assert is_sane(tuned(kind, task, suite.name))
         assert all(one["cost"] <= one["start_cost"] for one in found[task.name].values())
