@@ -134,18 +134,19 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
         tuned("best", NOISY, "any")
 
 
-def test_policies_are_not_added_to_a_controller_that_needs_an_extra_unless_asked_for(
+def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr(direct_search, "tuned_file", lambda suite: path)
-    found = {"mpc": {"settings": {}, "cost": 1.0}, "lq": {"settings": {}, "cost": 2.0}}
+    costs = {"mpc": 1.0, "lq-adaptive": 2.0, "lq": 3.0, "pid": 4.0}
+    found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)
     base = design_base("tuned", CALM)
     assert getattr(base, "kind", None) == "lq"
     monkeypatch.setattr("agents.mpc._solver_library", lambda: None)
     assert tuned("best", CALM, "any").kind == "mpc"
-    del found["lq"]
+    del found["lq"], found["pid"]
     write_json({"tasks": {"calm": found}}, path)
     with pytest.raises(InputError, match="no tuned settings of 'base' for task 'calm'"):
         tuned("base", CALM, "any")
@@ -158,4 +159,5 @@ def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
         best = min(found[task.name], key=lambda kind: float(found[task.name][kind]["cost"]))
         for kind in {"base"} if best == "mpc" and find_spec("osqp") is None else {"base", "best"}:
             assert is_sane(tuned(kind, task, suite.name))
+        assert set(found[task.name]) == set(tunable(task))
         assert all(one["cost"] <= one["start_cost"] for one in found[task.name].values())
