@@ -10,9 +10,11 @@ Inputs, with a free first axis:
 Output:
 
     action         float32 (batch, n_commands): parts of the limits in [-1, 1]; of discrete orders the order
+    part           float32 (batch, 1): what is added to the base's command, if there is a base
 
-Metadata, as JSON: observation_names, observation_scales, history, action, authority, base, environment,
-model.
+Metadata, as JSON: observation_names, observation_scales, history, action, authority, hold, base, environment,
+model. With `hold` above 1 the graph decides at every `hold`-th control interval; between them the action
+stays, or, with a base, is `base_action + part`, limited to [-1, 1], with the part of the last decision.
 """
 
 from __future__ import annotations
@@ -70,6 +72,8 @@ def onnx_model(policy: Any) -> Any:
         inputs.append(helper.make_tensor_value_info("base_action", real, ["batch", 1]))
     n_commands = 2 if policy.action == "rudder-shaft" else 1
     outputs = [helper.make_tensor_value_info("action", real, ["batch", n_commands])]
+    if policy.base is not None:
+        outputs.append(helper.make_tensor_value_info("part", real, ["batch", 1]))
     nodes, constants = _nodes(policy, helper)
     initializers = [onnx.numpy_helper.from_array(array, name) for name, array in constants.items()]
     graph = helper.make_graph(nodes, "policy", inputs, outputs, initializers)
@@ -127,6 +131,7 @@ def _metadata(policy: LearnedPolicy) -> dict[str, str]:
         "history": policy.history,
         "action": policy.action,
         "authority": policy.authority,
+        "hold": policy.hold,
         "base": None if policy.base is None else controller_content(policy.base),
         "environment": {"id": policy.env_id, "options": as_json(policy.env_options)},
         "model": {"name": policy.model_name, "sha256": policy.model_sha256},

@@ -3,7 +3,8 @@
 A policy is a network on `[observation(t - history + 1), ..., observation(t), base action(t)]`, its
 observations in the scales of the environment; the base's action only if there is a base. Where an episode
 begins, the first observation fills the history. Without a base the network's output, limited to [-1, 1], is
-the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning.
+the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning. The
+output is held for `hold` control intervals, while the base goes on with its feedback.
 
 Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
 al. 2019, Residual reinforcement learning for robot control, ICRA.
@@ -39,7 +40,7 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy with a history or a base remembers.
+    """What a policy with a history, a base or outputs that it holds remembers.
 
     Attributes
     ----------
@@ -47,10 +48,14 @@ class Memory(NamedTuple):
         Past observations, oldest first; for a single observation without the first axis.
     base : Any
         State of the base.
+    held : float32 array of shape (n, 1 + n_outputs)
+        Control intervals until the next decision, and the network's outputs of the last one; for a single
+        observation without the first axis.
     """
 
     seen: Numbers
     base: Any
+    held: Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +78,8 @@ class LearnedPolicy:
         Whose rudder the network adds to.
     authority : float
         Share of the rudder limit by which it may differ from the base; 1 without a base.
+    hold : int
+        Control intervals for which an output of the network holds.
     env_id : str
         Environment that it learned in.
     env_options : dict
@@ -95,6 +102,7 @@ class LearnedPolicy:
     history: int = 1
     base: Controller | None = None
     authority: float = 1.0
+    hold: int = 1
     env_id: str = "shipgym/CourseKeeping-v0"
     env_options: Mapping[str, Any] = field(default_factory=dict)
     model_name: str = "unknown"
@@ -104,6 +112,7 @@ class LearnedPolicy:
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")
         check_whole(self.history, "history", at_least=1)
+        check_whole(self.hold, "hold", at_least=1)
         check_number(self.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
         n = len(self.observation_names)
         if len(self.observation_scales) != n:
@@ -178,7 +187,7 @@ class LearnedPolicy:
             Parts of the limits, in [-1, 1]; of discrete orders the order itself, not its number
             (`order_numbers` gives it).
         state
-            As given, or a `Memory` if there is a history or a base.
+            As given, or a `Memory` if there is a history or a base, or outputs are held.
 
         Raises
         ------
@@ -193,19 +202,32 @@ class LearnedPolicy:
                 f"{self.observation_names[-1]!r} is the last that the policy needs"
             )
         rows = given.reshape(-1, given.shape[-1])
-        if self.history == 1 and self.base is None:
+        if self.history == 1 and self.base is None and self.hold == 1:
             action = self.commands(self.network(rows[:, :n]), None)
             return action.reshape(*given.shape[:-1], -1), state
-        seen, inner = self._recalled(state, episode_start, rows[:, :n], given.ndim)
+        seen, inner, held = self._recalled(state, episode_start, rows[:, :n], given.ndim)
         window = np.concatenate([seen, rows[:, None, :n]], axis=1)
         inputs, proposed = window.reshape(len(rows), -1), None
         if self.base is not None:
             order, inner = self.base.predict(given, inner, episode_start, deterministic)
             proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), -1)
             inputs = np.concatenate([inputs, proposed], axis=1)
-        action = self.commands(self.network(inputs), proposed)
+        held = self._decided(inputs, held)
+        action = self.commands(held[:, 1:], proposed)
         kept = window[:, 1:].copy()
-        return action.reshape(*given.shape[:-1], -1), Memory(kept if given.ndim == 2 else kept[0], inner)
+        memory = Memory(kept, inner, held) if given.ndim == 2 else Memory(kept[0], inner, held[0])
+        return action.reshape(*given.shape[:-1], -1), memory
+
+    def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
+        """Outputs that hold now: new ones of the ships whose last decision is over."""
+        due = held[:, 0] <= 0.0
+        now = held if not due.any() else np.where(due[:, None], self._outputs(inputs), held)
+        now[:, 0] -= 1.0
+        return now
+
+    def _outputs(self, inputs: Numbers) -> Numbers:
+        """The network's outputs, behind the control intervals for which they hold."""
+        return np.column_stack([np.full(len(inputs), self.hold, dtype=np.float32), self.network(inputs)])
 
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
@@ -216,13 +238,14 @@ class LearnedPolicy:
             return limited
         return np.clip(proposed + np.float32(self.authority) * limited, -1.0, 1.0)
 
-    def _recalled(self, state: Any, starts: Any, rows: Numbers, ndim: int) -> tuple[Numbers, Any]:
-        """Past observations of each ship, the present one where an episode begins, and the base's state."""
+    def _recalled(self, state: Any, starts: Any, rows: Numbers, ndim: int) -> tuple[Numbers, Any, Numbers]:
+        """What each ship remembers, as in `Memory`; where an episode begins, the present fills the past."""
         past, n = self.history - 1, len(rows)
         present = np.repeat(rows[:, None], past, axis=1)
+        nothing = np.zeros((n, 1 + OUTPUTS[self.action]), dtype=np.float32)
         if state is None:
-            return present, None
-        seen, inner = state
+            return present, None, nothing
+        seen, inner, held = state
         expected = (n, past, rows.shape[1])
         if np.shape(seen) != (expected if ndim == 2 else expected[1:]):
             raise InputError(
@@ -232,7 +255,8 @@ class LearnedPolicy:
         flags = np.asarray(False if starts is None else starts, dtype=np.bool_).reshape(-1)
         if flags.size not in (1, n):
             raise InputError(f"episode_start: {flags.size} found, expected one for each of {n} ships")
-        return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner
+        held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
+        return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner, held
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse what shows other quantities first, or in other scales, than those it learned with.

@@ -87,14 +87,15 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """History, base and authority of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if all(name in vars(wrapper) for name in ("base", "authority", "history")):
+        if all(name in vars(wrapper) for name in ("base", "authority", "history", "hold")):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 raise InputError(
                     f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
                     "hold"
                 )
-            return {"base": base, "authority": float(wrapper.authority), "history": int(wrapper.history)}
+            numbers = {"history": int(wrapper.history), "hold": int(wrapper.hold)}
+            return {"base": base, "authority": float(wrapper.authority), **numbers}
     return {}
 
 

@@ -13,6 +13,7 @@ belong together are refused. No pickle, no torch. Format 1 of kind "learned":
     history              number of observations the network sees, the newest last
     base                 null or a classical controller (`agents.controller_file`), whose rudder it adds to
     authority            share of the rudder limit by which it may differ from the base
+    hold                 control intervals for which an output of the network holds
     environment          {"id", "options"}: where it learned
     model                {"name", "sha256"}: the model it learned on
     training             how it was made: any JSON
@@ -60,7 +61,7 @@ Tensors = dict[str, NDArray[Any]]
 
 LEARNED = (
     "format", "kind", "observation_names", "observation_scales", "action", "network", "history", "base",
-    "authority", "environment", "model", "training",
+    "authority", "hold", "environment", "model", "training",
 )  # fmt: skip
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 REMEDY = "take another copy of both files"
@@ -136,6 +137,7 @@ def _learned_content(policy: LearnedPolicy, tensors: Tensors, prefix: str) -> di
         "history": policy.history,
         "base": None if policy.base is None else controller_content(policy.base),
         "authority": policy.authority,
+        "hold": policy.hold,
         "environment": {"id": policy.env_id, "options": as_json(policy.env_options)},
         "model": {"name": policy.model_name, "sha256": policy.model_sha256},
         "training": as_json(policy.training),
@@ -220,6 +222,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             history=content["history"],
             base=None if base is None else read_controller(_table(base, "base", where), f"{where}: base"),
             authority=content["authority"],
+            hold=content["hold"],
             env_id=place["id"],
             env_options=dict(check_table(place.get("options"), f"{where}: environment.options")),
             model_name=model["name"],

@@ -72,8 +72,10 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
         **training_options(plan),
     )
     settings = plan.settings
-    if base is not None or settings.history > 1:
-        ships = ResidualVecEnv(ships, base, authority=settings.authority, history=settings.history)
+    if base is not None or settings.history > 1 or settings.hold > 1:
+        ships = ResidualVecEnv(
+            ships, base, authority=settings.authority, history=settings.history, hold=settings.hold
+        )
     return scaled_rewards(ships, settings)
 
 

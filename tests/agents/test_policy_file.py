@@ -21,7 +21,7 @@ IDENTIFIED = load_model("mariner-tls-svm")
 POLICIES = {
     "plain": random_policy(),
     "history": random_policy(history=3),
-    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4),
+    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, hold=2),
     "discrete": random_policy(action="rudder-discrete"),
     "shielded": Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)),
     "shielded pid": Shielded.from_model(MARINER, PID.from_model(MARINER)),
