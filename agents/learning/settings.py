@@ -4,6 +4,7 @@ The files in `hyperparameters/` hold the tuned ones, later tables before earlier
 
     [defaults]                          # every setting of the algorithm
     [environments.path-following]       # those that differ there
+    [actions.rudder-discrete]           # those that differ with other commands than the rudder
     [tasks.mariner-rough]               # those that differ on a task of a suite
 
 A file of a user's own, and `--set`, name settings without tables.
@@ -317,6 +318,7 @@ def load_settings(
     environment: str = "course-keeping",
     task: str = "",
     given: Mapping[str, Any] | None = None,
+    action: str = "rudder",
 ) -> Settings:
     """The tuned settings of an algorithm, with those that are given in their place.
 
@@ -328,6 +330,8 @@ def load_settings(
         Name of a suite's task; one without settings of its own has those of its environment.
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What is commanded.
 
     Raises
     ------
@@ -338,9 +342,9 @@ def load_settings(
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.learning").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = _parsed(text, where)
-    check_keys(content, ("defaults", "environments", "tasks"), where)
+    check_keys(content, ("defaults", "environments", "actions", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
-    for table, name in (("environments", environment), ("tasks", task)):
+    for table, name in (("environments", environment), ("actions", action), ("tasks", task)):
         own = check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
         chosen |= _settings(own, kind, f"{where}: {table}.{name}")
     return make_settings(algorithm, chosen | dict(given or {}))
