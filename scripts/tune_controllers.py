@@ -30,7 +30,7 @@ from agents.benchmarking.direct_search import (
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
-from agents.los_autopilot import LAWS
+from agents.controllers.los_autopilot import LAWS
 from agents.oracle import OracleSettings, fly_oracle
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json

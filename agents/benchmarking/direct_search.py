@@ -22,10 +22,10 @@ from numpy.typing import NDArray
 from agents.benchmarking.designs import INNER, design, no_path
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Controller
-from agents.linear_loop import rate_weight
-from agents.los_autopilot import CRITICAL, LAWS
-from agents.pid import PID
+from agents.controllers.controller import Controller
+from agents.controllers.linear_loop import rate_weight
+from agents.controllers.los_autopilot import CRITICAL, LAWS
+from agents.controllers.pid import PID
 from shipgym.checks import check_choice, check_table, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import RUDDER_WEIGHT

@@ -12,7 +12,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from agents.controller import Controller
+from agents.controllers.controller import Controller
 from agents.learning.plan import Plan, training_options
 from agents.learning.residual import ResidualVecEnv
 from agents.learning.settings import (

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.benchmarking.suite import ENVIRONMENTS, BenchmarkTask, load_suite
-from agents.controller import model_hash
+from agents.controllers.controller import model_hash
 from agents.learning.settings import (
     ALGORITHMS,
     Settings,

@@ -1,6 +1,6 @@
 """What a learned policy sees and does in training: past observations, a classical controller to add to.
 
-The network acts on what `agents.policy.LearnedPolicy` gives it when it steers: the last observations, oldest
+The network acts on what `LearnedPolicy` gives it when it steers: the last observations, oldest
 first, then the base controller's action. The rudder is that action and the network's part of it, which may
 be held for several control intervals while the base goes on with its feedback.
 
@@ -18,7 +18,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from agents.controller import Policy
+from agents.controllers.controller import Policy
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 

@@ -23,7 +23,7 @@ from agents.benchmarking.direct_search import (
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.los_autopilot import LAWS
+from agents.controllers.los_autopilot import LAWS
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
 

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, Shielded
 from agents.cli import app
-from agents.onnx_export import export_onnx
+from agents.policies.onnx_export import export_onnx
 from shipgym.errors import InputError
 from tests.agents.policies import MARINER, random_network, random_policy
 

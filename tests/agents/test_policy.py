@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, LearnedPolicy, check_controller, fly
-from agents.policy import ORDERS, Memory, order_numbers
+from agents.policies.policy import ORDERS, Memory, order_numbers
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError

@@ -10,7 +10,7 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from agents import LQ, PID, Shielded, check_controller, load_agent
-from agents.shield import Limits
+from agents.policies.shield import Limits
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.models.mariner import mariner
