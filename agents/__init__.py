@@ -9,50 +9,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from agents.adaptive_lq import AdaptiveLQ
+    from agents.agent_file import load_agent
     from agents.benchmarking.results import BenchmarkResult, load_results
     from agents.benchmarking.run import benchmark
-    from agents.checker import check_controller
-    from agents.controller import Controller, Policy
-    from agents.controller_file import load_agent
-    from agents.filtered_pid import FilteredPID
+    from agents.controllers.adaptive_lq import AdaptiveLQ
+    from agents.controllers.checker import check_controller
+    from agents.controllers.controller import Controller, Policy
+    from agents.controllers.filtered_pid import FilteredPID
+    from agents.controllers.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
+    from agents.controllers.lq import LQ
+    from agents.controllers.lqg import LQG
+    from agents.controllers.mpc import MPC
+    from agents.controllers.pid import PID
+    from agents.controllers.robustness import MarginSpread, margin_spread
+    from agents.controllers.scheduled_lq import ScheduledLQ
     from agents.flight import Flights, StepResponses, fly, step_response
-    from agents.los_autopilot import AdaptiveLineOfSight, IntegralLineOfSight, LineOfSight
-    from agents.lq import LQ
-    from agents.lqg import LQG
-    from agents.mpc import MPC
-    from agents.pid import PID
-    from agents.policy import LearnedPolicy
-    from agents.robustness import MarginSpread, margin_spread
-    from agents.scheduled_lq import ScheduledLQ
-    from agents.shield import Shielded, interventions
+    from agents.policies.policy import LearnedPolicy
+    from agents.policies.shield import Shielded, interventions
 
 _HOME = {
-    "AdaptiveLineOfSight": "agents.los_autopilot",
-    "IntegralLineOfSight": "agents.los_autopilot",
-    "LQ": "agents.lq",
-    "LQG": "agents.lqg",
-    "LearnedPolicy": "agents.policy",
-    "LineOfSight": "agents.los_autopilot",
-    "MPC": "agents.mpc",
-    "MarginSpread": "agents.robustness",
-    "PID": "agents.pid",
-    "AdaptiveLQ": "agents.adaptive_lq",
+    "AdaptiveLineOfSight": "agents.controllers.los_autopilot",
+    "IntegralLineOfSight": "agents.controllers.los_autopilot",
+    "LQ": "agents.controllers.lq",
+    "LQG": "agents.controllers.lqg",
+    "LearnedPolicy": "agents.policies.policy",
+    "LineOfSight": "agents.controllers.los_autopilot",
+    "MPC": "agents.controllers.mpc",
+    "MarginSpread": "agents.controllers.robustness",
+    "PID": "agents.controllers.pid",
+    "AdaptiveLQ": "agents.controllers.adaptive_lq",
     "BenchmarkResult": "agents.benchmarking.results",
-    "Controller": "agents.controller",
-    "FilteredPID": "agents.filtered_pid",
+    "Controller": "agents.controllers.controller",
+    "FilteredPID": "agents.controllers.filtered_pid",
     "Flights": "agents.flight",
-    "Policy": "agents.controller",
-    "ScheduledLQ": "agents.scheduled_lq",
-    "Shielded": "agents.shield",
+    "Policy": "agents.controllers.controller",
+    "ScheduledLQ": "agents.controllers.scheduled_lq",
+    "Shielded": "agents.policies.shield",
     "StepResponses": "agents.flight",
     "benchmark": "agents.benchmarking.run",
-    "check_controller": "agents.checker",
+    "check_controller": "agents.controllers.checker",
     "fly": "agents.flight",
-    "interventions": "agents.shield",
-    "load_agent": "agents.controller_file",
+    "interventions": "agents.policies.shield",
+    "load_agent": "agents.agent_file",
     "load_results": "agents.benchmarking.results",
-    "margin_spread": "agents.robustness",
+    "margin_spread": "agents.controllers.robustness",
     "step_response": "agents.flight",
 }
 

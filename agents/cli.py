@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.benchmark_commands import benchmark_command
-from agents.command import (
+from agents.commands.benchmark import benchmark_command
+from agents.commands.command import (
     FAILED,
     Address,
     EngineName,
@@ -36,13 +36,13 @@ from agents.command import (
     answered,
     fail,
 )
-from agents.identification_commands import advise_command, identify_command, reduce_command
-from agents.learning_commands import train_command
-from agents.policy_commands import export_command
-from agents.tuning_commands import tune_command
+from agents.commands.export import export_command
+from agents.commands.identification import advise_command, identify_command, reduce_command
+from agents.commands.training import train_command
+from agents.commands.tuning import tune_command
 
 if TYPE_CHECKING:
-    from agents.autopilot_result import AutopilotResult
+    from agents.autopilot.result import AutopilotResult
 
 app = typer.Typer(
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
@@ -103,9 +103,9 @@ def trials_command(
     Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
     indices of an identified model come with their 95 % intervals.
     """
-    from agents.standard_trials import check_page, standard_trials, write_page
-    from agents.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
-    from agents.terminal import out as console
+    from agents.commands.standard_trials import check_page, standard_trials, write_page
+    from agents.commands.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
+    from agents.commands.terminal import out as console
     from shipgym.models import load_model
 
     ship = load_model(model)
@@ -175,10 +175,10 @@ def autopilot_command(
     Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
     model is unstable; the report then says so.
     """
-    from agents.autopilot import build_autopilot
-    from agents.identifying import given_options
+    from agents.autopilot.run import build_autopilot
+    from agents.commands.identifying import given_options
+    from agents.commands.terminal import progress_bars
     from agents.monte_carlo import Engine
-    from agents.terminal import progress_bars
 
     given = {
         "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
@@ -197,8 +197,8 @@ def autopilot_command(
 
 def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
     """Print the result of the chain; fail for an unstable model."""
-    from agents.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
-    from agents.terminal import out as console
+    from agents.commands.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
+    from agents.commands.terminal import out as console
     from identification.concerns import concerns
 
     if as_json:
@@ -230,8 +230,8 @@ def replay_command(
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
     """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
-    from agents.replay import write_replay
-    from agents.terminal import out as console
+    from agents.commands.terminal import out as console
+    from agents.replay.page import write_replay
 
     write_replay(episodes, out)
     console.print(f"written: {out}", soft_wrap=True)
@@ -255,9 +255,9 @@ def reproduce_command(
 
     Exits with 1 if an aim is missed.
     """
-    from agents.reproduction import missed, page, papers_of, reproduce, terminal_table
-    from agents.terminal import err, print_json
-    from agents.terminal import out as console
+    from agents.commands.reproduction import missed, page, papers_of, reproduce, terminal_table
+    from agents.commands.terminal import err, print_json
+    from agents.commands.terminal import out as console
     from shipgym.whole_file import write_text
 
     names = papers_of(paper)
@@ -285,9 +285,9 @@ def doctor_command(as_json: Json = False) -> None:
 
     Exits with 1 if something does not work.
     """
-    from agents.doctor import examine_installation
-    from agents.terminal import out as console
-    from agents.terminal import print_json
+    from agents.commands.doctor import examine_installation
+    from agents.commands.terminal import out as console
+    from agents.commands.terminal import print_json
 
     findings = examine_installation()
     if as_json:

@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controller import Controller, Policy
-from agents.policy import LearnedPolicy
-from agents.shield import Shielded
+from agents.controllers.controller import Controller, Policy
+from agents.policies.policy import LearnedPolicy
+from agents.policies.shield import Shielded
 from shipgym.checks import check_number
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, CourseKeepingTask, observation_scales

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.engines import JobProgress, check_engine, run_jobs
+from agents.engines.jobs import JobProgress, check_engine, run_jobs
 from agents.spread import ManoeuvreSpread, SailedDraws, nominal_runs, sail_draws, spread_of
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
@@ -22,7 +22,7 @@ from shipgym.models.linear import is_course_stable
 from shipgym.models.model_file import model_fields, read_model
 
 if TYPE_CHECKING:
-    from agents.controller import Controller
+    from agents.controllers.controller import Controller
     from agents.flight import Flights
 
 Floats = NDArray[np.float64]
@@ -32,7 +32,7 @@ DRAWS_A_JOB = 25
 
 @dataclass(frozen=True)
 class Engine:
-    """Where jobs are done: see `agents.engines.run_jobs`, whose arguments these are."""
+    """Where jobs are done: see `agents.engines.jobs.run_jobs`, whose arguments these are."""
 
     engine: str = "local"
     workers: int | None = 1
@@ -147,7 +147,7 @@ def draw_jobs(
     controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
-    from agents.controller_file import controller_content
+    from agents.controllers.controller_file import controller_content
 
     common = {
         "model": model_fields(replace(model, covariance=None)),
@@ -166,7 +166,7 @@ def draw_jobs(
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     """Manoeuvres, course stability and flights of some draws."""
-    from agents.controller_file import read_controller
+    from agents.controllers.controller_file import read_controller
     from agents.flight import fly
 
     model = read_model(job["model"], "model")

@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controller import Controller, Policy
-from agents.lq import LQ
-from agents.pid import PID
+from agents.controllers.controller import Controller, Policy
+from agents.controllers.lq import LQ
+from agents.controllers.pid import PID
 from shipgym.checks import check_number, check_whole
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine

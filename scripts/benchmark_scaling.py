@@ -112,7 +112,7 @@ def benchmark_table() -> None:
 
 def tasks_table() -> None:
     """What starting workers costs: jobs that do nothing."""
-    from agents.engines import run_jobs
+    from agents.engines.jobs import run_jobs
 
     head("100 jobs that do nothing")
     for workers in WORKERS:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from agents import LearnedPolicy
-from agents.network import Network
+from agents.policies.network import Network
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.models import load_model
 

@@ -20,14 +20,14 @@ from typing import Any
 
 import numpy as np
 
+from agents.agent_file import load_agent
 from agents.benchmarking.direct_search import tuned
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
-from agents.controller_file import load_agent
 from agents.learning import run_folder
 from agents.learning.plan import Given, make_plan
 from agents.learning.training import Progress, train
-from agents.policy import LearnedPolicy
+from agents.policies.policy import LearnedPolicy
 from shipgym.json_file import read_json, write_json
 
 AGENTS = Path(__file__).parents[1] / "agents"
@@ -147,13 +147,13 @@ def table(tasks: Sequence[BenchmarkTask], algorithm: str) -> str:
     """Costs of the best classical controller, the oracle and the agent, and whether the aim is met."""
     reference = read_json(REFERENCE, "reference file", "make it again with scripts/tune_controllers.py")
     lines = [
-        "| Task | Best classical | Cost | Oracle | Learned | Room closed | Aim | Gain: scored, fresh |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| Task | Best classical | Cost | Oracle | Learned | Room closed | Aim | Gain: scored, fresh | Seeds |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for task in tasks:
         path = PRETRAINED / f"{task.name}-{algorithm}.json"
         if task.name not in reference or not path.is_file():
-            lines.append(f"| {task.name} | | | | not trained | | missed | |")
+            lines.append(f"| {task.name} | | | | not trained | | missed | | |")
             continue
         policy = load_agent(path)
         assert isinstance(policy, LearnedPolicy)
@@ -171,10 +171,11 @@ def _row(task: BenchmarkTask, known: Any, policy: LearnedPolicy) -> str:
     gain, room = 1.0 - learned / classical, 1.0 - oracle / classical
     asked = room > ENOUGH
     met = gain >= 0.5 * room if asked else gain >= -CLOSE
+    every = ", ".join(f"{run['scored_cost']:.1f}" for run in policy.training["runs"])
     share = f"{gain / room:.0%} of {room:.1%}" if asked else f"room {room:.1%}, {-gain:+.1%} to classical"
     return (
         f"| {task.name} | {known['best_classical']['name']} | {classical:.1f} | {oracle:.1f} | {learned:.1f} "
-        f"| {share} | {'met' if met else 'missed'} | {gain:.1%}, {fresh_gain(policy, task):.1%} |"
+        f"| {share} | {'met' if met else 'missed'} | {gain:.1%}, {fresh_gain(policy, task):.1%} | {every} |"
     )
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from agents.benchmarking.transfer import CASES, N_RUNS, Transfer, save_transfer, transfer, transfer_case
-from agents.terminal import progress_bars
+from agents.commands.terminal import progress_bars
 from identification.real_ships.data import Data
 from identification.real_ships.recipe import fitted
 from shipgym import InputError, ShipModel, load_model
@@ -61,7 +61,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=ROOT / "transfer")
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
     parser.add_argument("--runs", type=int, default=N_RUNS)
-    parser.add_argument("--total-steps", type=int, default=1_000_000, help="of each training run")
+    parser.add_argument("--total-steps", type=int, default=400_000, help="of each training run")
     parser.add_argument("--workers", type=int, default=1)
     options = parser.parse_args()
     for task in options.tasks or CASES:

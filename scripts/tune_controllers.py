@@ -31,7 +31,7 @@ from agents.benchmarking.direct_search import (
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
-from agents.controller import Controller
+from agents.controllers.controller import Controller
 from agents.oracle import OracleSettings, fly_oracle
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json

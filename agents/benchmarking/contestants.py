@@ -29,9 +29,9 @@ from typing import Any
 
 from agents.benchmarking.designs import design
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Controller, Policy
-from agents.controller_file import controller_content
-from agents.los_autopilot import LAWS
+from agents.controllers.controller import Controller, Policy
+from agents.controllers.controller_file import controller_content
+from agents.controllers.los_autopilot import LAWS
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
@@ -92,7 +92,7 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     InputError
         Naming the file and what is wrong with it.
     """
-    from agents.controller_file import load_agent
+    from agents.agent_file import load_agent
 
     if not one.is_text or _is_factory(one.source):
         return
@@ -280,7 +280,7 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if _is_factory(source):
         found = _factory(source)
         return [found if hasattr(found, "predict") else _from_factory(found, task)]
-    from agents.controller_file import load_agent
+    from agents.agent_file import load_agent
 
     paths = _files(source, task)
     if not paths:

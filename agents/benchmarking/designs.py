@@ -10,9 +10,9 @@ from importlib import import_module
 from typing import Any
 
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Controller, model_hash
-from agents.controller_file import HOMES
-from agents.los_autopilot import LAWS
+from agents.controllers.controller import Controller, model_hash
+from agents.controllers.controller_file import HOMES
+from agents.controllers.los_autopilot import LAWS
 from shipgym.checks import check_choice
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError

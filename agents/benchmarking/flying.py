@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.benchmarking.metrics import Recording, metrics
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Policy
-from agents.shield import ShieldState, interventions
+from agents.controllers.controller import Policy
+from agents.policies.shield import ShieldState, interventions
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.kernels import layout

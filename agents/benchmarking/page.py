@@ -30,7 +30,7 @@ from agents.benchmarking.page_tables import (
 from agents.benchmarking.refly import Flight, Reflown, refly
 from agents.benchmarking.results import EPISODES, RESULTS, BenchmarkResult
 from agents.benchmarking.suite import N_EPISODES, load_suite
-from agents.output import check_page
+from agents.commands.output import check_page
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.episode import Episode
 from shipgym.pages import (
@@ -51,7 +51,7 @@ from shipgym.whole_file import write_text
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-    from agents.autopilot import Progress
+    from agents.autopilot.run import Progress
 
 PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed

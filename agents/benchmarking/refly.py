@@ -14,15 +14,15 @@ from agents.benchmarking.contestants import Contestant, contestants
 from agents.benchmarking.flying import commands
 from agents.benchmarking.results import BenchmarkResult
 from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.controller import Policy
-from agents.engines import run_jobs
+from agents.controllers.controller import Policy
+from agents.engines.jobs import run_jobs
 from shipgym.envs.recording import SUCCESS, plain
 from shipgym.envs.screen import STEP_OUTCOME
 from shipgym.episode import Episode
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
-    from agents.autopilot import Progress
+    from agents.autopilot.run import Progress
 
 Floats = NDArray[np.float64]
 

@@ -15,12 +15,12 @@ from agents.benchmarking.flying import fly_task
 from agents.benchmarking.oracle_costs import oracle_costs
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
 from agents.benchmarking.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
-from agents.engines import check_engine, run_jobs
+from agents.engines.jobs import check_engine, run_jobs
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
-    from agents.autopilot import Progress
+    from agents.autopilot.run import Progress
 
 _suite = lru_cache(maxsize=4)(load_suite)
 
@@ -55,7 +55,7 @@ def benchmark(
         Processes; None for as many as there are cores. Controllers that are given as objects, not by a text,
         fly in this process.
     engine : {"local", "ray"}
-        See `agents.engines.run_jobs`.
+        See `agents.engines.jobs.run_jobs`.
     progress : callable, optional
         Told what is done, how many of it, and the total.
     address : str, optional

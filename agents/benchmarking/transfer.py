@@ -26,8 +26,8 @@ from agents.benchmarking.direct_search import tune
 from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.controller import Controller, Policy
-from agents.engines import run_jobs
+from agents.controllers.controller import Controller, Policy
+from agents.engines.jobs import run_jobs
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel, load_model
@@ -152,7 +152,7 @@ def transfer(
     settings : mapping, optional
         Of PPO, in place of those of `SETTINGS_OF`.
     engine, workers
-        See `agents.engines.run_jobs`.
+        See `agents.engines.jobs.run_jobs`.
     progress : callable, optional
         Told the number of training runs done and their total.
 
@@ -178,7 +178,7 @@ def transfer(
         for seed in range(n_runs)
     ]  # fmt: skip
     files = run_jobs(learn, jobs, engine=engine, workers=workers, keep=folder / "jobs", progress=progress)
-    from agents.controller_file import load_agent
+    from agents.agent_file import load_agent
 
     found: dict[str, dict[str, Floats]] = {TUNED: _flown([tuned], case)}
     for k, learner in enumerate(learners):

@@ -12,7 +12,7 @@ from agents.benchmarking.contestants import CLASSICAL, Contestant, file_hash
 from agents.benchmarking.results import BenchmarkResult, load_results, versions
 from agents.benchmarking.run import fly_job, fly_job_of
 from agents.benchmarking.suite import load_suite, suite_hash
-from agents.engines import run_jobs
+from agents.engines.jobs import run_jobs
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 

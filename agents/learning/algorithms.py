@@ -12,7 +12,7 @@ from stable_baselines3 import PPO, SAC, TD3
 from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
-from agents.controller import Controller
+from agents.controllers.controller import Controller
 from agents.learning.plan import Plan, training_options
 from agents.learning.residual import ResidualVecEnv
 from agents.learning.settings import (
@@ -72,8 +72,10 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
         **training_options(plan),
     )
     settings = plan.settings
-    if base is not None or settings.history > 1:
-        ships = ResidualVecEnv(ships, base, authority=settings.authority, history=settings.history)
+    if base is not None or settings.history > 1 or settings.hold > 1:
+        ships = ResidualVecEnv(
+            ships, base, authority=settings.authority, history=settings.history, hold=settings.hold
+        )
     return scaled_rewards(ships, settings)
 
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from agents.agent_file import load_agent
 from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import tuned
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask
-from agents.controller import Controller
-from agents.controller_file import load_agent
+from agents.controllers.controller import Controller
 from shipgym.errors import InputError
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from agents.benchmarking.designs import design
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask
-from agents.controller import Policy
+from agents.controllers.controller import Policy
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 

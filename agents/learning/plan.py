@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.benchmarking.suite import ENVIRONMENTS, BenchmarkTask, load_suite
-from agents.controller import model_hash
+from agents.controllers.controller import model_hash
 from agents.learning.settings import (
     ALGORITHMS,
     Settings,
@@ -178,7 +178,7 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     own = read_settings_file(given.settings_file, given.algorithm) if given.settings_file else {}
     own |= given.settings
     if stored is None or stored.algorithm != given.algorithm:
-        settings = load_settings(given.algorithm, task.environment, task.name, own)
+        settings = load_settings(given.algorithm, task.environment, task.name, own, task.task.action)
     else:
         settings = changed(stored.settings, own)
     before = (0, False, 1) if stored is None else (stored.seed, stored.randomise, stored.threads)

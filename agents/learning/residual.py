@@ -1,7 +1,8 @@
-"""What a learned policy sees and does in training: past observations, and a classical controller to add to.
+"""What a learned policy sees and does in training: past observations, a classical controller to add to.
 
-The network acts on what `agents.policy.LearnedPolicy` gives it when it steers: the last observations, oldest
-first, then the base controller's action. The rudder is that action and the network's part of it.
+The network acts on what `LearnedPolicy` gives it when it steers: the last observations, oldest
+first, then the base controller's action. The rudder is that action and the network's part of it, which may
+be held for several control intervals while the base goes on with its feedback.
 
 Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
 al. 2019, Residual reinforcement learning for robot control, ICRA.
@@ -17,7 +18,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from agents.controller import Policy
+from agents.controllers.controller import Policy
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
@@ -37,7 +38,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
 
     The agent sees `[observation(t - history + 1), ..., observation(t), base action(t)]`; where an episode
     begins the first observation fills the history. What is done is
-    `clip(base action + authority * clip(output, -1, 1), -1, 1)`. Rewards stay what they are.
+    `clip(base action + authority * clip(output, -1, 1), -1, 1)`, for `hold` control intervals with the same
+    output. A step is these intervals, its reward their sum. Where an episode ends among them, the rest of the
+    step belongs to nobody: the next episode begins with the base alone, or with the output if there is none.
 
     Parameters
     ----------
@@ -51,6 +54,8 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         base it has to be 1.
     history : int
         Number of observations that are shown, the newest last.
+    hold : int
+        Control intervals of a step.
 
     Raises
     ------
@@ -60,11 +65,18 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     """
 
     def __init__(
-        self, venv: VecEnv, base: Policy | None = None, *, authority: float = 1.0, history: int = 1
+        self,
+        venv: VecEnv,
+        base: Policy | None = None,
+        *,
+        authority: float = 1.0,
+        history: int = 1,
+        hold: int = 1,
     ) -> None:
         self.base = base
         self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
         self.history = check_whole(history, "history", at_least=1)
+        self.hold = check_whole(hold, "hold", at_least=1)
         low, high = (np.tile(bound, self.history) for bound in _bounds(venv))
         if base is None:
             if self.authority != 1.0:
@@ -76,6 +88,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._past = np.zeros((venv.num_envs, self.history, *venv.observation_space.shape), np.float32)
         self._state: Any = None
         self._proposed: Floats = np.zeros((venv.num_envs, 0), np.float32)
+        self._outputs: Any = None
 
     def reset(self) -> Floats:
         """Begin an episode in each row.
@@ -90,21 +103,31 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return self._begin(observations, every)
 
     def step_async(self, actions: Any) -> None:
-        """Add the agent's outputs, shape (num_envs, n_commands), to what the base proposed."""
-        if self.base is None:
-            self.venv.step_async(actions)
-            return
-        outputs = np.clip(np.asarray(actions, dtype=np.float32), -1.0, 1.0)
-        self.venv.step_async(np.clip(self._proposed + np.float32(self.authority) * outputs, -1.0, 1.0))
+        """Add the agent's outputs, shape (num_envs, n_commands), to what the base proposes."""
+        self._outputs = np.array(actions)
 
     def step_wait(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
-        """One control interval; `terminal_observation` is what the agent would have seen next.
+        """`hold` control intervals; `terminal_observation` is what the agent would have seen next.
 
         Returns
         -------
         observations, rewards, dones, infos
-            As those of the ships inside.
+            As those of the ships inside; rewards summed up to the end of an episode, infos of that end.
         """
+        observations, rewards, dones, infos = self._interval()
+        infos = list(infos)  # the ships fill theirs anew
+        for _ in range(self.hold - 1):
+            if self.base is not None:
+                self._outputs[dones] = 0
+            observations, more, ends, latest = self._interval()
+            rewards = rewards + np.where(dones, np.float32(0.0), more)
+            infos = [old if over else new for old, over, new in zip(infos, dones, latest, strict=True)]
+            dones = dones | ends
+        return observations, rewards, dones, infos
+
+    def _interval(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
+        """One control interval of the ships with the agent's outputs."""
+        self.venv.step_async(self._commands())
         observations, rewards, dones, infos = self.venv.step_wait()
         self._past[:, :-1] = self._past[:, 1:]
         ended = np.flatnonzero(dones)
@@ -128,6 +151,13 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     def remember(self, memory: Mapping[str, Any]) -> None:
         """Go on from what `memory` gave, in place of a `reset`."""
         self._past[:], self._state, self._proposed = memory["past"], memory["state"], memory["proposed"]
+
+    def _commands(self) -> Any:
+        """What the ships do."""
+        if self.base is None:
+            return self._outputs
+        outputs = np.clip(np.asarray(self._outputs, dtype=np.float32), -1.0, 1.0)
+        return np.clip(self._proposed + np.float32(self.authority) * outputs, -1.0, 1.0)
 
     def _begin(self, observations: Floats, starts: Flags) -> Floats:
         """What the agent sees where some rows begin an episode."""

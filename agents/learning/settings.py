@@ -4,6 +4,7 @@ The files in `hyperparameters/` hold the tuned ones, later tables before earlier
 
     [defaults]                          # every setting of the algorithm
     [environments.path-following]       # those that differ there
+    [actions.rudder-discrete]           # those that differ with other commands than the rudder
     [tasks.mariner-rough]               # those that differ on a task of a suite
 
 A file of a user's own, and `--set`, name settings without tables.
@@ -39,9 +40,9 @@ class Settings:
     Attributes
     ----------
     total_steps : int
-        Control intervals to learn from, of all ships together.
+        Decisions to learn from, of all ships together; each lasts `hold` control intervals.
     evaluate_every : int
-        Control intervals between evaluations.
+        Decisions between evaluations.
     ships : int
         That sail at once.
     batch_size : int
@@ -51,13 +52,15 @@ class Settings:
     schedule : {"constant", "linear"}
         How the learning rate goes on; linear falls to 0 at the end of the training.
     gamma : float
-        Discount of a control interval.
+        Discount of a decision.
     net_arch : tuple of int
         Widths of the hidden layers, of policy and value alike.
     activation : {"relu", "tanh"}
         Between the layers.
     history : int
         Observations that the policy is shown, the newest last.
+    hold : int
+        Control intervals of a decision; a base goes on with its feedback in each of them.
     base : str
         Controller that the policy adds to, one of `BASES` or a controller's file.
     authority : float
@@ -77,6 +80,7 @@ class Settings:
     net_arch: tuple[int, ...]
     activation: str
     history: int
+    hold: int
     base: str
     authority: float
     reward_scale: float | str
@@ -84,6 +88,7 @@ class Settings:
     #: Least value of whole numbers, and bounds of others.
     WHOLE: ClassVar[dict[str, int]] = {
         "total_steps": 1, "evaluate_every": 1, "ships": 1, "batch_size": 1, "history": 1,
+        "hold": 1,
     }  # fmt: skip
     NUMBERS: ClassVar[dict[str, dict[str, Any]]] = {
         "learning_rate": {"above": 0.0, "at_most": 1.0},
@@ -128,7 +133,7 @@ class PPOSettings(Settings):
     Attributes
     ----------
     n_steps : int
-        Control intervals of each ship in a rollout.
+        Decisions of each ship in a rollout.
     n_epochs : int
         How often each sample of a rollout is used.
     gae_lambda : float
@@ -186,11 +191,11 @@ class OffPolicySettings(Settings):
     Attributes
     ----------
     buffer_size : int
-        Control intervals that are remembered.
+        Decisions that are remembered.
     learning_starts : int
-        Control intervals of all ships under random actions before learning begins.
+        Decisions of all ships under random actions before learning begins.
     train_freq : int
-        Control intervals of all ships between updates.
+        Decisions of all ships between updates.
     gradient_steps : int
         Of an update.
     tau : float
@@ -313,6 +318,7 @@ def load_settings(
     environment: str = "course-keeping",
     task: str = "",
     given: Mapping[str, Any] | None = None,
+    action: str = "rudder",
 ) -> Settings:
     """The tuned settings of an algorithm, with those that are given in their place.
 
@@ -324,6 +330,8 @@ def load_settings(
         Name of a suite's task; one without settings of its own has those of its environment.
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What is commanded.
 
     Raises
     ------
@@ -334,9 +342,9 @@ def load_settings(
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.learning").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = _parsed(text, where)
-    check_keys(content, ("defaults", "environments", "tasks"), where)
+    check_keys(content, ("defaults", "environments", "actions", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
-    for table, name in (("environments", environment), ("tasks", task)):
+    for table, name in (("environments", environment), ("actions", action), ("tasks", task)):
         own = check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
         chosen |= _settings(own, kind, f"{where}: {table}.{name}")
     return make_settings(algorithm, chosen | dict(given or {}))

@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from agents.controller_file import load_agent
+from agents.agent_file import load_agent
 from agents.learning import run_folder
 from agents.learning.bases import design_base
 from agents.learning.evaluation import HeldOut
 from agents.learning.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.learning.safe_file import read_values, write_values
-from agents.policy import LearnedPolicy
+from agents.policies.policy import LearnedPolicy
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.engines import run_jobs
+from agents.engines.jobs import run_jobs
 from agents.learning.plan import Plan, check_same
 from agents.learning.search_space import Choice, Reals, search_space, with_parameters
 from agents.learning.settings import changed

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from agents import LQ, LineOfSight, fly
-from agents.autopilot import build_autopilot, verify
-from agents.autopilot_result import verification_metrics
-from agents.report import write_report
+from agents.autopilot.page import write_report
+from agents.autopilot.result import verification_metrics
+from agents.autopilot.run import build_autopilot, verify
+from agents.commands.terminal import ranking_table
 from agents.spread import manoeuvre_spread
-from agents.terminal import ranking_table
 from identification import identify
 from identification.concerns import concerns
 from shipgym import InputError, ShipFile, load_model

@@ -6,12 +6,12 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
-from agents.benchmark_tables import ranking_table
 from agents.benchmarking.contestants import contestants
 from agents.benchmarking.designs import design
 from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
+from agents.commands.benchmark_tables import ranking_table
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy

@@ -140,7 +140,7 @@ def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
 
 
 def test_a_shield_is_counted(lq):
-    from agents.shield import Shielded
+    from agents.policies.shield import Shielded
 
     reckless = Shielded.from_model(KEEPING.ship, steady(1.0))
     found = fly_task(reckless, KEEPING, SEEDS[:3]).episodes

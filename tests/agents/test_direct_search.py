@@ -25,8 +25,8 @@ from agents.benchmarking.direct_search import (
 )
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask, load_suite
+from agents.controllers.los_autopilot import LAWS
 from agents.learning.bases import design_base
-from agents.los_autopilot import LAWS
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
 from shipgym.models import load_model
@@ -144,7 +144,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
     write_json({"tasks": {"calm": found}}, path)
     base = design_base("tuned", CALM)
     assert getattr(base, "kind", None) == "lq"
-    monkeypatch.setattr("agents.mpc._solver_library", lambda: None)
+    monkeypatch.setattr("agents.controllers.mpc._solver_library", lambda: None)
     assert tuned("best", CALM, "any").kind == "mpc"
     del found["lq"], found["pid"]
     write_json({"tasks": {"calm": found}}, path)

@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.engines import JobError, WorkerDiedError, run_jobs
-from agents.job_text import pack, unpack
-from agents.ray_engine import check_answers
+from agents.engines.job_text import pack, unpack
+from agents.engines.jobs import JobError, WorkerDiedError, run_jobs
+from agents.engines.ray_engine import check_answers
 from shipgym.errors import InputError
 
 JOBS = """
@@ -138,7 +138,7 @@ def test_interrupt_ends_the_workers(functions, tmp_path):
     pids = tmp_path / "pids"
     pids.mkdir()
     script = (
-        "import signal, sys, engine_jobs\nfrom agents.engines import run_jobs\n"
+        "import signal, sys, engine_jobs\nfrom agents.engines.jobs import run_jobs\n"
         "if __name__ == '__main__':\n"
         "    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where it is begun with & \n"
         "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"

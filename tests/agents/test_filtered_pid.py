@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents import PID, FilteredPID, check_controller, fly, load_agent, step_response
-from agents.filtered_pid import LEAD, TURN, notch_band
+from agents.controllers.filtered_pid import LEAD, TURN, notch_band
 from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
 from shipgym.models import load_model

@@ -9,8 +9,8 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from agents import LQ, fly, step_response
-from agents.linear_loop import SIGNALS, rate_weight, sample_ship
-from agents.lq import lq_gain
+from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
+from agents.controllers.lq import lq_gain
 from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.models import load_model

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, fly, load_agent, step_response
-from agents.linear_loop import sample_ship
-from agents.lqg import kalman_gain, rudder_response, wave_model
+from agents.controllers.linear_loop import sample_ship
+from agents.controllers.lqg import kalman_gain, rudder_response, wave_model
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import minimize
 
 from agents import LQ, MPC, check_controller, fly, load_agent
-from agents.linear_loop import SIGNALS, rate_weight
+from agents.controllers.linear_loop import SIGNALS, rate_weight
 from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
 from shipgym.models import load_model

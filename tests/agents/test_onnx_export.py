@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, Shielded
 from agents.cli import app
-from agents.onnx_export import export_onnx
+from agents.policies.onnx_export import export_onnx
 from shipgym.errors import InputError
 from tests.agents.policies import MARINER, random_network, random_policy
 
@@ -23,6 +23,7 @@ POLICIES = {
     "history": random_policy(history=3),
     "residual": random_policy(base=LQ_MARINER, authority=0.6, history=2),
 }
+HELD = random_policy(base=LQ_MARINER, authority=0.6, hold=2)
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -42,6 +43,20 @@ def test_the_graph_commands_what_the_policy_does(name, tmp_path):
                 inputs["base_action"] = policy.base.predict(seen)[0]
             (action,) = session.run(["action"], inputs)
             np.testing.assert_allclose(action, expected, rtol=0.0, atol=1e-6)
+
+
+def test_between_decisions_the_part_of_the_last_one_is_added_to_the_base(tmp_path):
+    export_onnx(HELD, tmp_path / "policy.onnx")
+    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
+    hold = json.loads(session.get_modelmeta().custom_metadata_map["hold"])
+    random, state, part = np.random.default_rng(0), None, None
+    for step in range(5):
+        seen = random.uniform(-1.0, 1.0, (3, 8)).astype(np.float32)
+        expected, state = HELD.predict(seen, state, np.full(3, step == 0))
+        base = LQ_MARINER.predict(seen)[0]
+        if step % hold == 0:
+            (part,) = session.run(["part"], {"observations": seen, "base_action": base})
+        np.testing.assert_allclose(np.clip(base + part, -1.0, 1.0), expected, rtol=0.0, atol=1e-6)
 
 
 def test_the_metadata_say_what_it_observes(tmp_path):

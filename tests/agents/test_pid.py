@@ -9,8 +9,8 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from agents import PID, fly, step_response
-from agents.linear_loop import rate_weight, sample_ship
-from agents.pid import optimal_poles, place_poles
+from agents.controllers.linear_loop import rate_weight, sample_ship
+from agents.controllers.pid import optimal_poles, place_poles
 from shipgym.envs.course_keeping_task import observation_scales
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError

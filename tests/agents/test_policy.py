@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, LearnedPolicy, check_controller, fly
-from agents.policy import ORDERS, order_numbers
+from agents.policies.policy import ORDERS, Memory, order_numbers
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
@@ -21,6 +21,7 @@ WITH_MEMORY = {
     "history": {"history": 3},
     "base": {"base": LQ_MARINER, "authority": 0.3},
     "stateful base": {"base": LQG.from_model(MARINER), "authority": 0.3, "history": 2},
+    "held": {"base": LQ_MARINER, "hold": 3},
 }
 
 
@@ -70,7 +71,30 @@ def test_the_history_begins_with_the_first_observation_and_is_kept_oldest_first(
     begins = np.array([False, True, False, False])
     actions, _ = policy.predict(SEEN[16:20], state, begins)
     np.testing.assert_allclose(actions[1], policy.predict(SEEN[17])[0], rtol=0.0, atol=1e-6)
-    np.testing.assert_allclose(actions[0], policy.predict(SEEN[16], (state.seen[0], None))[0], atol=1e-6)
+    np.testing.assert_allclose(
+        actions[0], policy.predict(SEEN[16], Memory(state.seen[0], None, state.held[0]))[0], atol=1e-6
+    )
+
+
+def test_an_output_is_held_while_the_base_goes_on():
+    policy, silent = random_policy(base=LQ_MARINER, authority=0.3, hold=3), random_policy(hold=2)
+    bases = [LQ_MARINER.predict(rows)[0] for rows in (SEEN[:2], SEEN[2:4], SEEN[4:6], SEEN[6:8])]
+    begins = [[True, True], [False, False], [False, True], [False, False]]
+    decided = [[0, 0], [0, 0], [0, 2], [3, 2]]  # the step whose output each ship steers with
+    outputs = [
+        np.clip(policy.network(np.concatenate([SEEN[2 * k : 2 * k + 2], bases[k]], axis=1)), -1.0, 1.0)
+        for k in range(4)
+    ]
+    state = None
+    for k in range(4):
+        actions, state = policy.predict(SEEN[2 * k : 2 * k + 2], state, np.array(begins[k]))
+        held = np.stack([outputs[step][ship] for ship, step in enumerate(decided[k])])
+        expected = np.clip(bases[k] + np.float32(0.3) * held, -1.0, 1.0)
+        np.testing.assert_allclose(actions, expected, rtol=0.0, atol=1e-6)
+    first, state = silent.predict(SEEN[0])
+    second, state = silent.predict(SEEN[1], state)
+    np.testing.assert_array_equal(first, second)
+    np.testing.assert_array_equal(silent.predict(SEEN[2], state)[0], silent.predict(SEEN[2])[0])
 
 
 def test_the_network_adds_its_part_to_the_base():
@@ -131,6 +155,7 @@ def test_another_environment_is_refused_with_the_difference():
         ({"network": random_network(8, 4, 2)}, "network: 2 outputs found, expected 1: for action 'rudder'"),
         ({"action": "rudders"}, "action: 'rudders' found.*Did you mean 'rudder'"),
         ({"history": 0}, "history: 0 found, expected a whole number of at least 1"),
+        ({"hold": 1.5}, "hold: 1.5 found, expected a whole number of at least 1"),
         ({"authority": 0.5}, "authority: 0.5 found without a base"),
         ({"base": LQ_MARINER, "authority": -1.0}, "authority: -1 found"),
         ({"base": LQ_MARINER, "action": "rudder-shaft"}, "'rudder-shaft' found beside a base"),

@@ -13,7 +13,7 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.learning.residual import ResidualVecEnv
-from agents.policy import order_numbers
+from agents.policies.policy import order_numbers
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
 from shipgym.models import load_model

@@ -10,7 +10,7 @@ import pytest
 from safetensors.numpy import load_file, save_file
 
 from agents import LQ, PID, Shielded, check_controller, load_agent
-from agents.shield import Limits
+from agents.policies.shield import Limits
 from shipgym.errors import InputError
 from shipgym.models import load_model
 from shipgym.models.mariner import mariner
@@ -21,7 +21,7 @@ IDENTIFIED = load_model("mariner-tls-svm")
 POLICIES = {
     "plain": random_policy(),
     "history": random_policy(history=3),
-    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4),
+    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, hold=2),
     "discrete": random_policy(action="rudder-discrete"),
     "shielded": Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)),
     "shielded pid": Shielded.from_model(MARINER, PID.from_model(MARINER)),

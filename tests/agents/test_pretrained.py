@@ -7,8 +7,8 @@ from agents import load_agent
 from agents.benchmarking.contestants import check_fits, pretrained
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import load_suite
-from agents.controller import model_hash
-from agents.policy import LearnedPolicy
+from agents.controllers.controller import model_hash
+from agents.policies.policy import LearnedPolicy
 
 SUITE = load_suite()
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode

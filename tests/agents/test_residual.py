@@ -89,6 +89,30 @@ def test_only_history():
     assert residual.observation_space.contains(residual.step(action)[0][0])
 
 
+@pytest.mark.parametrize("name", BASES)
+def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_end(name):
+    env, base = BASES[name]
+    long, short = ResidualVecEnv(ships(env), base, hold=3), ResidualVecEnv(ships(env), base)
+    np.testing.assert_array_equal(long.reset(), short.reset())
+    random, endings = np.random.default_rng(2), 0
+    for _ in range(STEPS):
+        outputs = random.uniform(-1.0, 1.0, (SHIPS, 1)).astype(np.float32)
+        seen, rewards, dones, infos = long.step(outputs)
+        earned, over, ends = np.zeros(SHIPS), np.zeros(SHIPS, bool), [None] * SHIPS
+        for _ in range(3):
+            expected, more, ended, told = short.step(np.where(over[:, None], 0.0, outputs))
+            earned += np.where(over, 0.0, more)
+            ends = [told[k] if ended[k] and not over[k] else ends[k] for k in range(SHIPS)]
+            over |= ended
+        np.testing.assert_array_equal(seen, expected)
+        np.testing.assert_array_equal(dones, over)
+        np.testing.assert_allclose(rewards, earned, rtol=1e-6)
+        for k in np.flatnonzero(over):
+            np.testing.assert_array_equal(infos[k]["terminal_observation"], ends[k]["terminal_observation"])
+        endings += over.sum()
+    assert endings == SHIPS * (3 * STEPS // 5)
+
+
 def test_an_output_beyond_its_limits_counts_as_the_limit():
     env, base = BASES["lq"]
     one, other = (ResidualVecEnv(ships(env), base, authority=0.1) for _ in range(2))
@@ -123,6 +147,7 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tm
         (lambda: ResidualVecEnv(ships(COURSE), authority=0.5), "authority: 0.5 found without a base"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0), "authority: 3"),
         (lambda: ResidualVecEnv(ships(COURSE), history=0), "history: 0"),
+        (lambda: ResidualVecEnv(ships(COURSE), hold=0), "hold: 0"),
         (lambda: ResidualVecEnv(ships(COURSE), "lq"), "base: str found"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
         (lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))), "base: the scale of"),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, PID, margin_spread
-from agents.robustness import MarginSpread
+from agents.controllers.robustness import MarginSpread
 from shipgym.errors import InputError
 from shipgym.models import load_model
 

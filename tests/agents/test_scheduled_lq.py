@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, ScheduledLQ, check_controller, fly, load_agent
-from agents.linear_loop import SIGNALS, rate_weight, sample_ship
-from agents.lq import lq_gain
+from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
+from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
 from shipgym.models import load_model
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, Shielded, check_controller, interventions
-from agents.shield import Limits
+from agents.policies.shield import Limits
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask

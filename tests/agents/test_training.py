@@ -67,7 +67,7 @@ def stopping_at(steps):
 @pytest.mark.parametrize(
     ("algorithm", "settings"),
     [
-        ("ppo", {"history": 2, "base": "lqg", "authority": 0.5}),
+        ("ppo", {"history": 2, "base": "lqg", "authority": 0.5, "hold": 3}),
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),

@@ -1,0 +1,80 @@
+"""Agents by their files, whatever their kind, and pretrained ones by name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from agents.controllers.controller import Controller
+from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
+from shipgym.checks import did_you_mean, quoted
+from shipgym.errors import InputError
+from shipgym.json_file import read_json
+from shipgym.models import ShipModel
+
+if TYPE_CHECKING:
+    from agents.policies.policy import LearnedPolicy
+    from agents.policies.shield import Shielded
+
+    Agent: TypeAlias = Controller | LearnedPolicy | Shielded
+
+PRETRAINED = Path(__file__).parent / "pretrained"
+
+
+def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
+    """Read the file of a controller, a learned policy or a shielded one; none needs torch.
+
+    Parameters
+    ----------
+    path : str or Path
+        A file, or the name of a pretrained agent, `mariner-calm-ppo` (`list_pretrained`).
+    model : ShipModel, optional
+        The ship it shall steer; one with other observation scales is refused.
+
+    Returns
+    -------
+    Controller, LearnedPolicy or Shielded
+        Of the kind that was saved.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the field at fault, or the difference to the model.
+    """
+    file, where = find_agent(path), str(path)
+    content = read_json(file, "controller file", REMEDY)
+    agent: Agent
+    if content.get("kind") in POLICIES:
+        from agents.policies.policy_file import read_policy
+
+        agent = read_policy(content, file)
+    else:
+        agent = read_controller(content, where)
+    if model is not None:
+        agent.check_fits_model(model)
+    return agent
+
+
+def list_pretrained() -> list[str]:
+    """Names of the agents that come with the package: task of the suite and algorithm."""
+    return sorted(file.stem for file in PRETRAINED.glob("*.json"))
+
+
+def find_agent(name: str | Path) -> Path:
+    """The file of an agent: as given, or of the pretrained agent of that name.
+
+    Raises
+    ------
+    InputError
+        If it is neither, with the nearest pretrained name.
+    """
+    given = Path(name)
+    if given.suffix == ".json" or given.exists():
+        return given
+    known = list_pretrained()
+    if str(name) not in known:
+        raise InputError(
+            f"agent: '{name}' found, expected a file, or a pretrained agent: {quoted(known)}."
+            f"{did_you_mean(str(name), known)}"
+        )
+    return PRETRAINED / f"{name}.json"

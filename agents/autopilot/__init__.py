@@ -1,0 +1,1 @@
+"""The chain of `shipgym autopilot`: design, flights over the uncertainty, report."""

@@ -1,0 +1,1 @@
+"""The subcommands of `shipgym` and what they print and write."""

@@ -1,0 +1,1 @@
+"""Classical controllers, what they are designed with, and their files."""

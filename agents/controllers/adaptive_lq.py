@@ -1,0 +1,333 @@
+"""Adaptive autopilot: LQ designed anew, while the ship sails, for the steering that is identified.
+
+Sources: Astrom & Wittenmark 1995, Adaptive Control, chapter 4 (self-tuning regulators, certainty
+equivalence); van Amerongen 1982, Adaptive steering of ships; Song 2020, chapter 4 (TMILS,
+`identification.recursive`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.batched_lq import lq_rows, sampled_ships
+from agents.controllers.linear_loop import SIGNALS, length_time
+from agents.controllers.lq import LQ
+from agents.controllers.stateful import Flags, Stateful, heading_error
+from identification.recursive_kernels import scalar_updates
+from shipgym.checks import check_number
+from shipgym.envs.task import RUDDER_WEIGHT
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+from shipgym.models.linear import LARGEST_RUDDER, linearise, straight_running
+from shipgym.simulation.sensors import SEA_TRIAL
+
+Floats = NDArray[np.float64]
+
+# Sway and yaw acceleration each are explained by sway, yaw rate, rudder and what is always there, in the
+# prime system with the instantaneous speed.
+N_TERMS, N_EQUATIONS = 4, 2
+SIZES = np.array([0.05, 0.2, 0.2, 0.02])  # of these in course keeping
+UNEXPLAINED = 2e-3  # of prime accelerations, without noise
+LARGEST_SWAY, LARGEST_TURN = 0.1, 0.25  # prime speeds beyond which steering is not linear
+INNOVATIONS = 3
+WIDEST = 5.0  # factor by which the rudder's effect may differ from that of the design
+
+# What is remembered of a ship.
+THETA = slice(0, N_EQUATIONS * N_TERMS)
+COVARIANCE = slice(THETA.stop, THETA.stop + N_EQUATIONS * N_TERMS**2)
+PAST_TERMS = slice(COVARIANCE.stop, COVARIANCE.stop + (INNOVATIONS - 1) * N_TERMS)
+PAST_TARGETS = slice(PAST_TERMS.stop, PAST_TERMS.stop + (INNOVATIONS - 1) * N_EQUATIONS)
+GAINS = slice(PAST_TARGETS.stop, PAST_TARGETS.stop + len(SIGNALS))
+NEUTRAL = slice(GAINS.stop, GAINS.stop + 2)  # rudder, sway
+LAST = slice(NEUTRAL.stop, NEUTRAL.stop + 4)  # sway, yaw rate, rudder, speed
+STEP, CHANGE, RESTLESS = LAST.stop, LAST.stop + 1, LAST.stop + 2  # steps; of the yaw rate; mean square
+N_MEMORY = RESTLESS + 1
+
+RESTLESS_LIMIT = 1.4  # times what the sensors' noise makes of the yaw rate's second difference
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AdaptiveLQ(Stateful):
+    """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
+
+    It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
+    be linear are not learned from, nor is anything while the yaw rate trembles more than noise explains: in
+    waves, unless they are filtered out. An estimate whose rudder effect is not believable, or whose gains
+    would leave it or the model unstable, changes nothing.
+
+    Attributes
+    ----------
+    prior : array of shape (2, 4)
+        Prime coefficients of the model: sway and yaw acceleration per sway, yaw rate, rudder, and always.
+    """
+
+    kind: ClassVar[str] = "lq-adaptive"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {"prior": ("equations", "terms")}
+
+    prior: Floats
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
+        forgetting_lengths: float = 20.0,
+        redesign_lengths: float = 1.0,
+        noise: float = 1.0,
+    ) -> AdaptiveLQ:
+        """Design on a model, from which the ship may differ.
+
+        Parameters
+        ----------
+        model : ShipModel
+            With sway.
+        dt, integral_lengths, rudder_weight, rate_weight_s2
+            As in `LQ.from_model`, for the model and for what is identified.
+        forgetting_lengths : float
+            Time after which a sample counts 1/e, in times to travel one ship length. A sudden change of the
+            ship is followed within about 10 such times of gentle course changes; a ship that only sails
+            straight shows nothing to learn from, and nothing is forgotten beyond the model.
+        redesign_lengths : float
+            Between two designs, likewise.
+        noise : float
+            Of sway speed and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`). The noisier, the
+            longer the model is believed.
+
+        Returns
+        -------
+        AdaptiveLQ
+
+        Raises
+        ------
+        InputError
+            If the model has no sway or no straight course, or an argument is out of its range.
+        """
+        check_number(forgetting_lengths, "forgetting_lengths", above=0.0)
+        check_number(redesign_lengths, "redesign_lengths", above=0.0)
+        check_number(noise, "noise", at_least=0.0)
+        if not has_sway(model):
+            raise InputError(f"model: {model.name!r} has no sway, expected one with surge, sway and yaw")
+        start = LQ.from_model(
+            model,
+            dt=dt,
+            integral_lengths=integral_lengths,
+            rudder_weight=rudder_weight,
+            rate_weight_s2=rate_weight_s2,
+        )
+        about = straight_running(model)
+        interval, time = start.design["dt"], length_time(model)
+        length, speed = model.particulars["length"], about.surge
+        steering, rudder = linearise(model, about)
+        prior = np.column_stack([steering, rudder, np.zeros(N_EQUATIONS)]) / units(length, speed)
+        prior[:, 3] = -prior[:, 0] * about.sway / speed - prior[:, 2] * about.rudder
+        deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
+        errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
+        return cls(
+            gains=start.gains,
+            neutral_rudder=start.neutral_rudder,
+            neutral_sway=start.neutral_sway,
+            margins=start.margins,
+            observation_scales=start.observation_scales,
+            model_name=start.model_name,
+            model_sha256=start.model_sha256,
+            design={
+                "dt": interval,
+                "integral_time": integral_lengths * time,
+                "rudder_weight": start.design["rudder_weight"],
+                "rate_weight_s2": start.design["rate_weight_s2"],
+                "length": length,
+                "speed": speed,
+                "sway_error": float(errors[0]),
+                "yaw_error": float(errors[1]),
+                "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
+                "gear_lag": model.steering.time_constant,
+                "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
+                "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
+            },
+            prior=prior,
+        )
+
+    @property
+    def memory_size(self) -> int:
+        """Estimate, its covariance, last samples, gains in use."""
+        return N_MEMORY
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """Learn from the last interval, now and then design anew, and feed back."""
+        kept = memory.copy()
+        kept[begins] = self._fresh()
+        speed = np.maximum(np.hypot(seen["surge"], seen["sway"]), 0.1 * self.design["speed"])
+        now = np.stack([seen["sway"], seen["yaw_rate"], seen["rudder"], speed], axis=-1)
+        self._learn(kept, now, begins, self._at_rest(kept, now, begins))
+        kept[:, LAST] = now
+        kept[:, STEP] += 1.0
+        due = np.flatnonzero(kept[:, STEP] % self.design["redesign_steps"] == 0.0)
+        if len(due):
+            kept[due] = self._redesigned(kept[due])
+        rudder, sway = kept[:, NEUTRAL].T
+        signals = (
+            seen["sway"] - sway,
+            seen["yaw_rate"],
+            heading_error(seen),
+            seen["rudder"] - rudder,
+            seen["heading_error_integral"],
+        )
+        order: Floats = rudder + np.einsum("ij,ij->i", kept[:, GAINS], np.stack(signals, axis=-1))
+        return order, kept
+
+    @property
+    def error_size(self) -> Floats:
+        """Of prime accelerations that are not explained, shape (2,)."""
+        return np.array([self.design["sway_error"], self.design["yaw_error"]])
+
+    def _fresh(self) -> Floats:
+        """What is remembered when an episode begins: the design."""
+        memory = np.zeros(N_MEMORY)
+        memory[THETA] = (self.prior * SIZES / self.error_size[:, None]).ravel()
+        memory[COVARIANCE] = np.stack([np.diag(self._doubt()[q]) for q in range(N_EQUATIONS)]).ravel()
+        memory[GAINS] = [self.gains[signal] for signal in SIGNALS]
+        memory[RESTLESS] = 10.0 * self.design["restless_limit"] ** 2  # it must be seen to be calm
+        memory[NEUTRAL] = self.neutral_rudder, self.neutral_sway
+        return memory
+
+    def _doubt(self) -> Floats:
+        """Variance of the model's scaled coefficients, shape (2, 4): each may be as wrong as it is large."""
+        size = np.abs(self.prior * SIZES / self.error_size[:, None])
+        doubt: Floats = np.maximum(size, 0.01) ** 2
+        return doubt
+
+    def _at_rest(self, kept: Floats, now: Floats, begins: Flags) -> Flags:
+        """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
+        change = np.where(begins, 0.0, now[:, 1] - kept[:, LAST][:, 1])
+        trembling = (change - kept[:, CHANGE]) ** 2
+        share = 1.0 / self.design["redesign_steps"]
+        kept[:, RESTLESS] += share * (trembling - kept[:, RESTLESS])
+        kept[:, CHANGE] = change
+        at_rest: Flags = kept[:, RESTLESS] < self.design["restless_limit"] ** 2
+        return at_rest
+
+    def _learn(self, kept: Floats, now: Floats, begins: Flags, at_rest: Flags) -> None:
+        """TMILS with the last interval's mean motion and accelerations; all ships side by side."""
+        last, dt, length = kept[:, LAST], self.design["dt"], self.design["length"]
+        sway, turn, rudder, speed = (0.5 * (last + now)).T
+        speed = np.where(begins, now[:, 3], speed)
+        terms = np.stack([sway / speed, turn * length / speed, rudder, np.ones_like(speed)], axis=-1)
+        targets = (now - last)[:, :2] / dt * np.stack([length / speed**2, (length / speed) ** 2], axis=-1)
+        linear = (
+            (np.abs(terms[:, 0]) < LARGEST_SWAY) & (np.abs(terms[:, 1]) < LARGEST_TURN) & ~begins & at_rest
+        )
+        if not linear.any():
+            return
+        n = int(linear.sum())
+        chosen = kept[linear]
+        rows = chosen[:, PAST_TERMS].reshape(n, INNOVATIONS - 1, N_TERMS)
+        phi = np.concatenate([rows, (terms[linear] / SIZES)[:, None]], axis=1)
+        past = chosen[:, PAST_TARGETS].reshape(n, INNOVATIONS - 1, N_EQUATIONS)
+        y = np.concatenate([past, (targets[linear] / self.error_size)[:, None]], axis=1)
+        self._update(chosen, phi, y)
+        chosen[:, PAST_TERMS] = phi[:, 1:].reshape(n, -1)
+        chosen[:, PAST_TARGETS] = y[:, 1:].reshape(n, -1)
+        kept[linear] = chosen
+
+    def _update(self, chosen: Floats, phi: Floats, y: Floats) -> None:
+        """One step of TMILS for each ship and equation; estimates and covariances are changed in place."""
+        n = len(chosen)
+        signals = n * N_EQUATIONS
+        theta = np.ascontiguousarray(chosen[:, THETA]).reshape(signals, N_TERMS)
+        covariance = np.ascontiguousarray(chosen[:, COVARIANCE]).reshape(signals, N_TERMS, N_TERMS)
+        features = np.ascontiguousarray(np.repeat(phi.transpose(1, 0, 2), N_EQUATIONS, axis=1))
+        targets = np.ascontiguousarray(y.transpose(1, 0, 2).reshape(INNOVATIONS, signals))
+        course = np.empty((1, signals, N_TERMS))
+        ceiling = np.ascontiguousarray(np.tile(self._doubt(), (n, 1)))
+        forgetting = float(self.design["forgetting"])
+        scalar_updates(
+            features,
+            targets,
+            INNOVATIONS - 1,
+            theta,
+            covariance,
+            ceiling,
+            forgetting,
+            INNOVATIONS,
+            0.0,
+            course,
+        )
+        chosen[:, THETA] = theta.reshape(n, -1)
+        chosen[:, COVARIANCE] = covariance.reshape(n, -1)
+
+    def coefficients(self, state: Floats) -> Floats:
+        """Prime coefficients that are identified, of the state that `predict` hands back.
+
+        Parameters
+        ----------
+        state : array of shape (memory_size,) or (n, memory_size)
+
+        Returns
+        -------
+        array of shape (2, 4) or (n, 2, 4)
+            As `prior`.
+        """
+        estimate = np.asarray(state)[..., THETA]
+        scaled = estimate.reshape(*estimate.shape[:-1], N_EQUATIONS, N_TERMS)
+        found: Floats = scaled * self.error_size[:, None] / SIZES
+        return found
+
+    def _redesigned(self, kept: Floats) -> Floats:
+        """What is remembered, with new gains and a new neutral rudder where they can be believed."""
+        new = kept.copy()
+        prime = self.coefficients(kept)
+        share = prime[:, 1, 2] / self.prior[1, 2]
+        linear = prime * units(self.design["length"], self.design["speed"])
+        at_rest = linear[:, :, [0, 2]]
+        solvable = (share > 1.0 / WIDEST) & (share < WIDEST) & (np.linalg.det(at_rest) != 0.0)
+        which = np.flatnonzero(solvable)
+        neutral = np.linalg.solve(at_rest[which], -linear[which, :, 3:])[:, ::-1, 0]  # rudder, sway
+        A, B = sampled_ships(linear[which, :, :3], self.design["gear_lag"], self.design["dt"])
+        rows = lq_rows(
+            A,
+            B,
+            self.design["dt"],
+            self.design["rate_weight_s2"],
+            self.design["integral_time"],
+            self.design.get("rudder_weight", RUDDER_WEIGHT),  # older files name none
+        )
+        good = np.isfinite(rows).all(axis=1) & (np.abs(neutral[:, 0]) < LARGEST_RUDDER)
+        which, neutral, rows, A, B = which[good], neutral[good], rows[good], A[good], B[good]
+        good = _stable(A, B, rows) & _stable(*self._believed, rows)
+        new[which[good], GAINS], new[which[good], NEUTRAL] = rows[good], neutral[good]
+        return new
+
+    @cached_property
+    def _believed(self) -> tuple[Floats, Floats]:
+        """The ship of the model, sampled."""
+        linear = self.prior * units(self.design["length"], self.design["speed"])
+        return sampled_ships(linear[None, :, :3], self.design["gear_lag"], self.design["dt"])
+
+
+def has_sway(model: ShipModel) -> bool:
+    """Whether a ship's steering is that of sway and yaw, which is what is identified."""
+    return "v" in model.state_names and "q" not in model.state_names
+
+
+def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:
+    """Whether ships are held by feedback rows, shape (n,)."""
+    poles = np.linalg.eigvals(A + B[:, :, None] * rows[:, None, :])
+    held: Flags = np.abs(poles).max(axis=1, initial=0.0) < 1.0
+    return held
+
+
+def units(length: float, speed: float) -> Floats:
+    """SI value of prime coefficients of 1, in the order of `AdaptiveLQ.prior`, shape (2, 4)."""
+    sway = np.array([speed / length, speed, speed**2 / length, speed**2 / length])
+    return np.stack([sway, sway / length])

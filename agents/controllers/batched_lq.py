@@ -1,0 +1,127 @@
+"""LQ gains of many sampled ships at once, as `lq_gain` designs one: for designs made while sailing.
+
+Sources: Chu, Fan, Lin & Wang 2004, Structure-preserving algorithms for periodic discrete-time algebraic
+Riccati equations, International Journal of Control 77 (doubling); Anderson & Moore 1990, Optimal Control,
+chapter 3 (cross terms).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER, SIGNALS, YAW_RATE
+from shipgym.envs.task import RUDDER_WEIGHT
+
+Floats = NDArray[np.float64]
+
+N = len(SIGNALS)
+DOUBLINGS = 40  # each doubles the horizon
+ACCURACY = 1e-13
+
+
+def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
+    """Ships with their steering gear, the command held over a control interval (`sample_steering`).
+
+    Parameters
+    ----------
+    linear : array of shape (n, 2, 3)
+        d/dt (v, r) per sway, yaw rate and rudder, SI units.
+    lag : float
+        Of the steering gear, s; 0 for one that follows within the interval.
+    dt : float
+        Control interval, s.
+
+    Returns
+    -------
+    A : array of shape (n, 5, 5)
+    B : array of shape (n, 5)
+    """
+    from scipy.linalg import expm
+
+    n = RUDDER + 1
+    flow = np.zeros((len(linear), n + 1, n + 1))  # of state and command
+    flow[:, :ERROR, :ERROR] = linear[:, :, :ERROR]
+    flow[:, ERROR, YAW_RATE] = -1.0
+    if lag > 0.0:
+        flow[:, :ERROR, RUDDER] = linear[:, :, ERROR]
+        flow[:, RUDDER, RUDDER], flow[:, RUDDER, n] = -1.0 / lag, 1.0 / lag
+    else:
+        flow[:, :ERROR, n] = linear[:, :, ERROR]
+    held = expm(dt * flow)
+    A, B = np.zeros((len(linear), N, N)), np.zeros((len(linear), N))
+    A[:, :n, :n], B[:, :n] = held[:, :n, :n], held[:, :n, n]
+    if lag == 0.0:
+        A[:, RUDDER], B[:, RUDDER] = 0.0, 1.0
+    A[:, INTEGRAL] = dt * A[:, ERROR]
+    A[:, INTEGRAL, INTEGRAL], B[:, INTEGRAL] = 1.0, dt * B[:, ERROR]
+    return A, B
+
+
+def lq_rows(
+    A: Floats,
+    B: Floats,
+    dt: float,
+    rate_weight: float,
+    integral_time: float,
+    rudder_weight: float = RUDDER_WEIGHT,
+) -> Floats:
+    """Feedback rows of order = row x that minimise the environment's cost, one a ship.
+
+    Parameters
+    ----------
+    A, B : arrays of shape (n, 5, 5) and (n, 5)
+        Sampled ships.
+    dt : float
+        Control interval, s.
+    rate_weight, integral_time, rudder_weight : float
+        As in `agents.controllers.lq.lq_gain`.
+
+    Returns
+    -------
+    array of shape (n, 5)
+        NaN where no stabilising gain was found.
+    """
+    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
+    rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
+    C, D = A[:, rows].copy(), B[:, rows]
+    C[:, 2, RUDDER] -= 1.0
+    C, D, column = weights[:, None] * C, (weights * D)[:, :, None], B[:, :, None]
+    Ct, Dt, row = C.transpose(0, 2, 1), D.transpose(0, 2, 1), B[:, None, :]
+    R, S = Dt @ D, Dt @ C
+    plain = A - column @ (S / R)  # with commands that take the cross term away
+    X = riccati(plain, column @ (row / R), Ct @ C - S.transpose(0, 2, 1) @ (S / R))
+    gain: Floats = (row @ X @ A + S) / (R + row @ X @ column)
+    return -gain[:, 0]
+
+
+def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
+    """Stabilising solutions X of X = A'X (I + G X)^-1 A + H, by doubling.
+
+    Parameters
+    ----------
+    A, G, H : arrays of shape (n, m, m)
+        G and H symmetric, not negative; all are overwritten.
+
+    Returns
+    -------
+    array of shape (n, m, m)
+        NaN where the doubling did not settle.
+    """
+    eye = np.eye(A.shape[-1])
+    settled = np.zeros(len(A), dtype=np.bool_)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(DOUBLINGS):
+            going = ~settled & np.isfinite(H).all(axis=(1, 2))
+            if not going.any():
+                break
+            a, g, h = A[going], G[going], H[going]
+            left = np.linalg.solve(eye + g @ h, np.concatenate([a, g], axis=2))
+            wa, wg = left[:, :, : len(eye)], left[:, :, len(eye) :]
+            at = a.transpose(0, 2, 1)
+            more = at @ h @ wa
+            A[going], G[going], H[going] = a @ wa, g + a @ wg @ at, h + 0.5 * (more + more.transpose(0, 2, 1))
+            size = np.abs(H[going]).max(axis=(1, 2))
+            settled[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
+    H[~settled] = np.nan
+    return H

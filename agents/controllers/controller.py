@@ -1,0 +1,285 @@
+"""The classical autopilots' common part: from what the environment shows to the rudder.
+
+A controller is a list of gains on deviations from straight running. By itself it keeps no state: the integral
+of the heading error, with its anti-windup, is part of the observation.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.linear_loop import (
+    Compensator,
+    Margins,
+    SampledShip,
+    compensator_margins,
+    feedback_row,
+    sample_ship,
+)
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+Action = NDArray[np.float32]
+
+SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
+
+
+class Policy(Protocol):
+    """Anything that steers: our controllers, stable-baselines3's agents, a user's own."""
+
+    def predict(
+        self,
+        observation: Any,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Any, Any]:
+        """Actions for observations of shape (n_observations,) or (n, n_observations), and the state."""
+
+
+@dataclass(frozen=True, eq=False)
+class Controller:
+    """Feedback of deviations from straight running to the commanded rudder.
+
+    Attributes
+    ----------
+    gains : dict of str to float
+        By the names of `feedback`, SI units: rad of rudder per rad, rad/s, rad s or m/s.
+    neutral_rudder : float
+        Rudder at which the ship runs straight, rad.
+    neutral_sway : float
+        Sway speed in straight running, m/s.
+    margins : Margins
+        Of the loop with the model it was designed on.
+    observation_scales : tuple of float
+        Physical value of each observation of 1, SI units; the rudder's is also the action's.
+    model_name, model_sha256 : str
+        The model it was designed on, and a hash of its structure and numbers.
+    design : dict of str to float
+        How it was designed: settings and intermediate results.
+    observation_names : tuple of str
+        What it observes.
+    """
+
+    kind: ClassVar[str] = ""
+    #: For each gain the signal it acts on and the sign with which it does.
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
+    #: What it observes, and names of its gains where they are not those of `feedback`.
+    observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    gain_names: ClassVar[tuple[str, ...]] = ()
+    #: Whether it leads another controller, its `autopilot`, which the file holds too.
+    has_autopilot: ClassVar[bool] = False
+    #: Arrays that the file holds beside the gains: names of fields, and of the lengths of their axes.
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+
+    gains: dict[str, float]
+    neutral_rudder: float
+    neutral_sway: float
+    margins: Margins
+    observation_scales: tuple[float, ...]
+    model_name: str
+    model_sha256: str
+    design: dict[str, float] = field(default_factory=dict)
+    observation_names: tuple[str, ...] = OBSERVATION_NAMES
+
+    @classmethod
+    def designed(
+        cls,
+        model: ShipModel,
+        ship: SampledShip,
+        gains: dict[str, float],
+        design: dict[str, float],
+        **more: Any,
+    ) -> Self:
+        """The controller with these gains, its margins computed.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The model it was designed on.
+        ship : SampledShip
+            The same, linearised and sampled.
+        gains : dict of str to float
+            By the names of `feedback`.
+        design : dict of str to float
+            How they were found.
+        **more
+            Further fields of the class.
+
+        Raises
+        ------
+        InputError
+            If the closed loop is unstable.
+        """
+        unknown = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
+        found = cls(
+            gains=gains,
+            neutral_rudder=ship.about.rudder,
+            neutral_sway=ship.about.sway,
+            margins=unknown,
+            observation_scales=tuple(observation_scales(model).tolist()),
+            model_name=model.name,
+            model_sha256=model_hash(model),
+            design={"dt": ship.dt, **design},
+            **more,
+        )
+        return replace(found, margins=found._margins(ship, model))
+
+    def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
+        return compensator_margins(ship, self.loop(), f"{type(self).__name__} on model '{model.name}'")
+
+    def loop(self) -> Compensator:
+        """The controller for small motions, without limits: what its margins are computed from."""
+        by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
+        return Compensator.static(feedback_row(by_signal))
+
+    def margins_on(self, model: ShipModel) -> Margins:
+        """Margins and bandwidth of the same controller on another ship.
+
+        Raises
+        ------
+        InputError
+            If the closed loop is unstable, or the model has no straight course.
+        """
+        return self._margins(sample_ship(model, self.design["dt"]), model)
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships.
+
+        What there is to remember is in the state that `predict` hands back, so one controller may steer
+        any number of episodes side by side.
+        """
+
+    @property
+    def name(self) -> str:
+        """Short name: `pid`, `lq`."""
+        return self.kind
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Action, Any]:
+        """Commanded rudder for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of any of the environments: it steers by the first eight, those of course keeping, whose
+            heading error is against the line-of-sight course where a path is followed.
+        state, episode_start, deterministic
+            Not used: the controller has no memory and no chance in it.
+
+        Returns
+        -------
+        action : float32 array of shape (1,) or (n, 1)
+            Part of the rudder limit, in [-1, 1].
+        state
+            As given.
+
+        Raises
+        ------
+        InputError
+            If the observation has fewer entries, or another number of dimensions.
+        """
+        seen, n = np.asarray(observation, dtype=np.float64), len(self.observation_names)
+        if seen.ndim not in (1, 2) or seen.shape[-1] < n:
+            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n}), or more")
+        deviations = self._deviations(seen[..., :n])
+        order = np.full(seen.shape[:-1], self.neutral_rudder)
+        for gain, (signal, sign) in self.feedback.items():
+            order = order + sign * self.gains[gain] * deviations[signal]
+        limit = self.observation_scales[self.observation_names.index("rudder")]
+        return np.clip(order / limit, -1.0, 1.0)[..., None].astype(np.float32), state
+
+    def _deviations(self, seen: Floats) -> dict[str, Floats]:
+        """Deviations from straight running by signal, SI units, each of shape (...)."""
+        values = dict(zip(self.observation_names, (seen * self.observation_scales).T, strict=True))
+        return {
+            "heading_error": np.arctan2(values["heading_error_sin"], values["heading_error_cos"]),
+            "yaw_rate": values["yaw_rate"],
+            "sway": values["sway"] - self.neutral_sway,
+            "rudder": values["rudder"] - self.neutral_rudder,
+            "heading_error_integral": values["heading_error_integral"],
+        }
+
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `observation_names` of an environment; it may show more than what is steered by.
+        scales : sequence of float
+            Its `observation_scales`.
+        where : str
+            Start of the message.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        n = len(self.observation_names)
+        check_names(names[:n], self.observation_names, where)
+        check_scales(
+            names[:n], scales[:n], self.observation_scales, where,
+            f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
+            f"rudder limit; design a controller on this model with {type(self).__name__}.from_model",
+        )  # fmt: skip
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
+        self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
+
+    def save(self, path: str | Path) -> None:
+        """Write the controller as a JSON file (format in `agents.controllers.controller_file`)."""
+        from agents.controllers.controller_file import save
+
+        save(self, Path(path))
+
+
+def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
+    """Refuse observations by other names or in another order, naming the first difference."""
+    for i, (one, other) in enumerate(zip(found, expected, strict=False)):
+        if one != other:
+            raise InputError(f"{where}: observation {i} is '{one}', expected '{other}'")
+    if len(found) != len(expected):
+        difference = [name for name in (*found, *expected) if (name in found) != (name in expected)]
+        raise InputError(
+            f"{where}: {len(found)} observations found, expected {len(expected)}; "
+            f"in one and not in the other: {', '.join(difference)}"
+        )
+
+
+def check_scales(
+    names: Sequence[str], found: Sequence[float], expected: Sequence[float], where: str, meant: str
+) -> None:
+    """Refuse observations in other scales, naming the first difference; `meant` has {} for what is meant."""
+    for name, one, other in zip(names, found, expected, strict=True):
+        if abs(one - other) > SCALE_TOLERANCE * abs(other):
+            said = meant.replace("{}", f"{other:g}")
+            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
+
+
+def model_hash(model: ShipModel) -> str:
+    """SHA-256 of a model's structure, coefficients, particulars and steering gear."""
+    content = [
+        model.dynamics.to_dict(),
+        model.coefficients,
+        model.particulars.to_dict(),
+        model.steering.to_dict(),
+    ]
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

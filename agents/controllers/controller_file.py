@@ -1,0 +1,214 @@
+"""The controller file: JSON, versioned, written whole or not at all, validated field by field on reading.
+
+Format 1:
+
+    format               1
+    kind                 "pid", "lq", ... (`HOMES`)
+    observation_names    what it observes, in order
+    observation_scales   physical value of each observation of 1, SI units
+    gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
+    neutral_rudder       rad, positive to starboard
+    neutral_sway         m/s
+    model                {"name", "sha256"}: what it was designed on
+    margins              {name: value or null for no limit}
+    design               {name: value}: how it was designed
+    autopilot            a controller of this format; only of guidance
+    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.controllers.controller import Controller, check_names
+from agents.controllers.linear_loop import Margins
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    quoted,
+)
+from shipgym.errors import InputError
+from shipgym.json_file import write_json
+
+FORMAT = 1
+REMEDY = "design the controller again or take another copy"
+FIELDS = (
+    "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
+    "model", "margins", "design",
+)  # fmt: skip
+MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
+POLICIES = ("learned", "shielded")  # whose files are described in `agents.policies.policy_file`
+HOMES = {
+    "pid": ("agents.controllers.pid", "PID"),
+    "pid-filtered": ("agents.controllers.filtered_pid", "FilteredPID"),
+    "lq": ("agents.controllers.lq", "LQ"),
+    "lqg": ("agents.controllers.lqg", "LQG"),
+    "lq-scheduled": ("agents.controllers.scheduled_lq", "ScheduledLQ"),
+    "lq-adaptive": ("agents.controllers.adaptive_lq", "AdaptiveLQ"),
+    "mpc": ("agents.controllers.mpc", "MPC"),
+    "los": ("agents.controllers.los_autopilot", "LineOfSight"),
+    "ilos": ("agents.controllers.los_autopilot", "IntegralLineOfSight"),
+    "alos": ("agents.controllers.los_autopilot", "AdaptiveLineOfSight"),
+}
+
+
+def save(controller: Controller, path: Path) -> None:
+    """Write a controller file: to a temporary name, then renamed.
+
+    Raises
+    ------
+    InputError
+        If the folder does not exist or cannot be written.
+    """
+    write_json(controller_content(controller), path)
+
+
+def controller_content(controller: Controller) -> dict[str, Any]:
+    """What a controller's file holds."""
+    margins = asdict(controller.margins)
+    content: dict[str, Any] = {
+        "format": FORMAT,
+        "kind": controller.kind,
+        "observation_names": list(controller.observation_names),
+        "observation_scales": list(controller.observation_scales),
+        "gains": controller.gains,
+        "neutral_rudder": controller.neutral_rudder,
+        "neutral_sway": controller.neutral_sway,
+        "model": {"name": controller.model_name, "sha256": controller.model_sha256},
+        "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
+        "design": controller.design,
+    }
+    if controller.arrays:
+        content["arrays"] = {name: getattr(controller, name).tolist() for name in controller.arrays}
+    if controller.has_autopilot:
+        content["autopilot"] = controller_content(getattr(controller, "autopilot"))  # noqa: B009
+    return content
+
+
+def read_controller(content: Mapping[str, Any], where: str) -> Controller:
+    """A classical controller from what `controller_content` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
+    if "format" in content and content["format"] != FORMAT:
+        raise InputError(
+            f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
+        )
+    if "kind" in content:
+        kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
+        if kind in POLICIES:
+            raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(HOMES)}")
+    check_keys(content, (*FIELDS, *MORE_FIELDS), where)
+    _check_all_there(content, FIELDS, where)
+    home, name = HOMES[content["kind"]]
+    design: type[Controller] = getattr(import_module(home), name)
+    has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
+    expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
+    check_keys(content, expected, where)
+    _check_all_there(content, expected, where)
+    model = check_table(content["model"], f"{where}: model")
+    check_keys(model, ("name", "sha256"), f"{where}: model")
+    _check_observations(content["observation_names"], design.observes, where)
+    more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
+    if design.has_autopilot:
+        more["autopilot"] = read_controller(
+            check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
+        )
+    return design(
+        gains=_numbers(content["gains"], design.gain_names or tuple(design.feedback), f"{where}: gains"),
+        neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
+        neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
+        margins=_margins(content["margins"], f"{where}: margins"),
+        observation_scales=_scales(content["observation_scales"], design.observes, where),
+        model_name=check_text(model.get("name"), f"{where}: model.name"),
+        model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
+        design=_design(content["design"], f"{where}: design"),
+        observation_names=design.observes,
+        **more,
+    )
+
+
+def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
+    for name in expected:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(expected)}")
+
+
+def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict[str, Any]:
+    """Arrays of finite numbers, whose axes of one name have one length."""
+    table = check_table(value, where)
+    check_keys(table, tuple(axes), where)
+    lengths: dict[str, int] = {}
+    arrays = {}
+    for name, named in axes.items():
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
+        try:
+            array = np.array(table[name], dtype=np.float64)
+        except (TypeError, ValueError):
+            raise InputError(f"{where}.{name}: expected nested lists of numbers; {REMEDY}") from None
+        fits = array.ndim == len(named) and bool(np.isfinite(array).all())
+        if fits:
+            fits = all(lengths.setdefault(axis, n) == n for axis, n in zip(named, array.shape, strict=True))
+        if not fits:
+            raise InputError(
+                f"{where}.{name}: shape {array.shape} or a number that is not finite found, expected finite "
+                f"numbers of shape ({', '.join(named)}); {REMEDY}"
+            )
+        arrays[name] = array
+    return arrays
+
+
+def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> None:
+    """The observations must be those of the environment, in its order."""
+    if not isinstance(names, list):
+        raise InputError(f"{where}: observation_names: {names!r} found, expected a list of names")
+    check_names([str(name) for name in names], expected, f"{where}: observation_names")
+
+
+def _scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+    n = len(names)
+    if not isinstance(value, list) or len(value) != n:
+        found = len(value) if isinstance(value, list) else repr(value)
+        raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
+    return tuple(
+        check_number(scale, f"{where}: observation_scales[{i}] ('{names[i]}')", above=0.0)
+        for i, scale in enumerate(value)
+    )
+
+
+def _numbers(value: Any, names: tuple[str, ...], where: str) -> dict[str, float]:
+    """A finite number for each name and none besides."""
+    table = check_table(value, where)
+    check_keys(table, names, where)
+    for name in names:
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(names)}")
+    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+
+
+def _margins(value: Any, where: str) -> Margins:
+    """Margins; null is no limit."""
+    names = tuple(margin.name for margin in fields(Margins))
+    table = check_table(value, where)
+    finite = {name: number for name, number in table.items() if number is not None}
+    unlimited = {name: np.inf for name, number in table.items() if number is None}
+    known = _numbers({**finite, **dict.fromkeys(unlimited, 0.0)}, names, where)
+    return Margins(**{**known, **unlimited})
+
+
+def _design(value: Any, where: str) -> dict[str, float]:
+    table = check_table(value, where)
+    return {name: check_number(number, f"{where}.{name}") for name, number in table.items()}

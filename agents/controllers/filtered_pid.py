@@ -1,0 +1,226 @@
+"""PID autopilot with what ships carry around it: reference filter, anti-windup and wave filter.
+
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.2.1 (third-order reference
+model), 11.1.2 (notch filter), 12.2.6 (heading autopilot with feedforward); Astrom & Hagglund 2006, Advanced
+PID Control, 3.5 (back-calculation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, sample_ship
+from agents.controllers.pid import PID
+from agents.controllers.stateful import Flags, Stateful, heading_error
+from shipgym.checks import check_number
+from shipgym.envs.task import control_interval
+from shipgym.guidance import wrapped
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+
+DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator (Fossen 2011, 11.1.2)
+# what is remembered: last measured error and yaw rate, the reference's lead over the course with its first
+# and second derivative, the integral, and the notch's four numbers of heading and of yaw rate
+LAST_ERROR, LAST_RATE, LEAD, TURN, TURN_RATE, GATHERED, NOTCHES = range(7)
+N_MEMORY = NOTCHES + 8
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class FilteredPID(Stateful):
+    """PID whose course is a smooth reference, whose integral does not wind up, and which is deaf to waves.
+
+    order = neutral + proportional * (reference - heading) + derivative * (reference's rate - yaw rate)
+    + integral of that error. The integral is its own, not the environment's: what the rudder's limit cuts off
+    is taken back from it (back-calculation).
+    """
+
+    kind: ClassVar[str] = "pid-filtered"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = PID.feedback
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        frequency: float | None = None,
+        damping: float | None = None,
+        integral_lengths: float = 20.0,
+        reference_share: float = 3.0,
+        largest_turn_rate_deg_s: float | None = None,
+        tracking_lengths: float = 2.0,
+        wave_period: float | None = None,
+    ) -> FilteredPID:
+        """Design on a model: PID's gains, and the filters around them.
+
+        Parameters
+        ----------
+        model : ShipModel
+            Stable or unstable on its course.
+        dt, frequency, damping, integral_lengths
+            As in `PID.from_model`.
+        reference_share : float
+            Natural frequency of the reference model over that of the loop. Less turns slower and with less
+            rudder; infinite leaves the reference filter out.
+        largest_turn_rate_deg_s : float, optional
+            Of the reference, degrees per second; by default none.
+        tracking_lengths : float
+            Time in which the integral gives back what the limit cuts off, in times to travel one ship length;
+            infinite leaves the anti-windup out.
+        wave_period : float, optional
+            Of the first-order motion as it is met, s: heading and yaw rate go through a notch there.
+
+        Returns
+        -------
+        FilteredPID
+
+        Raises
+        ------
+        InputError
+            If the model has no straight course, an argument is out of its range, or the loop is unstable.
+        """
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        plain = PID.from_model(
+            model, dt=interval, frequency=frequency, damping=damping, integral_lengths=integral_lengths
+        )
+        share = 0.0 if np.isposinf(reference_share) else 1.0
+        if share:
+            share = check_number(reference_share, "reference_share", above=0.0)
+        tracking = 0.0
+        if not np.isposinf(tracking_lengths):
+            length_time = model.particulars["length"] / model.particulars["speed"]
+            tracking = 1.0 / (check_number(tracking_lengths, "tracking_lengths", above=0.0) * length_time)
+        turn_rate = 0.0  # none
+        if largest_turn_rate_deg_s is not None:
+            turn_rate = np.radians(
+                check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
+            )
+        if wave_period is not None:
+            check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
+        return cls.designed(
+            model,
+            sample_ship(model, interval),
+            gains=plain.gains,
+            design={
+                **plain.design,
+                "reference_frequency": share * plain.design["frequency"],
+                "largest_turn_rate": float(turn_rate),
+                "tracking_rate": tracking,
+                "wave_frequency": 0.0 if wave_period is None else 2.0 * np.pi / wave_period,
+            },
+        )
+
+    @property
+    def memory_size(self) -> int:
+        """Reference, integral and the memories of two notch filters."""
+        return N_MEMORY
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """One control interval of filters and feedback."""
+        dt, gains = self.design["dt"], self.gains
+        kept = memory.copy()
+        error, rate = heading_error(seen), seen["yaw_rate"]
+        # a change of the heading error that is not the ship's own turning is one of the course
+        turned = 0.5 * dt * (rate + memory[:, LAST_RATE])
+        course_change = np.where(begins, 0.0, wrapped(error - memory[:, LAST_ERROR] + turned))
+        kept[:, LAST_ERROR], kept[:, LAST_RATE] = error, rate
+        kept[begins, LEAD] = -error[begins]  # the reference sets out from the heading
+        lead, turn = self._reference(kept, course_change)
+        quiet_error, quiet_rate = error, rate
+        if self.design["wave_frequency"]:
+            quiet_error = wrapped(error - self._notched(error, course_change, kept, NOTCHES, begins))
+            still = np.zeros_like(rate)
+            quiet_rate = rate - self._notched(rate, still, kept, NOTCHES + 4, begins)
+        off = wrapped(quiet_error + lead)
+        gathered = memory[:, GATHERED] + np.where(begins, 0.0, dt * off)
+        order = self.neutral_rudder + gains["proportional"] * off + gains["derivative"] * (turn - quiet_rate)
+        order = order + gains["integral"] * gathered
+        limit = self.observation_scales[self.observation_names.index("rudder")]
+        cut = np.clip(order, -limit, limit) - order
+        if self.design["tracking_rate"] and gains["integral"] > 0.0:
+            gathered = gathered + dt * self.design["tracking_rate"] * cut / gains["integral"]
+        kept[:, GATHERED] = gathered
+        return order, kept
+
+    def _reference(self, kept: Floats, course_change: Floats) -> tuple[Floats, Floats]:
+        """Lead of the reference over the course, and the reference's turn rate, an interval later.
+
+        A third-order reference model (w / (s + w)) w^2 / (s^2 + 2 w s + w^2) with the course as input, which
+        is written for the lead, reference minus course: only that is known.
+        """
+        frequency, dt = self.design["reference_frequency"], self.design["dt"]
+        if frequency == 0.0:
+            return np.zeros_like(course_change), np.zeros_like(course_change)
+        lead = wrapped(kept[:, LEAD] - course_change)
+        turn, turn_rate = kept[:, TURN], kept[:, TURN_RATE]
+        jerk = -3.0 * frequency * turn_rate - 3.0 * frequency**2 * turn - frequency**3 * lead
+        turn_rate = turn_rate + dt * jerk
+        turn = turn + dt * turn_rate
+        if largest := self.design["largest_turn_rate"]:
+            turn = np.clip(turn, -largest, largest)
+        lead = wrapped(lead + dt * turn)
+        kept[:, LEAD], kept[:, TURN], kept[:, TURN_RATE] = lead, turn, turn_rate
+        return lead, turn
+
+    def _notched(self, signal: Floats, shift: Floats, kept: Floats, at: int, begins: Flags) -> Floats:
+        """What the notch takes away from a signal whose past is shifted with the course; 0 at the start."""
+        x1, x2 = kept[:, at] + shift, kept[:, at + 1] + shift
+        x1, x2 = np.where(begins, signal, x1), np.where(begins, signal, x2)
+        signal = x1 + wrapped(signal - x1)
+        band, once, twice = notch_band(self.design["wave_frequency"] * self.design["dt"])
+        taken: Floats = band * (signal - x2) - once * kept[:, at + 2] - twice * kept[:, at + 3]
+        kept[:, at + 3], kept[:, at + 1] = kept[:, at + 2], x1
+        kept[:, at + 2], kept[:, at] = taken, signal
+        return taken
+
+    def loop(self) -> Compensator:
+        """Integral, and the notch where there is one; the reference is outside of the loop."""
+        dt, gains, frequency = self.design["dt"], self.gains, self.design["wave_frequency"]
+        look = np.zeros((2, len(SIGNALS)))
+        look[0, ERROR] = look[1, YAW_RATE] = 1.0
+        row = np.array([gains["proportional"] + gains["integral"] * dt, -gains["derivative"]])
+        inner = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.eye(2)
+        if frequency:
+            inner = _two_notches(frequency * dt)
+        a, b, c, d = inner
+        n = len(a)
+        A = np.zeros((n + 1, n + 1))
+        A[:n, :n], A[n, n], A[n, :n] = a, 1.0, dt * c[0]
+        B = np.vstack([b @ look, dt * d[:1] @ look])
+        C = np.append(row @ c, gains["integral"])[None]
+        return Compensator(A, B, C, (row @ d @ look)[None])
+
+
+def notch_band(turn: float) -> tuple[float, float, float]:
+    """Band-pass that a notch takes away, discretised bilinearly at `turn` rad an interval.
+
+    Parameters
+    ----------
+    turn : float
+
+    Returns
+    -------
+    band, once, twice : float
+        taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice taken[k - 2].
+    """
+    k = np.tan(0.5 * turn)
+    per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)
+    band = 2.0 * (WIDE - DEEP) * k * per
+    return band, 2.0 * (k * k - 1.0) * per, (1.0 - 2.0 * WIDE * k + k * k) * per
+
+
+def _two_notches(turn: float) -> tuple[Floats, Floats, Floats, Floats]:
+    """State space of the notch on error and yaw rate side by side."""
+    import control  # here, because it takes a second to import
+    from scipy.linalg import block_diag
+
+    band, once, twice = notch_band(turn)
+    notch = control.tf2ss([1.0 - band, once, twice + band], [1.0, once, twice], True)
+    a, b, c, d = (np.asarray(block_diag(one, one)) for one in (notch.A, notch.B, notch.C, notch.D))
+    return a, b, c, d

@@ -1,0 +1,280 @@
+"""Paths over any heading autopilot: line of sight, and its integral and adaptive forms against drift.
+
+The path-following environment shows the heading error against its own line-of-sight course. These controllers
+work out another course from the cross-track error and hand the heading error against that to the autopilot.
+
+Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3 (line of sight);
+Borhaug, Pavlov & Pettersen 2008 (integral line of sight, see `shipgym.guidance`); Fossen 2023, An adaptive
+line-of-sight (ALOS) guidance law for path following of aircraft and marine craft, IEEE Transactions on
+Control Systems Technology 31 (adaptive).
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.controller import Action, Controller, Policy
+from agents.controllers.linear_loop import Compensator, Margins, length_time
+from agents.controllers.lq import LQ
+from shipgym.checks import check_number
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.task import INTEGRAL_ZONE
+from shipgym.errors import InputError
+from shipgym.guidance import PathPosition, integral_line_of_sight, wrapped
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+
+N_HEADING = len(OBSERVATION_NAMES)
+CRITICAL = 4.0  # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double root
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Guided(Controller):
+    """A heading autopilot that is led along a path.
+
+    The state that `predict` takes and hands back is a pair: what the guidance remembers of each ship, and the
+    autopilot's own state.
+
+    Attributes
+    ----------
+    autopilot : Policy
+        Steers by the first eight observations, those of course keeping.
+    """
+
+    observes: ClassVar[tuple[str, ...]] = (*OBSERVATION_NAMES, "cross_track")
+    gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead", "integral")
+    has_autopilot: ClassVar[bool] = True
+
+    autopilot: Policy
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        autopilot: Policy | None = None,
+        task: PathFollowingTask | None = None,
+        lookahead_lengths: float | None = None,
+        integral_lengths: float | None = None,
+    ) -> Self:
+        """Lead an autopilot along the paths of a task.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The ship.
+        autopilot : Policy, optional
+            Any heading autopilot, also one that was learned; by default `LQ.from_model(model)`.
+        task : PathFollowingTask, optional
+            Its lookahead, corridor and control interval are used; by default the environment's own.
+        lookahead_lengths : float, optional
+            Ship lengths; by default that of the task. Longer turns gentler, shorter comes back sooner.
+        integral_lengths : float, optional
+            Time over which a steady cross-track error is integrated to as much again, in times to travel
+            one ship length. By default 4 times `lookahead_lengths`, with which the way back to the path is
+            critically damped; less swings, more is slower.
+
+        Returns
+        -------
+        LineOfSight, IntegralLineOfSight or AdaptiveLineOfSight
+
+        Raises
+        ------
+        InputError
+            If an argument is out of its range or the autopilot was designed for another ship.
+        """
+        asked = task or PathFollowingTask()
+        length = model.particulars["length"]
+        if lookahead_lengths is None:
+            lookahead_lengths = asked.lookahead
+        check_number(lookahead_lengths, "lookahead_lengths", above=0.0)
+        if integral_lengths is None:
+            integral_lengths = CRITICAL * lookahead_lengths
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        pilot = LQ.from_model(model, dt=asked.interval(model)) if autopilot is None else autopilot
+        known = isinstance(pilot, Controller)
+        like = pilot if isinstance(pilot, Controller) else LQ.from_model(model, dt=asked.interval(model))
+        like.check_fits_model(model)
+        scales = {quantity.name: quantity.scale for quantity in asked.observed(model)}
+        return cls(
+            gains={
+                "lookahead": lookahead_lengths * length,
+                "task_lookahead": asked.lookahead * length,
+                "integral": 1.0 / (integral_lengths * length_time(model)),
+            },
+            neutral_rudder=like.neutral_rudder,
+            neutral_sway=like.neutral_sway,
+            margins=like.margins if known else Margins(np.inf, np.inf, np.inf, np.inf),
+            observation_scales=tuple(scales[name] for name in cls.observes),
+            model_name=like.model_name,
+            model_sha256=like.model_sha256,
+            design={"dt": asked.interval(model), "integral_lengths": float(integral_lengths)},
+            observation_names=cls.observes,
+            autopilot=pilot,
+        )
+
+    @abstractmethod
+    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+        """Course to steer against that of the leg, and what is remembered of the drift next.
+
+        Parameters
+        ----------
+        cross_track : array of shape (n,)
+            m, positive to starboard of the leg.
+        drift : array of shape (n,)
+            What was remembered.
+
+        Returns
+        -------
+        course : array of shape (n,)
+            rad.
+        drift : array of shape (n,)
+        """
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Action, Any]:
+        """Commanded rudder for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of the path-following environment.
+        state : tuple, optional
+            What the last call handed back; None where episodes begin.
+        episode_start : bool or array-like of bool of shape (n,), optional
+            Where an episode begins and the state is that of the one before.
+        deterministic : bool
+            Handed on to the autopilot.
+
+        Returns
+        -------
+        action : float32 array of shape (1,) or (n, 1)
+            Part of the rudder limit, in [-1, 1].
+        state : tuple
+            For the next call.
+
+        Raises
+        ------
+        InputError
+            If the observation has fewer entries or another number of dimensions, or the state is not one
+            of as many ships.
+        """
+        given, n = np.array(observation, dtype=np.float64), len(self.observes)
+        if given.ndim not in (1, 2) or given.shape[-1] < n:
+            raise InputError(
+                f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: of the "
+                f"path-following environment"
+            )
+        memory, inner, begins = _remembered(state, episode_start, given.shape[:-1])
+        cross = given[..., N_HEADING] * self.observation_scales[N_HEADING]
+        wanted, drift = self.course(cross, memory[..., 0])
+        shown = -np.arctan2(cross, self.gains["task_lookahead"])
+        error = wrapped(np.arctan2(given[..., 0], given[..., 1]) + wanted - shown)
+        reach = self.observation_scales[N_HEADING - 1]
+        gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
+        integral = np.clip(memory[..., 1] + gathered, -reach, reach)
+        seen = given[..., :N_HEADING]
+        seen[..., 0], seen[..., 1], seen[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
+        starts = None if inner is None else np.atleast_1d(begins)
+        action, inner = self.autopilot.predict(seen.astype(np.float32), inner, starts, deterministic)
+        return action, (np.stack([drift, integral], axis=-1), inner)
+
+    def loop(self) -> Compensator:
+        """Of the heading autopilot: guidance is slower by far."""
+        return self._heading_autopilot("its margins").loop()
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship that the autopilot was not designed for."""
+        if isinstance(self.autopilot, Controller):
+            self.autopilot.check_fits_model(model)
+
+    def save(self, path: str | Path) -> None:
+        """Write guidance and autopilot as one JSON file (format in `agents.controllers.controller_file`)."""
+        self._heading_autopilot("a file")
+        super().save(path)
+
+    def _heading_autopilot(self, what: str) -> Controller:
+        if not isinstance(self.autopilot, Controller):
+            raise InputError(
+                f"autopilot: {type(self.autopilot).__name__} found, expected a controller of shipgym "
+                f"for {what}"
+            )
+        return self.autopilot
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LineOfSight(Guided):
+    """Steer for the point of the leg that lies the lookahead ahead (Fossen 2011, 10.3.2).
+
+    A steady current sets the ship off the path.
+    """
+
+    kind: ClassVar[str] = "los"
+
+    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+        """See `Guided.course`; nothing is remembered."""
+        course: Floats = -np.arctan2(cross_track, self.gains["lookahead"])
+        return course, drift
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IntegralLineOfSight(Guided):
+    """Line of sight with an integral of the cross-track error, which ends at 0 in a steady current."""
+
+    kind: ClassVar[str] = "ilos"
+
+    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+        """See `Guided.course`; the integral is remembered, m."""
+        zero = np.zeros_like(cross_track)
+        where = PathPosition(along=zero, cross_track=cross_track, course=zero, to_go=zero)
+        gain, dt = self.gains["integral"], self.design["dt"]
+        return integral_line_of_sight(where, self.gains["lookahead"], drift, gain, dt)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AdaptiveLineOfSight(Guided):
+    """Line of sight less an estimate of the crab angle (Fossen 2023), which a steady current brings to 0."""
+
+    kind: ClassVar[str] = "alos"
+
+    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+        """See `Guided.course`; the estimated crab angle is remembered, rad."""
+        lookahead = self.gains["lookahead"]
+        rate = self.gains["integral"] * cross_track / np.hypot(lookahead, cross_track)
+        return -drift - np.arctan2(cross_track, lookahead), drift + self.design["dt"] * rate
+
+
+#: Guidance laws by kind.
+LAWS: Mapping[str, type[Guided]] = {
+    law.kind: law for law in (LineOfSight, IntegralLineOfSight, AdaptiveLineOfSight)
+}
+
+
+def _remembered(state: Any, starts: Any, shape: tuple[int, ...]) -> tuple[Floats, Any, NDArray[np.bool_]]:
+    """Memory of each ship with zeros where an episode begins, the autopilot's state, and where it does."""
+    if state is None:
+        return np.zeros((*shape, 2)), None, np.ones(shape, dtype=np.bool_)
+    memory = np.array(state[0], dtype=np.float64)
+    if memory.shape != (*shape, 2):
+        raise InputError(
+            f"state: shape {memory.shape} found, expected {(*shape, 2)}: what the last predict of as many "
+            f"ships handed back, or None where episodes begin"
+        )
+    flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
+    begins = np.zeros(shape, dtype=np.bool_) | flags.reshape(shape if flags.size > 1 else ())
+    memory[begins] = 0.0
+    return memory, state[1], begins

@@ -1,0 +1,297 @@
+"""LQG autopilot: LQ feedback of what a Kalman filter makes of noisy heading and yaw rate.
+
+Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 11.3 (Kalman filter and
+wave model for heading autopilots) and 13.1 (separation); Anderson & Moore 1990, Optimal Control, chapter 8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.linear_loop import (
+    ERROR,
+    INTEGRAL,
+    RUDDER,
+    SIGNALS,
+    YAW_RATE,
+    Compensator,
+    length_time,
+    rate_weight,
+    sample_ship,
+)
+from agents.controllers.lq import LQ, lq_gain
+from agents.controllers.stateful import Flags, Stateful, heading_error
+from shipgym.checks import check_number
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
+from shipgym.guidance import wrapped
+from shipgym.models import ShipModel
+from shipgym.models.linear import StraightRunning, linearise
+from shipgym.simulation.sensors import SEA_TRIAL
+
+Floats = NDArray[np.float64]
+
+OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
+COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two looks at it, rad
+NEW_COURSE = np.radians(1.0)  # least jump of the heading error that is a new course, rad
+GATE = 6.0  # such a jump in standard deviations of what noise explains
+WAVE_DAMPING = 0.1  # of the model of first-order motion (Fossen 2011, 8.2.6)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LQG(Stateful):
+    """LQ feedback of estimated motions: a stationary Kalman filter on noisy heading and yaw rate.
+
+    The measured sway speed is not used. The filter's states are sway, yaw rate and heading error and, where a
+    wave period is given, heading and rate of the first-order motion, which is not answered with rudder. It is
+    told the measured rudder, so limits of the steering gear do not mislead it. A jump of the
+    heading error that neither noise nor the ship can make is taken as a new course.
+
+    Attributes
+    ----------
+    transition : array of shape (n_states, n_states)
+        From one look to the next.
+    input : array of shape (n_states,)
+        Effect of the mean rudder in between.
+    kalman : array of shape (n_states, 2)
+        Gain on the innovations of yaw rate and heading error, estimate at the time of the measurement.
+    output : array of shape (2, n_states)
+        What is measured of the states.
+    """
+
+    kind: ClassVar[str] = "lqg"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "transition": ("states", "states"),
+        "input": ("states",),
+        "kalman": ("states", "outputs"),
+        "output": ("outputs", "states"),
+    }
+
+    transition: Floats
+    input: Floats
+    kalman: Floats
+    output: Floats
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
+        noise: float = 1.0,
+        disturbance_deg: float = 2.0,
+        wave_period: float | None = None,
+        wave_heading_deg: float = 1.0,
+    ) -> LQG:
+        """Design on a model, about straight running: LQ's gains and a Kalman filter (`control.dlqe`).
+
+        Parameters
+        ----------
+        model : ShipModel
+            Stable or unstable on its course.
+        dt : float, optional
+            Control interval, s; by default that of the environment.
+        integral_lengths, rudder_weight, rate_weight_s2
+            As in `LQ.from_model`.
+        noise : float
+            Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
+        disturbance_deg : float
+            How much the sea pushes the ship: standard deviation of a rudder angle, drawn anew each interval,
+            that would do the same. More makes the filter trust what is measured.
+        wave_period : float, optional
+            Of the first-order motion, s, as it is met; by default none is modelled.
+        wave_heading_deg : float
+            Standard deviation of the heading in it, degrees.
+
+        Raises
+        ------
+        InputError
+            If the model has no straight course, or an argument is out of its range.
+        """
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        check_number(noise, "noise", above=0.0)
+        check_number(disturbance_deg, "disturbance_deg", above=0.0)
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        ship, weight = sample_ship(model, interval), rate_weight(model)
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        if rate_weight_s2 is not None:
+            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
+        gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
+        transition, effect = rudder_response(model, ship.about, interval)
+        push = np.radians(disturbance_deg) * effect
+        push[2] = np.hypot(push[2], COURSE_NOISE)
+        process, output = np.diag(push**2), np.eye(3)[list(OUTPUTS)]
+        if wave_period is not None:
+            check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
+            check_number(wave_heading_deg, "wave_heading_deg", above=0.0)
+            motion, drive = wave_model(wave_period, np.radians(wave_heading_deg), interval)
+            transition, process = _beside(transition, motion), _beside(process, drive)
+            effect = np.append(effect, [0.0, 0.0])
+            output = np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]])
+        deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
+        kalman, spread = kalman_gain(transition, process, output, np.diag(deviation**2))
+        return cls.designed(
+            model,
+            ship,
+            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
+            design={
+                "integral_lengths": float(integral_lengths),
+                "rate_weight_s2": weight,
+                "noise": float(noise),
+                "disturbance_deg": float(disturbance_deg),
+                "new_course_rad": max(NEW_COURSE, GATE * spread[1]),
+                **({} if wave_period is None else {"wave_period": float(wave_period)}),
+            },
+            transition=transition,
+            input=effect,
+            kalman=kalman,
+            output=output,
+        )
+
+    @property
+    def memory_size(self) -> int:
+        """The estimate, and the rudder at the last look."""
+        return len(self.input) + 1
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """Correct the estimate by what is seen and feed it back."""
+        rudder = seen["rudder"] - self.neutral_rudder
+        measured = np.stack([seen["yaw_rate"], heading_error(seen)], axis=-1)
+        estimate, before = memory[:, :-1], np.where(begins, rudder, memory[:, -1])
+        expected = _times(estimate, self.transition.T) + 0.5 * (before + rudder)[:, None] * self.input
+        expected[begins] = 0.0
+        expected[begins, 1:3] = measured[begins]
+        innovation = measured - _times(expected, self.output.T)
+        innovation[:, 1] = wrapped(innovation[:, 1])
+        jump = np.where(np.abs(innovation[:, 1]) > self.design["new_course_rad"], innovation[:, 1], 0.0)
+        expected[:, ERROR] += jump
+        innovation[:, 1] -= jump
+        estimate = expected + _times(innovation, self.kalman.T)
+        estimate[:, ERROR] = wrapped(estimate[:, ERROR])
+        order = self.neutral_rudder + self.gains["rudder"] * rudder
+        order = order + self.gains["heading_error_integral"] * seen["heading_error_integral"]
+        for column, signal in enumerate(SIGNALS[: ERROR + 1]):
+            order = order + self.gains[signal] * estimate[:, column]
+        return order, np.column_stack([estimate, rudder])
+
+    def loop(self) -> Compensator:
+        """Filter and feedback together; the course does not jump."""
+        n = len(self.input)
+        look = np.zeros((2, len(SIGNALS)))
+        look[[0, 1], list(OUTPUTS)] = 1.0
+        trusted = np.eye(n) - self.kalman @ self.output
+        rudder = np.eye(len(SIGNALS))[RUDDER]
+        remember = np.column_stack([trusted @ self.transition, 0.5 * trusted @ self.input])
+        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ look
+        row = np.zeros(n)
+        row[: ERROR + 1] = [self.gains[signal] for signal in SIGNALS[: ERROR + 1]]
+        at_once = self.gains["rudder"] * rudder
+        at_once[INTEGRAL] = self.gains["heading_error_integral"]
+        return Compensator(
+            A=np.vstack([remember, np.zeros(n + 1)]),
+            B=np.vstack([correct, rudder]),
+            C=(row @ remember)[None],
+            D=(row @ correct + at_once)[None],
+        )
+
+
+def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:
+    """Sway, yaw rate and heading error with the rudder held over an interval.
+
+    Parameters
+    ----------
+    model : ShipModel
+    about : StraightRunning
+        Where small motions are about.
+    dt : float
+        s.
+
+    Returns
+    -------
+    transition : array of shape (3, 3)
+    effect : array of shape (3,)
+        Of the rudder angle, per rad.
+    """
+    import control  # here, because it takes a second to import
+
+    A, B = np.zeros((3, 3)), np.zeros((3, 1))
+    A[:2, :2], B[:2] = linearise(model, about)
+    A[2, 1] = -1.0
+    held = control.sample_system(control.ss(A, B, np.eye(3), 0.0), dt, method="zoh")
+    return np.asarray(held.A, dtype=np.float64), np.asarray(held.B, dtype=np.float64)[:, 0]
+
+
+def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
+    """First-order heading in waves as a lightly damped oscillator driven by noise (Fossen 2011, 8.2.6).
+
+    Parameters
+    ----------
+    period : float
+        s.
+    deviation : float
+        Standard deviation of the heading, rad.
+    dt : float
+        Interval, s.
+
+    Returns
+    -------
+    transition : array of shape (2, 2)
+        Of heading and its rate.
+    covariance : array of shape (2, 2)
+        Of what drives them in an interval, which keeps the deviation as it is.
+    """
+    from scipy.linalg import expm
+
+    frequency = 2.0 * np.pi / period
+    motion = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * WAVE_DAMPING * frequency]])
+    transition: Floats = np.asarray(expm(motion * dt), dtype=np.float64)
+    steady = deviation**2 * np.diag([1.0, frequency**2])
+    return transition, steady - transition @ steady @ transition.T
+
+
+def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floats) -> tuple[Floats, Floats]:
+    """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
+
+    Parameters
+    ----------
+    transition : array of shape (n, n)
+    process : array of shape (n, n)
+        Covariance of what disturbs the states in an interval.
+    output : array of shape (m, n)
+    noise : array of shape (m, m)
+        Covariance of the measurements' noise.
+
+    Returns
+    -------
+    gain : array of shape (n, m)
+        `transition @ gain` is the predictor's gain, that of `control.dlqe`.
+    deviation : array of shape (m,)
+        Standard deviation of the innovations.
+    """
+    import control
+
+    _, covariance, _ = control.dlqe(transition, np.eye(len(transition)), output, process, noise)
+    innovation = output @ covariance @ output.T + noise
+    gain: Floats = np.linalg.solve(innovation, output @ covariance).T
+    return gain, np.sqrt(np.diag(innovation))
+
+
+def _beside(one: Floats, other: Floats) -> Floats:
+    """Block-diagonal of two matrices."""
+    from scipy.linalg import block_diag
+
+    return np.asarray(block_diag(one, other), dtype=np.float64)
+
+
+def _times(rows: Floats, matrix: Floats) -> Floats:
+    """Matrix product whose rows do not depend on how many there are."""
+    product: Floats = np.einsum("ij,jk->ik", rows, matrix)
+    return product

@@ -1,0 +1,242 @@
+"""Linear model predictive control: LQ that knows how far and how fast the rudder goes.
+
+With the regulator's cost of what is left after the horizon, and commands written as LQ's plus a
+correction v, the cost of a plan is that of LQ plus the sum of (R + B'PB) v[k]^2: the best plan is the one
+nearest to LQ's that keeps to the limits. Where LQ's own does, it is LQ's, and nothing has to be solved.
+
+Sources: Rawlings, Mayne & Diehl 2017, Model Predictive Control, 1.3 and 2.5 (terminal cost); Rossiter,
+Kouvaritakis & Rice 1998, A numerically robust state-space approach to stable-predictive control strategies,
+Automatica 34 (corrections of a stabilising feedback); Stellato et al. 2020, OSQP, Mathematical Programming
+Computation 12.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from importlib import import_module
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.linear_loop import RUDDER, SIGNALS, length_time, sample_ship
+from agents.controllers.lq import LQ, lq_gain
+from agents.controllers.stateful import Flags, Stateful
+from shipgym.checks import check_number
+from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT, control_interval
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+
+ACCURACY = 1e-4  # of the solver, rad
+MOST_ITERATIONS = 20_000
+STEP_SIZE = 2.0  # of the solver (its rho), fixed so that an answer depends on the question alone
+
+
+class Plan(NamedTuple):
+    """Plans over the horizon, deviations from straight running: the numbers that are limited.
+
+    Attributes
+    ----------
+    by_state : array of shape (2 * horizon, 5)
+        Commands, then changes of the rudder in an interval, of LQ's own plan, per state.
+    by_correction : array of shape (2 * horizon, horizon)
+        The same per correction of LQ's commands.
+    """
+
+    by_state: Floats
+    by_correction: Floats
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MPC(Stateful):
+    """Plans the rudder over a horizon within its limit and rate; needs the extra `mpc` (OSQP).
+
+    It remembers nothing: the state of `predict` is empty.
+
+    Attributes
+    ----------
+    transition : array of shape (5, 5)
+    effect : array of shape (5,)
+        The sampled ship, x[k + 1] = transition x[k] + effect order[k] (`agents.controllers.linear_loop`).
+    """
+
+    kind: ClassVar[str] = "mpc"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "transition": ("signals", "signals"),
+        "effect": ("signals",),
+    }
+
+    transition: Floats
+    effect: Floats
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        integral_lengths: float = 20.0,
+        horizon_lengths: float = 2.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
+    ) -> MPC:
+        """Design on a model, about straight running.
+
+        Parameters
+        ----------
+        model : ShipModel
+            Stable or unstable on its course.
+        dt : float, optional
+            Control interval, s; by default that of the environment.
+        integral_lengths, rudder_weight : float
+            As in `LQ.from_model`.
+        horizon_lengths : float
+            How far it plans within the limits, in times to travel one ship length; beyond, LQ's cost without
+            limits is taken.
+        rate_weight_s2 : float, optional
+            Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
+            (`linear_loop.rate_weight`), because LQ does not know that the gear is slow.
+
+        Returns
+        -------
+        MPC
+
+        Raises
+        ------
+        InputError
+            If OSQP is not installed, the model has no straight course, or an argument is out of its range.
+        """
+        _solver_library()
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
+        check_number(weight, "rate_weight_s2", above=0.0)
+        ship = sample_ship(model, interval)
+        reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
+        gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
+        return cls.designed(
+            model,
+            ship,
+            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
+            design={
+                "integral_lengths": float(integral_lengths),
+                "rudder_weight": float(rudder_weight),
+                "rate_weight_s2": weight,
+                "horizon_steps": float(max(2, round(horizon_lengths * length_time(model) / interval))),
+                "rudder_rate_rad_s": model.steering.rate,
+            },
+            transition=reduced.A,
+            effect=reduced.B[:, 0],
+        )
+
+    @property
+    def memory_size(self) -> int:
+        """Nothing is remembered."""
+        return 0
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
+        limit = self.observation_scales[self.observation_names.index("rudder")]
+        deviations = self._from_straight_running(seen)
+        rudder = np.clip(deviations[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
+        deviations[:, RUDDER] = rudder
+        row = np.array([self.gains[signal] for signal in SIGNALS])
+        orders: Floats = np.einsum("ij,j->i", deviations, row)
+        lowest, highest = self._bounds(limit)
+        planned = np.einsum("ij,kj->ik", deviations, self.plan.by_state)
+        for ship in np.flatnonzero(np.any((planned < lowest) | (planned > highest), axis=1)):
+            orders[ship] += self._correction(lowest - planned[ship], highest - planned[ship])
+            orders[ship] = self._within(orders[ship], rudder[ship], limit)
+        return self.neutral_rudder + orders, memory
+
+    def _from_straight_running(self, seen: dict[str, Floats]) -> Floats:
+        """State of each ship, shape (n, 5)."""
+        error = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+        sway, rudder = seen["sway"] - self.neutral_sway, seen["rudder"] - self.neutral_rudder
+        return np.stack([sway, seen["yaw_rate"], error, rudder, seen["heading_error_integral"]], axis=-1)
+
+    @cached_property
+    def plan(self) -> Plan:
+        """How commands and rudder follow from the state and from corrections of LQ's commands."""
+        steps = int(self.design["horizon_steps"])
+        row = np.array([self.gains[signal] for signal in SIGNALS])
+        closed = self.transition + np.outer(self.effect, row)
+        limited = np.stack([row, closed[RUDDER] - np.eye(len(SIGNALS))[RUDDER]])  # command, rudder's change
+        by_state = np.empty((2, steps, len(SIGNALS)))
+        answer = np.empty((2, steps))  # to a correction of 1 at the first step
+        power = np.eye(len(SIGNALS))
+        answer[:, 0] = 1.0, self.effect[RUDDER]
+        for k in range(steps):
+            by_state[:, k] = limited @ power
+            if k + 1 < steps:
+                answer[:, k + 1] = limited @ power @ self.effect
+            power = closed @ power
+        later = np.subtract.outer(np.arange(steps), np.arange(steps))
+        by_correction = np.where(later >= 0, answer[:, np.maximum(later, 0)], 0.0)
+        return Plan(by_state.reshape(2 * steps, -1), by_correction.reshape(2 * steps, steps))
+
+    def _bounds(self, limit: float) -> tuple[Floats, Floats]:
+        """Of what is limited, shape (2 * horizon,) each."""
+        steps = int(self.design["horizon_steps"])
+        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
+        neutral = self.neutral_rudder
+        low, high = (-limit - neutral, -change), (limit - neutral, change)
+        return np.repeat(low, steps), np.repeat(high, steps)
+
+    def _within(self, order: float, rudder: float, limit: float) -> float:
+        """A command within the limits to the last bit."""
+        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
+        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
+        lower, upper = ((rudder * (1.0 - stays) + way) / moves for way in (-change, change))
+        lower = max(lower, -limit - self.neutral_rudder)
+        upper = min(upper, limit - self.neutral_rudder)
+        return float(min(max(order, lower), upper))
+
+    @cached_property
+    def _solver(self) -> Any:
+        """OSQP with the corrections as unknowns; only its bounds change."""
+        from scipy import sparse
+
+        matrix = sparse.csc_matrix(self.plan.by_correction)
+        rows, steps = matrix.shape
+        solver = _solver_library().OSQP()
+        solver.setup(
+            sparse.identity(steps, format="csc"),
+            np.zeros(steps),
+            matrix,
+            np.full(rows, -1.0),
+            np.full(rows, 1.0),
+            verbose=False,
+            eps_abs=ACCURACY,
+            eps_rel=ACCURACY,
+            max_iter=MOST_ITERATIONS,
+            rho=STEP_SIZE,
+            adaptive_rho=False,
+            warm_starting=False,
+        )
+        return solver
+
+    def _correction(self, lowest: Floats, highest: Floats) -> float:
+        """First correction of the smallest ones that bring LQ's plan within its limits."""
+        self._solver.update(l=lowest, u=highest)
+        return float(self._solver.solve(raise_error=False).x[0])
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the solver, which is set up anew in another process."""
+        return {name: value for name, value in self.__dict__.items() if name != "_solver"}
+
+
+def _solver_library() -> Any:
+    try:
+        return import_module("osqp")
+    except ModuleNotFoundError:
+        raise InputError(
+            "MPC: the solver OSQP is not installed; install it with: pip install 'shipgym[mpc]'"
+        ) from None

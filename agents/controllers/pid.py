@@ -1,0 +1,174 @@
+"""PID autopilot by pole placement on the ship's Nomoto model.
+
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2 (pole placement);
+van Amerongen 1982, Adaptive steering of ships, chapter 3 (bandwidth from the steering cost).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.linear_loop import length_time, rate_weight, sample_ship
+from shipgym.checks import check_number
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
+from shipgym.models import ShipModel
+from shipgym.models.linear import Nomoto, linearise, nomoto_of
+
+# Measured by the environment's cost on ships stable and unstable, gears slow and fast, and lags up to half
+# a ship length: with these the PID costs at most 1.1 times its best, 1.2 times in course changes of 5 deg.
+LAG_SHARE = 0.5  # of the gear's lag that is made up for; all of it would make the ship slow
+FREQUENCY_SHARE = 0.85  # of the optimal regulator, which feeds back the rudder too and can be faster
+
+
+@dataclass(frozen=True, eq=False)
+class PID(Controller):
+    """Proportional, integral and derivative feedback of the heading error, with neutral rudder.
+
+    order = neutral rudder + proportional * error + integral * (integral of error) - derivative * yaw rate.
+    """
+
+    kind: ClassVar[str] = "pid"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = {
+        "proportional": ("heading_error", 1.0),
+        "integral": ("heading_error_integral", 1.0),
+        "derivative": ("yaw_rate", -1.0),
+    }
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        frequency: float | None = None,
+        damping: float | None = None,
+        integral_lengths: float = 20.0,
+    ) -> PID:
+        """Design on a model, about straight running.
+
+        The poles are placed on the first-order Nomoto form with half of the steering gear's lag and half
+        a control interval for the held command. Their natural frequency and damping are, if not given,
+        near those that the environment's cost asks for (`optimal_poles`), lower where the lag is long.
+
+        Parameters
+        ----------
+        model : ShipModel
+            Stable or unstable on its course.
+        dt : float, optional
+            Control interval, s; by default that of the environment.
+        frequency : float, optional
+            Natural frequency of the dominant pair of poles, rad/s.
+        damping : float, optional
+            Its damping ratio.
+        integral_lengths : float
+            Time for an offset to decay, in times to travel one ship length.
+
+        Returns
+        -------
+        PID
+
+        Raises
+        ------
+        InputError
+            If the model has no straight course, an argument is out of its range, or the poles asked for
+            leave the ship unstable.
+        """
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        ship = sample_ship(model, interval)
+        response = nomoto_of(*linearise(model, ship.about))
+        lag = LAG_SHARE * model.steering.time_constant + 0.5 * interval
+        slow = 1.0 / (integral_lengths * length_time(model))
+        wanted, ratio = optimal_poles(response, rate_weight(model))
+        if damping is not None:
+            ratio = check_number(damping, "damping", above=0.0)
+        if frequency is not None:
+            wanted = check_number(frequency, "frequency", above=0.0)
+        else:
+            # the gear's pole must stay no slower than the pair
+            wanted = min(
+                FREQUENCY_SHARE * wanted, (1.0 / lag + 1.0 / response.T - slow) / (2.0 * ratio + 1.0)
+            )
+        return cls.designed(
+            model,
+            ship,
+            gains=place_poles(response, lag, wanted, ratio, slow),
+            design={
+                "frequency": wanted,
+                "damping": ratio,
+                "integral_lengths": float(integral_lengths),
+                "lag": lag,
+                "nomoto_K": response.K,
+                "nomoto_T": response.T,
+            },
+        )
+
+
+def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
+    """Natural frequency and damping that the steering cost asks for.
+
+    They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and
+    rudder rate, for the first-order Nomoto form with the rudder rate as input.
+
+    Parameters
+    ----------
+    response : Nomoto
+        Its first-order form is used.
+    rate_weight : float
+        Weight of the rudder rate, s^2.
+
+    Returns
+    -------
+    frequency : float
+        rad/s.
+    damping : float
+    """
+    import control  # here, because it takes a second to import
+
+    A = np.array([[-1.0 / response.T, 0.0, response.rudder_effect], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    B = np.array([[0.0], [0.0], [1.0]])
+    weights = np.diag([0.0, 1.0, RUDDER_WEIGHT])
+    _, _, poles = control.lqr(A, B, weights, np.array([[rate_weight]]))
+    oscillating = poles[np.abs(poles.imag) > 0.0]
+    pair = oscillating if len(oscillating) else poles[np.argsort(np.abs(poles))[:2]]
+    frequency = float(np.sqrt(np.prod(pair).real))
+    return frequency, float(-pair.sum().real / (2.0 * frequency))
+
+
+def place_poles(
+    response: Nomoto, lag: float, frequency: float, damping: float, slow: float
+) -> dict[str, float]:
+    """PID gains for a pair of poles and a slow one on Nomoto's first-order form with a gear.
+
+    The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki) has a fixed sum of
+    roots, which leaves the fourth to the gear.
+
+    Parameters
+    ----------
+    response : Nomoto
+    lag : float
+        Of the gear and the held command, s.
+    frequency, damping : float
+        Of the pair of poles, rad/s and ratio.
+    slow : float
+        The pole of the integral action, 1/s.
+
+    Returns
+    -------
+    dict of str to float
+        `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
+    """
+    fourth = 1.0 / lag + 1.0 / response.T - 2.0 * damping * frequency - slow
+    pair = np.array([1.0, 2.0 * damping * frequency, frequency**2])
+    wanted = np.polymul(np.polymul(pair, [1.0, slow]), [1.0, fourth])
+    per_rudder = lag / response.rudder_effect
+    return {
+        "proportional": float(wanted[3] * per_rudder),
+        "integral": float(wanted[4] * per_rudder),
+        "derivative": float((wanted[2] - 1.0 / (lag * response.T)) * per_rudder),
+    }

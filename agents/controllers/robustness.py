@@ -1,0 +1,84 @@
+"""How certain a controller's margins are: its loop with ships drawn from a model's covariance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.controller import Controller
+from agents.controllers.linear_loop import Margins
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class MarginSpread:
+    """Margins and bandwidth of one controller on many ships.
+
+    Attributes
+    ----------
+    nominal : Margins
+        On the model it was designed on.
+    by_name : dict of str to array of shape (n_models,)
+        Each figure of `Margins` on each ship; nan where the loop is unstable or the ship has no straight
+        course.
+    stable : bool array of shape (n_models,)
+        Where the loop is stable.
+    """
+
+    nominal: Margins
+    by_name: dict[str, Floats]
+    stable: NDArray[np.bool_]
+
+    def quantiles(self, share: Sequence[float] = (0.05, 0.5, 0.95)) -> dict[str, Floats]:
+        """Quantiles of each figure over the ships with a stable loop, by name.
+
+        Raises
+        ------
+        InputError
+            If no loop is stable.
+        """
+        if not self.stable.any():
+            raise InputError("margins: the loop is stable on none of the ships, so there are no quantiles")
+        return {
+            name: np.quantile(values[self.stable], share, method="lower")  # finite and infinite ones mixed
+            for name, values in self.by_name.items()
+        }
+
+
+def margin_spread(controller: Controller, models: Sequence[ShipModel]) -> MarginSpread:
+    """Margins of a linear controller on each of many ships.
+
+    Parameters
+    ----------
+    controller : Controller
+        A linear one; of a scheduled or adaptive one the design at service speed, of MPC without limits.
+    models : sequence of ShipModel
+        For example `model.sample(100, seed)`: the identified posterior.
+
+    Returns
+    -------
+    MarginSpread
+
+    Raises
+    ------
+    InputError
+        If there are no models.
+    """
+    if not models:
+        raise InputError("models: none found, expected at least one")
+    names = [item.name for item in fields(Margins)]
+    table = np.full((len(models), len(names)), np.nan)
+    for row, model in zip(table, models, strict=True):
+        try:
+            found = controller.margins_on(model)
+        except InputError:
+            continue
+        row[:] = [getattr(found, name) for name in names]
+    by_name = dict(zip(names, table.T.copy(), strict=True))
+    return MarginSpread(controller.margins, by_name, ~np.isnan(table[:, 0]))

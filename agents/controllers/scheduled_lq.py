@@ -1,0 +1,163 @@
+"""LQ autopilot whose gains follow the speed: a slower ship needs more rudder.
+
+Source: Rugh & Shamma 2000, Research on gain scheduling, Automatica 36; for autopilots van Amerongen 1982,
+Adaptive steering of ships, chapter 3 (the rudder's effect grows with the square of the speed).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, rate_weight, sample_ship
+from agents.controllers.lq import LQ, lq_gain
+from agents.controllers.stateful import Flags, Stateful, heading_error
+from shipgym.checks import check_number
+from shipgym.envs.task import RUDDER_WEIGHT, control_interval
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Floats = NDArray[np.float64]
+
+SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScheduledLQ(Stateful):
+    """LQ designed at several speeds; gains and neutral rudder lie straight between them.
+
+    Below the lowest and above the highest speed those of the nearest are kept. It remembers nothing: the
+    state of `predict` is empty. `gains` and `margins` are those at service speed.
+
+    Attributes
+    ----------
+    speeds : array of shape (n_speeds,)
+        Surge speeds, m/s, rising.
+    schedule : array of shape (n_speeds, 5)
+        Gains at each, in the order of `linear_loop.SIGNALS`.
+    neutral : array of shape (n_speeds, 2)
+        Rudder, rad, and sway speed, m/s, of straight running at each.
+    """
+
+    kind: ClassVar[str] = "lq-scheduled"
+    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
+    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
+        "speeds": ("speeds",),
+        "schedule": ("speeds", "signals"),
+        "neutral": ("speeds", "rudder and sway"),
+    }
+
+    speeds: Floats
+    schedule: Floats
+    neutral: Floats
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT,
+        rate_weight_s2: float | None = None,
+        speeds: Sequence[float] | None = None,
+    ) -> ScheduledLQ:
+        """Design on a model, about straight running at each speed.
+
+        The shaft is taken to turn as at service speed: the ship has lost speed in a turn or in weather.
+
+        Parameters
+        ----------
+        model : ShipModel
+            Stable or unstable on its course.
+        dt : float, optional
+            Control interval, s; by default that of the environment.
+        integral_lengths, rudder_weight, rate_weight_s2
+            As in `LQ.from_model`, at each speed.
+        speeds : sequence of float, optional
+            m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the
+            range of speeds that the model was identified in.
+
+        Returns
+        -------
+        ScheduledLQ
+            In `design`, `least_gain_margin` and `least_phase_margin_deg` are those of the worst speed.
+
+        Raises
+        ------
+        InputError
+            If the model has no straight course at one of the speeds, or an argument is out of its range.
+        """
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        service = model.particulars["speed"]
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        weight = rate_weight(model)
+        if rate_weight_s2 is not None:
+            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
+        listed = _rising([service * part for part in SPEEDS] if speeds is None else speeds)
+        gains, neutral, margins = [], [], []
+        for speed in listed.tolist():
+            ship = sample_ship(model, interval, speed=speed)
+            reduced = ship
+            if "q" in model.state_names:
+                reduced = sample_ship(model, interval, first_order=True, speed=speed)
+            time = integral_lengths * model.particulars["length"] / speed
+            gains.append(-lq_gain(reduced, weight, time, rudder_weight))
+            neutral.append((ship.about.rudder, ship.about.sway))
+            name = f"ScheduledLQ on model '{model.name}' at {speed:g} m/s"
+            margins.append(compensator_margins(ship, Compensator.static(gains[-1][None]), name))
+        at_service = [float(np.interp(service, listed, column)) for column in np.array(gains).T]
+        return cls.designed(
+            model,
+            sample_ship(model, interval),
+            gains=dict(zip(SIGNALS, at_service, strict=True)),
+            design={
+                "integral_lengths": float(integral_lengths),
+                "rate_weight_s2": weight,
+                "least_gain_margin": min(1e6, *(m.gain_margin for m in margins)),
+                "least_phase_margin_deg": min(m.phase_margin_deg for m in margins),
+            },
+            speeds=listed,
+            schedule=np.array(gains),
+            neutral=np.array(neutral),
+        )
+
+    @property
+    def memory_size(self) -> int:
+        """Nothing is remembered."""
+        return 0
+
+    def at(self, speed: Floats) -> tuple[Floats, Floats]:
+        """Gains, shape (n, 5), and neutral rudder and sway, shape (n, 2), at surge speeds of shape (n,)."""
+        gains, neutral = (
+            np.stack([np.interp(speed, self.speeds, column) for column in table.T], axis=-1)
+            for table in (self.schedule, self.neutral)
+        )
+        return gains, neutral
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """Feedback with the gains of each ship's speed."""
+        gains, neutral = self.at(seen["surge"])
+        rudder, sway = neutral.T
+        signals = (
+            seen["sway"] - sway,
+            seen["yaw_rate"],
+            heading_error(seen),
+            seen["rudder"] - rudder,
+            seen["heading_error_integral"],
+        )
+        order: Floats = rudder + np.einsum("ij,ij->i", gains, np.stack(signals, axis=-1))
+        return order, memory
+
+
+def _rising(speeds: Sequence[float]) -> Floats:
+    """Speeds as an array, checked."""
+    listed = [check_number(speed, f"speeds[{i}]", above=0.0) for i, speed in enumerate(speeds)]
+    if len(listed) < 2 or np.any(np.diff(listed) <= 0.0):
+        raise InputError(f"speeds: {list(speeds)} found, expected at least two in rising order, m/s")
+    return np.array(listed)

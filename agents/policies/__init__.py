@@ -1,0 +1,1 @@
+"""Learned policies and the shield around them, without torch."""

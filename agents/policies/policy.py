@@ -1,0 +1,328 @@
+"""Learned policies: what reinforcement learning found, run in NumPy.
+
+A policy is a network on `[observation(t - history + 1), ..., observation(t), base action(t)]`, its
+observations in the scales of the environment; the base's action only if there is a base. Where an episode
+begins, the first observation fills the history. Without a base the network's output, limited to [-1, 1], is
+the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning. The
+output is held for `hold` control intervals, while the base goes on with its feedback.
+
+Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
+al. 2019, Residual reinforcement learning for robot control, ICRA.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.controller import Action, Controller, check_names, check_scales
+from agents.policies.network import Network
+from shipgym.checks import check_choice, check_number, check_whole
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.task import ACTIONS, RUDDER_ORDERS, Observed, Task
+from shipgym.errors import InputError
+from shipgym.models import ShipModel
+
+Numbers = NDArray[np.float32]
+
+ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
+#: Number of the network's outputs by the kind of action.
+OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2}
+LARGEST_AUTHORITY = 2.0
+#: Options of an environment that decide what is observed and in which scales.
+SHOWING = ("action", "roll", "corridor", "ground")
+
+
+class Memory(NamedTuple):
+    """What a policy with a history, a base or outputs that it holds remembers.
+
+    Attributes
+    ----------
+    seen : float32 array of shape (n, history - 1, n_observations)
+        Past observations, oldest first; for a single observation without the first axis.
+    base : Any
+        State of the base.
+    held : float32 array of shape (n, 1 + n_outputs)
+        Control intervals until the next decision, and the network's outputs of the last one; for a single
+        observation without the first axis.
+    """
+
+    seen: Numbers
+    base: Any
+    held: Numbers
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedPolicy:
+    """A learned autopilot in the signature of `Controller.predict`; steers without torch.
+
+    Attributes
+    ----------
+    network : Network
+        Weights, activation and output.
+    observation_names : tuple of str
+        What it observes, in order.
+    observation_scales : tuple of float
+        Physical value of each observation of 1, SI units.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What it commands. Of discrete orders that with the largest output is taken.
+    history : int
+        Number of observations the network sees, the newest last.
+    base : Controller or None
+        Whose rudder the network adds to.
+    authority : float
+        Share of the rudder limit by which it may differ from the base; 1 without a base.
+    hold : int
+        Control intervals for which an output of the network holds.
+    env_id : str
+        Environment that it learned in.
+    env_options : dict
+        Its options, as JSON has them.
+    model_name, model_sha256 : str
+        The model that it learned on, and a hash of its structure and numbers.
+    training : dict
+        How it was made, as JSON has it: algorithm, seeds, steps, command, versions, learning curve, score.
+
+    Raises
+    ------
+    InputError
+        Naming the field whose value does not fit.
+    """
+
+    network: Network
+    observation_names: tuple[str, ...]
+    observation_scales: tuple[float, ...]
+    action: str = "rudder"
+    history: int = 1
+    base: Controller | None = None
+    authority: float = 1.0
+    hold: int = 1
+    env_id: str = "shipgym/CourseKeeping-v0"
+    env_options: Mapping[str, Any] = field(default_factory=dict)
+    model_name: str = "unknown"
+    model_sha256: str = "unknown"
+    training: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_choice(self.action, ACTIONS, "action")
+        check_whole(self.history, "history", at_least=1)
+        check_whole(self.hold, "hold", at_least=1)
+        check_number(self.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
+        n = len(self.observation_names)
+        if len(self.observation_scales) != n:
+            raise InputError(
+                f"observation_scales: {len(self.observation_scales)} found, expected {n} numbers"
+            )
+        if self.base is None and self.authority != 1.0:
+            raise InputError(f"authority: {self.authority:g} found without a base, expected 1, or a base")
+        if self.base is not None:
+            if self.action != "rudder":
+                raise InputError(f"action: '{self.action}' found beside a base, expected 'rudder'")
+            self.base.check_fits(self.observation_names, self.observation_scales, "base")
+        n_in = self.history * n + (self.base is not None)
+        _check_size(
+            "inputs", self.network.sizes[0], n_in, f"{self.history} x {n} observations and the base's"
+        )
+        _check_size("outputs", self.network.sizes[-1], OUTPUTS[self.action], f"for action '{self.action}'")
+
+    @classmethod
+    def from_sb3(cls, agent: Any, env: Any = None, training: Mapping[str, Any] | None = None) -> Self:
+        """The policy of a trained agent of stable-baselines3 (see `agents.policies.policy_extraction`).
+
+        Parameters
+        ----------
+        agent : BaseAlgorithm
+            PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy".
+        env : VecEnv, optional
+            The environment that it learned in, with its wrappers; by default the agent's own.
+        training : dict, optional
+            How it was made.
+
+        Raises
+        ------
+        InputError
+            For an agent or a wrapper that cannot be written as such a policy.
+        """
+        from agents.policies.policy_extraction import sb3_fields
+
+        return cls(**sb3_fields(agent, env), training=dict(training or {}))
+
+    @property
+    def name(self) -> str:
+        """Short name: the algorithm, or `learned`."""
+        return str(self.training.get("algorithm", "learned"))
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships."""
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Action, Any]:
+        """Commands for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of the environment that it learned in, or of one that shows more after these.
+        state : Memory, optional
+            What the last call handed back; None where episodes begin.
+        episode_start : bool or array-like of bool of shape (n,), optional
+            Where an episode begins and the state is that of the one before.
+        deterministic
+            Not used: it always gives the mean of what it learned, or its most likely order.
+
+        Returns
+        -------
+        action : float32 array of shape (n_commands,) or (n, n_commands)
+            Parts of the limits, in [-1, 1]; of discrete orders the order itself, not its number
+            (`order_numbers` gives it).
+        state
+            As given, or a `Memory` if there is a history or a base, or outputs are held.
+
+        Raises
+        ------
+        InputError
+            If the observation has fewer entries or another number of dimensions, or the state is not one of
+            as many ships.
+        """
+        given, n = np.asarray(observation, dtype=np.float32), len(self.observation_names)
+        if given.ndim not in (1, 2) or given.shape[-1] < n:
+            raise InputError(
+                f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: "
+                f"{self.observation_names[-1]!r} is the last that the policy needs"
+            )
+        rows = given.reshape(-1, given.shape[-1])
+        if self.history == 1 and self.base is None and self.hold == 1:
+            action = self.commands(self.network(rows[:, :n]), None)
+            return action.reshape(*given.shape[:-1], -1), state
+        seen, inner, held = self._recalled(state, episode_start, rows[:, :n], given.ndim)
+        window = np.concatenate([seen, rows[:, None, :n]], axis=1)
+        inputs, proposed = window.reshape(len(rows), -1), None
+        if self.base is not None:
+            order, inner = self.base.predict(given, inner, episode_start, deterministic)
+            proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), -1)
+            inputs = np.concatenate([inputs, proposed], axis=1)
+        held = self._decided(inputs, held)
+        action = self.commands(held[:, 1:], proposed)
+        kept = window[:, 1:].copy()
+        memory = Memory(kept, inner, held) if given.ndim == 2 else Memory(kept[0], inner, held[0])
+        return action.reshape(*given.shape[:-1], -1), memory
+
+    def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
+        """Outputs that hold now: new ones of the ships whose last decision is over."""
+        due = held[:, 0] <= 0.0
+        now = held if not due.any() else np.where(due[:, None], self._outputs(inputs), held)
+        now[:, 0] -= 1.0
+        return now
+
+    def _outputs(self, inputs: Numbers) -> Numbers:
+        """The network's outputs, behind the control intervals for which they hold."""
+        return np.column_stack([np.full(len(inputs), self.hold, dtype=np.float32), self.network(inputs)])
+
+    def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
+        """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
+        if self.action == "rudder-discrete":
+            return ORDERS[output.argmax(axis=-1), None]
+        limited = np.clip(output, -1.0, 1.0)
+        if proposed is None:
+            return limited
+        return np.clip(proposed + np.float32(self.authority) * limited, -1.0, 1.0)
+
+    def _recalled(self, state: Any, starts: Any, rows: Numbers, ndim: int) -> tuple[Numbers, Any, Numbers]:
+        """What each ship remembers, as in `Memory`; where an episode begins, the present fills the past."""
+        past, n = self.history - 1, len(rows)
+        present = np.repeat(rows[:, None], past, axis=1)
+        nothing = np.zeros((n, 1 + OUTPUTS[self.action]), dtype=np.float32)
+        if state is None:
+            return present, None, nothing
+        seen, inner, held = state
+        expected = (n, past, rows.shape[1])
+        if np.shape(seen) != (expected if ndim == 2 else expected[1:]):
+            raise InputError(
+                f"state: shape {np.shape(seen)} found, expected {expected if ndim == 2 else expected[1:]}: "
+                f"what the last predict of as many ships handed back, or None where episodes begin"
+            )
+        flags = np.asarray(False if starts is None else starts, dtype=np.bool_).reshape(-1)
+        if flags.size not in (1, n):
+            raise InputError(f"episode_start: {flags.size} found, expected one for each of {n} ships")
+        held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
+        return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner, held
+
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse what shows other quantities first, or in other scales, than those it learned with.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `observation_names` of an environment; it may show more after what the policy observes.
+        scales : sequence of float
+            Its `observation_scales`.
+        where : str
+            Start of the message.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        n = len(self.observation_names)
+        check_names(names[:n], self.observation_names, where)
+        check_scales(
+            names[:n], scales[:n], self.observation_scales, where,
+            f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
+            f"ship or task; train one in this environment",
+        )  # fmt: skip
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship with other observation scales in the environment that it learned in."""
+        shown = self._observed(model)
+        names, scales = [one.name for one in shown], [one.scale for one in shown]
+        self.check_fits(names, scales, f"model '{model.name}'")
+
+    def _observed(self, model: ShipModel) -> tuple[Observed, ...]:
+        """What its environment shows of a ship."""
+        task: type[Task] = PathFollowingTask if "cross_track" in self.observation_names else CourseKeepingTask
+        known = {"action": self.action, "roll": "roll" in self.observation_names, **self.env_options}
+        fields = task.__dataclass_fields__
+        asked = task.from_options({name: known[name] for name in SHOWING if name in known and name in fields})
+        asked.check_fits(model)
+        return asked.observed(model)
+
+    def save(self, path: str | Path) -> None:
+        """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
+        from agents.policies.policy_file import save
+
+        save(self, Path(path))
+
+
+def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
+    """Numbers of discrete rudder orders, for environments with the action "rudder-discrete".
+
+    Parameters
+    ----------
+    action : array-like of shape (..., 1)
+        As `LearnedPolicy.predict` hands them back.
+
+    Returns
+    -------
+    int array of shape (...)
+        Of the nearest order.
+    """
+    given = np.asarray(action, dtype=np.float32)
+    numbers: NDArray[np.int64] = np.abs(given - ORDERS).argmin(axis=-1)
+    return numbers
+
+
+def _check_size(what: str, found: int, expected: int, why: str) -> None:
+    if found != expected:
+        raise InputError(f"network: {found} {what} found, expected {expected}: {why}")

@@ -1,0 +1,191 @@
+"""The network of a trained agent of stable-baselines3, and what it observed, as fields of a `LearnedPolicy`.
+
+PPO and A2C have the mean of their action, SAC and TQC the hyperbolic tangent of it, TD3 and DDPG a network
+that ends so. Whatever else is found (other extractors of features, layers or wrappers) is refused, not
+guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import gymnasium
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.controller import Controller, model_hash
+from agents.policies.network import Layer, Network
+from agents.policies.policy_file import as_json
+from shipgym.errors import InputError
+
+ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
+#: Keywords of a vector environment that say how it runs, not what is asked.
+RUNNING = ("model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
+#: Wrappers that change observations.
+REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
+N_COMPARED = 16
+AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
+
+
+def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
+    """Fields of `LearnedPolicy` from an agent and its environment.
+
+    Parameters
+    ----------
+    agent : BaseAlgorithm
+        PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy".
+    env : VecEnv, optional
+        The environment that it learned in, with its wrappers; by default the agent's own.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    InputError
+        For an agent or a wrapper that cannot be written as a learned policy.
+    """
+    given = agent.get_env() if env is None else env
+    if given is None:
+        raise InputError("env: none found and the agent has none, expected the environment it learned in")
+    stack = list(_stack(given))
+    _check_wrappers(stack)
+    found = {**_environment(stack[-1]), **_residual(stack)}
+    network = _network(agent)
+    _check_extraction(network, agent, found["action"])
+    return {"network": network, **found}
+
+
+def _stack(env: Any) -> Iterator[Any]:
+    """The environment and what it wraps, down to the ships."""
+    while env is not None:
+        yield env
+        held = vars(env)
+        inner = held.get("vector_env")  # of ShipVecEnv
+        if "envs" in held:  # of DummyVecEnv
+            inner = env.envs[0]
+        env = held.get("venv", held.get("env", inner))
+
+
+def _check_wrappers(stack: Sequence[Any]) -> None:
+    for wrapper in stack:
+        name = type(wrapper).__name__
+        if name == "VecNormalize" and wrapper.norm_obs:
+            raise InputError(
+                "env: VecNormalize that scales observations found, expected VecNormalize(norm_obs=False): "
+                "the environments scale them already"
+            )
+        if name in REFUSED or isinstance(wrapper, gymnasium.ObservationWrapper | gymnasium.ActionWrapper):
+            raise InputError(
+                f"env: wrapper {name} found, expected none that changes observations or actions but "
+                f"ResidualVecEnv, whose history shows past ones"
+            )
+
+
+def _residual(stack: Sequence[Any]) -> dict[str, Any]:
+    """History, base and authority of the wrapper that adds to a controller, if there is one."""
+    for wrapper in stack:
+        if all(name in vars(wrapper) for name in ("base", "authority", "history", "hold")):
+            base = wrapper.base
+            if base is not None and not isinstance(base, Controller):
+                raise InputError(
+                    f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
+                    "hold"
+                )
+            numbers = {"history": int(wrapper.history), "hold": int(wrapper.hold)}
+            return {"base": base, "authority": float(wrapper.authority), **numbers}
+    return {}
+
+
+def _environment(ships: Any) -> dict[str, Any]:
+    """What is observed and commanded, and where."""
+    if not hasattr(ships, "observation_names"):
+        raise InputError(
+            f"env: {type(ships).__name__} found, expected an environment of shipgym, such as ShipVecEnv"
+        )
+    model, spec = ships.model, ships.spec
+    kwargs = dict(spec.kwargs) if spec is not None else {}
+    kind = "PathFollowing" if "cross_track" in ships.observation_names else "CourseKeeping"
+    return {
+        "observation_names": tuple(ships.observation_names),
+        "observation_scales": tuple(float(scale) for scale in ships.observation_scales),
+        "action": ships.task.action,
+        "env_id": f"shipgym/{kind}-v0" if spec is None else spec.id,
+        "env_options": {name: as_json(value) for name, value in kwargs.items() if name not in RUNNING},
+        "model_name": model.name,
+        "model_sha256": model_hash(model),
+    }
+
+
+def _network(agent: Any) -> Network:
+    """The layers from observation to command."""
+    policy = agent.policy
+    actor: Any = getattr(policy, "actor", None)
+    _check_features(policy if actor is None else actor)
+    if getattr(agent, "use_sde", False):
+        raise InputError("agent: state-dependent exploration (use_sde) found, expected an agent without")
+    if hasattr(policy, "action_net") and hasattr(policy, "mlp_extractor"):  # PPO, A2C
+        return _dense([*policy.mlp_extractor.policy_net, policy.action_net])
+    if hasattr(actor, "latent_pi") and hasattr(actor, "mu"):  # SAC, TQC
+        return _dense([*actor.latent_pi, actor.mu], "tanh")
+    if actor is not None and hasattr(actor, "mu"):  # TD3, DDPG
+        *modules, last = actor.mu
+        if type(last).__name__ == "Tanh":
+            return _dense(modules, "tanh")
+    raise InputError(
+        f"agent: {type(agent).__name__} with {type(policy).__name__} found, expected PPO, A2C, SAC, TD3, "
+        f"DDPG or TQC with 'MlpPolicy'"
+    )
+
+
+def _check_features(owner: Any) -> None:
+    name = type(getattr(owner, "features_extractor", None)).__name__
+    if name not in ("FlattenExtractor", "NoneType"):
+        raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
+
+
+def _dense(modules: Sequence[Any], output: str = "linear") -> Network:
+    """Linear layers with one activation between them."""
+    layers: list[Layer] = []
+    names = set()
+    for i, module in enumerate(modules):
+        kind = type(module).__name__
+        if not (kind in ACTIVATION_OF if i % 2 else kind == "Linear"):
+            raise InputError(
+                f"agent: layer {i} of the network is {kind}, expected dense layers with ReLU or Tanh between "
+                "them"
+            )
+        if i % 2:
+            names.add(kind)
+        else:
+            layers.append((_array(module.weight), _array(module.bias)))
+    if len(names) > 1:
+        raise InputError(f"agent: activations {sorted(names)} found, expected one")
+    return Network(tuple(layers), ACTIVATION_OF[names.pop()] if names else "relu", output)
+
+
+def _array(parameter: Any) -> NDArray[np.float32]:
+    return np.ascontiguousarray(parameter.detach().cpu().numpy(), dtype=np.float32).copy()
+
+
+def _check_extraction(network: Network, agent: Any, action: str) -> None:
+    """The network must command what the agent does, on observations at random."""
+    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (N_COMPARED, network.sizes[0])).astype(np.float32)
+    if agent.observation_space.shape != inputs.shape[1:]:
+        raise InputError(
+            f"agent: observations of shape {agent.observation_space.shape} found, expected "
+            f"{inputs.shape[1:]}, as its network has inputs"
+        )
+    theirs, _ = agent.predict(inputs, deterministic=True)
+    output = network(inputs)
+    if action == "rudder-discrete":
+        agrees = bool((output.argmax(axis=-1) == theirs).all())
+    else:
+        agrees = bool(np.abs(np.clip(output, -1.0, 1.0) - theirs).max() < AGREEMENT)
+    if not agrees:
+        raise InputError(
+            f"agent: {type(agent.policy).__name__} commands otherwise than its layers say, expected "
+            f"'MlpPolicy' with actions in [-1, 1]"
+        )

@@ -1,0 +1,323 @@
+"""A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
+
+It looks at observations alone and takes over
+
+* where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
+  for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such
+  limit);
+* where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
+  towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
+  count, however large;
+* where the policy's command is no number.
+
+It hands back after the ship has been within `Limits.back_deg` of her course and within
+`Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
+The limits to hand back lie inside those to take over, so that it does not chatter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.controller import Action, Controller, Policy
+from agents.controllers.lq import LQ
+from shipgym.checks import check_number
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
+from shipgym.envs.task import control_interval
+from shipgym.errors import InputError
+from shipgym.models import Envelope, ShipModel
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+# what is remembered of each ship
+STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)
+N_WATCHED = 7
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When the fallback takes over, and when it hands back.
+
+    Attributes
+    ----------
+    envelope_out, envelope_back : float
+        Distance from the training data (1 is its edge) beyond which it takes over, and within which it may
+        hand back.
+    out_lengths : float
+        How long it must be beyond before it takes over, in times to travel one ship length: noise is shorter.
+    runaway_deg : float
+        How far the ship may turn away from her course, degrees.
+    back_deg : float
+        Heading error within which it may hand back, degrees.
+    calm_lengths : float
+        How long both must hold before it does, in times to travel one ship length.
+    """
+
+    envelope_out: float = 1.5
+    envelope_back: float = 1.1
+    out_lengths: float = 0.25
+    runaway_deg: float = 10.0
+    back_deg: float = 5.0
+    calm_lengths: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_number(self.envelope_out, "limits.envelope_out", at_least=1.0)
+        hint = "less than to take over"
+        check_number(
+            self.envelope_back, "limits.envelope_back", above=0.0, below=self.envelope_out, hint=hint
+        )
+        check_number(self.runaway_deg, "limits.runaway_deg", above=0.0, at_most=180.0)
+        check_number(self.back_deg, "limits.back_deg", above=0.0, below=self.runaway_deg, hint=hint)
+        check_number(self.out_lengths, "limits.out_lengths", at_least=0.0)
+        check_number(self.calm_lengths, "limits.calm_lengths", at_least=0.0)
+
+
+class ShieldState(NamedTuple):
+    """What a shield remembers.
+
+    Attributes
+    ----------
+    policy, fallback : Any
+        Their own states; both go on while the other steers.
+    watch : array of shape (n, 7) or (7,)
+        Of each ship; `interventions` reads it.
+    """
+
+    policy: Any
+    fallback: Any
+    watch: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Interventions:
+    """How often and how long a fallback steered, since the episode of each ship began; shapes (n,) or ().
+
+    Attributes
+    ----------
+    count : int array
+        How often it took over.
+    intervals : int array
+        Control intervals that it steered.
+    steering : bool array
+        Whether it steers now.
+    """
+
+    count: NDArray[np.int64]
+    intervals: NDArray[np.int64]
+    steering: Flags
+
+
+def interventions(state: ShieldState) -> Interventions:
+    """Read from the state that `Shielded.predict` handed back how often and how long the fallback steered."""
+    watch = state.watch
+    count, intervals = watch[..., COUNT].astype(np.int64), watch[..., INTERVALS].astype(np.int64)
+    return Interventions(count, intervals, watch[..., STEERED] > 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Shielded:
+    """A policy under a safety shield.
+
+    Attributes
+    ----------
+    policy : Policy
+        Who steers; any, also one that was learned.
+    fallback : Controller
+        Who takes over: the rudder alone, a shaft stays with the policy.
+    dt : float
+        Control interval, s.
+    envelope : Envelope or None
+        Of the model.
+    limits : Limits
+        When the fallback takes over.
+    """
+
+    policy: Policy
+    fallback: Controller
+    dt: float
+    envelope: Envelope | None = None
+    limits: Limits = Limits()
+
+    def __post_init__(self) -> None:
+        check_number(self.dt, "dt", above=0.0)
+        if not isinstance(self.fallback, Controller):
+            raise InputError(
+                f"fallback: {type(self.fallback).__name__} found, expected a controller of shipgym, such as "
+                f"LQ.from_model(model)"
+            )
+        names = getattr(self.policy, "observation_names", None)
+        scales = getattr(self.policy, "observation_scales", None)
+        if names is not None and scales is not None:
+            self.fallback.check_fits(names, scales, "fallback")
+
+    @classmethod
+    def from_model(
+        cls,
+        model: ShipModel,
+        policy: Policy,
+        fallback: Controller | None = None,
+        *,
+        dt: float | None = None,
+        limits: Limits | None = None,
+    ) -> Self:
+        """Put a policy under a shield with a model's envelope.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The ship; if it has an envelope the shield knows it.
+        policy : Policy
+            Who steers.
+        fallback : Controller, optional
+            By default `LQ.from_model(model)`.
+        dt : float, optional
+            Control interval, s; by default that of the environment.
+        limits : Limits, optional
+            When the fallback takes over.
+
+        Raises
+        ------
+        InputError
+            If the fallback or the policy was made for another ship.
+        """
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        rescue = LQ.from_model(model, dt=interval) if fallback is None else fallback
+        shield = cls(policy, rescue, interval, model.envelope, limits or Limits())
+        shield.check_fits_model(model)
+        return shield
+
+    @property
+    def name(self) -> str:
+        """Short name: that of the policy, and that it is shielded."""
+        return f"{getattr(self.policy, 'name', type(self.policy).__name__)}-shielded"
+
+    @property
+    def observation_names(self) -> tuple[str, ...]:
+        """What is observed: what the policy does, or the fallback if the policy does not say."""
+        return tuple(getattr(self.policy, "observation_names", self.fallback.observation_names))
+
+    @property
+    def observation_scales(self) -> tuple[float, ...]:
+        """Physical value of each observation of 1, SI units."""
+        return tuple(getattr(self.policy, "observation_scales", self.fallback.observation_scales))
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships."""
+
+    def predict(
+        self,
+        observation: ArrayLike,
+        state: Any = None,
+        episode_start: Any = None,
+        deterministic: bool = True,
+    ) -> tuple[Action, ShieldState]:
+        """Commands for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of the environment.
+        state : ShieldState, optional
+            What the last call handed back; None where episodes begin.
+        episode_start : bool or array-like of bool of shape (n,), optional
+            Where an episode begins and the state is that of the one before.
+        deterministic : bool
+            Handed on to the policy.
+
+        Returns
+        -------
+        action : float32 array of shape (n_commands,) or (n, n_commands)
+            The policy's, or the fallback's rudder.
+        state : ShieldState
+
+        Raises
+        ------
+        InputError
+            If the observation has fewer entries or another number of dimensions, or the state is not one of
+            as many ships.
+        """
+        given = np.asarray(observation)
+        inner, outer, watch = (None, None, None) if state is None else state
+        ours, outer = self.fallback.predict(given, outer, episode_start, deterministic)
+        theirs, inner = self.policy.predict(given, inner, episode_start, deterministic)
+        action = np.array(theirs, dtype=np.float32)
+        watch = self._begun(watch, episode_start, given.shape[:-1])
+        self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), watch)
+        steered = watch[..., STEERED] > 0.0
+        action[..., 0] = np.where(steered, ours[..., 0], action[..., 0])
+        return np.where(np.isfinite(action), action, 0.0), ShieldState(inner, outer, watch)
+
+    def _begun(self, watch: Floats | None, starts: Any, shape: tuple[int, ...]) -> Floats:
+        """What is remembered, a copy with zeros where an episode begins."""
+        if watch is None:
+            return np.zeros((*shape, N_WATCHED))
+        if np.shape(watch) != (*shape, N_WATCHED):
+            raise InputError(
+                f"state: watch of shape {np.shape(watch)} found, expected {(*shape, N_WATCHED)}: what the "
+                f"last predict of as many ships handed back, or None where episodes begin"
+            )
+        flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
+        begins = np.broadcast_to(flags.reshape(shape if flags.size > 1 else ()), shape)
+        return np.where(begins[..., None], 0.0, watch)
+
+    def _update(self, observation: NDArray[Any], broken: Flags, watch: Floats) -> None:
+        """Decide for each ship who steers, and count."""
+        limits, n = self.limits, len(OBSERVATION_NAMES)
+        si = observation[..., :n].astype(np.float64) * self.fallback.observation_scales[:n]
+        seen = dict(zip(OBSERVATION_NAMES, np.moveaxis(si, -1, 0), strict=True))
+        error = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+        near = np.abs(error) <= np.radians(limits.back_deg)
+        turn = 0.5 * self.dt * (seen["yaw_rate"] + watch[..., LAST_RATE])
+        watch[..., LAST_RATE] = seen["yaw_rate"]
+        watch[..., TURNED] = np.where(near, 0.0, np.maximum(watch[..., TURNED] - np.sign(error) * turn, 0.0))
+        out = broken | (watch[..., TURNED] >= np.radians(limits.runaway_deg))
+        calm = near & ~broken
+        if self.envelope is not None:
+            distance = self.envelope.distance(seen["surge"], seen["sway"], seen["yaw_rate"], seen["rudder"])
+            beyond = distance > limits.envelope_out
+            watch[..., OUTSIDE] = np.where(beyond, watch[..., OUTSIDE] + 1.0, 0.0)
+            out |= beyond & (watch[..., OUTSIDE] >= self._intervals(limits.out_lengths))
+            calm &= distance <= limits.envelope_back
+        steered = watch[..., STEERED] > 0.0
+        watch[..., QUIET] = np.where(steered & calm, watch[..., QUIET] + 1.0, 0.0)
+        over = watch[..., QUIET] >= self._intervals(limits.calm_lengths)
+        now = (steered & ~over) | out
+        watch[..., STEERED] = now
+        watch[..., COUNT] += now & ~steered
+        watch[..., INTERVALS] += now
+
+    def _intervals(self, lengths: float) -> float:
+        """Control intervals in times to travel one ship length; one at least."""
+        length_time = 1.0 / self.fallback.observation_scales[OBSERVATION_NAMES.index("yaw_rate")]
+        return max(1.0, lengths * length_time / self.dt)
+
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse what shows other quantities first, or in other scales, than policy and fallback know.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        for one in (self.policy, self.fallback):
+            if (check := getattr(one, "check_fits", None)) is not None:
+                check(names, scales, where)
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship that policy or fallback was not made for."""
+        for one in (self.policy, self.fallback):
+            if (check := getattr(one, "check_fits_model", None)) is not None:
+                check(model)
+
+    def save(self, path: str | Path) -> None:
+        """Write policy and fallback as one file (format in `agents.policies.policy_file`)."""
+        from agents.policies.policy_file import save
+
+        save(self, Path(path))
