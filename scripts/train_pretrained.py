@@ -147,7 +147,8 @@ def table(tasks: Sequence[BenchmarkTask], algorithm: str) -> str:
     """Costs of the best classical controller, the oracle and the agent, and whether the aim is met."""
     reference = read_json(REFERENCE, "reference file", "make it again with scripts/tune_controllers.py")
     lines = [
-        "| Task | Best classical | Cost | Oracle | Learned | Room closed | Aim | Gain: scored, fresh | Seeds |",
+        "| Task | Best classical | Cost | Oracle | Learned | Room closed | Aim | Gain: scored, fresh "
+        "| Training seeds |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for task in tasks:
