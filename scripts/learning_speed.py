@@ -39,7 +39,7 @@ def ppo_speed(env_id: str, repeats: int = 3, threads: int = 2) -> LearningSpeed:
     before = torch.get_num_threads()
     torch.set_num_threads(threads)
     try:
-        settings = load_settings("ppo")
+        settings = load_settings("ppo", given={"base": "none"})
         arguments = sb3_arguments(settings)
         env = Timed(env_id, settings.ships, seed=0)
         scaled = VecNormalize(env, norm_obs=False, gamma=settings.gamma)

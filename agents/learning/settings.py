@@ -2,9 +2,8 @@
 
 The files in `hyperparameters/` hold the tuned ones, later tables before earlier ones:
 
-    [defaults]                          # every setting of the algorithm
-    [environments.path-following]       # those that differ there
-    [actions.rudder-discrete]           # those that differ with other commands than the rudder
+    [defaults]                          # every setting of the algorithm, to learn from nothing
+    [residual.path-following]           # those that differ there beside a base, by default for the rudder
     [tasks.mariner-rough]               # those that differ on a task of a suite
 
 A file of a user's own, and `--set`, name settings without tables.
@@ -331,7 +330,8 @@ def load_settings(
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded.
+        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
+        nothing.
 
     Raises
     ------
@@ -342,9 +342,12 @@ def load_settings(
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.learning").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = _parsed(text, where)
-    check_keys(content, ("defaults", "environments", "actions", "tasks"), where)
+    check_keys(content, ("defaults", "residual", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
-    for table, name in (("environments", environment), ("actions", action), ("tasks", task)):
+    tables = [("residual", environment), ("tasks", task)]
+    if action != "rudder" or (given or {}).get("base") == "none":
+        tables = []
+    for table, name in tables:
         own = check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
         chosen |= _settings(own, kind, f"{where}: {table}.{name}")
     return make_settings(algorithm, chosen | dict(given or {}))

@@ -50,7 +50,7 @@ def learned(algorithm, name, steps, settings):
 
 @pytest.mark.parametrize("name", [COURSE, PATH])
 def test_ppo_learns(name):
-    agent = learned(PPO, name, 8 * 4096, load_settings("ppo", given=QUICK))
+    agent = learned(PPO, name, 8 * 4096, load_settings("ppo", given={"base": "none", **QUICK}))
     assert mean_return(agent, name) > 0.25 * mean_return(Nothing(), name)
     assert max(info["l"] for info in agent.ep_info_buffer) <= 60
     assert bool(agent.ep_success_buffer) == (name == PATH)  # what stable-baselines3 logs as success rate
@@ -59,3 +59,13 @@ def test_ppo_learns(name):
 def test_sac_learns():
     agent = learned(SAC, COURSE, 2560, load_settings("sac", given=COARSE))
     assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)
+
+
+def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one():
+    assert (load_settings("ppo").base, load_settings("ppo", "path-following").base) == ("lq", "ilos")
+    assert load_settings("ppo", "path-following", "container-path").base == "tuned"
+    for asked in ({"given": {"base": "none"}}, {"action": "rudder-discrete"}, {"action": "rudder-shaft"}):
+        settings = load_settings("ppo", "path-following", "container-path", **asked)
+        assert (settings.base, settings.hold) == ("none", 1)
+        assert settings == load_settings("ppo", given={"base": "none"})
+    assert load_settings("sac").base == "none"

@@ -8,6 +8,7 @@ from agents.benchmarking.contestants import check_fits, pretrained
 from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import load_suite
 from agents.controllers.controller import model_hash
+from agents.learning.plan import Given, make_plan
 from agents.policies.policy import LearnedPolicy
 
 SUITE = load_suite()
@@ -30,6 +31,8 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
     record = agent.training
     assert record["task"] == task.name
     assert f"--task {task.name} --seed {record['seed']}" in record["command"]
+    commanded = make_plan(Given("ppo", task=task.name, seed=record["seed"])).configuration()
+    assert {name: record[name] for name in commanded} == commanded
     held_out = {run["seed"]: run["held_out_cost"] for run in record["runs"]}
     assert record["seed"] == min(held_out, key=held_out.get)
     for run in record["runs"]:

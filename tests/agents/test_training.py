@@ -22,7 +22,14 @@ from agents.learning.training import train
 from shipgym.errors import InputError
 
 TINY = {
-    "ppo": {"ships": 8, "n_steps": 32, "batch_size": 64, "n_epochs": 2, "total_steps": 768},
+    "ppo": {
+        "base": "none",
+        "ships": 8,
+        "n_steps": 32,
+        "batch_size": 64,
+        "n_epochs": 2,
+        "total_steps": 768,
+    },
     "sac": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
     "td3": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
     "tqc": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
@@ -207,11 +214,11 @@ def test_the_command_trains_and_resumes(tmp_path):
         (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
         (
             ["train", "ppo", "--set", "batch_size=1000"],
-            "a divisor above 1 of ships x n_steps, 16384",
+            "a divisor above 1 of ships x n_steps, 32768",
         ),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
         (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
-        (["train", "ppo", "--set", "authority=0.5"], "without a base"),
+        (["train", "ppo", "--set", "base=none", "--set", "authority=0.5"], "without a base"),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),
         (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),

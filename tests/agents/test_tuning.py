@@ -53,7 +53,7 @@ def trainings(tmp_path, monkeypatch):
 
 
 def plan(**settings):
-    return make_plan(Given("ppo", settings={"total_steps": 10} | settings))
+    return make_plan(Given("ppo", settings={"base": "none", "total_steps": 10} | settings))
 
 
 def test_better_settings_are_found_and_written_for_training(trainings, tmp_path):
