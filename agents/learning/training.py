@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from agents.agent_file import load_agent
 from agents.learning import run_folder
 from agents.learning.bases import design_base
@@ -33,6 +35,7 @@ try:
 except ModuleNotFoundError as error:
     raise InputError(f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'") from None
 
+REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
 CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
 
 
@@ -99,9 +102,9 @@ class TrainingResult:
 
     @property
     def lq_reached(self) -> Mapping[str, Any] | None:
-        """The first evaluation that cost no more than LQ; None if there was none."""
-        below = (row for row in self.curve if self.lq_cost is not None and row["cost"] <= self.lq_cost)
-        return next(below, None)
+        """The first evaluation that cost no more than LQ, to a thousandth; None if there was none."""
+        limit = -np.inf if self.lq_cost is None else REACHED * self.lq_cost
+        return next((row for row in self.curve if row["cost"] <= limit), None)
 
     def to_dict(self) -> dict[str, Any]:
         """For programs."""

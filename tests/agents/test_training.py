@@ -278,3 +278,9 @@ def test_a_process_that_is_killed_is_resumed(tmp_path):
     assert code == 0
     assert "resumed at step" in printed
     assert "go on with --resume" in printed.replace("\n", " ")
+
+
+def test_lq_is_reached_at_once_by_what_is_added_to_it_and_not_by_what_knows_nothing():
+    added, bare = train(tiny(base="lq", authority=0.1)), train(tiny())
+    assert added.lq_reached["steps"] == 0
+    assert bare.lq_reached is None
