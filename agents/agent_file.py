@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     Agent: TypeAlias = Controller | LearnedPolicy | Shielded
 
+RUN_AGENT = "agent.json"  # of a training's folder
 PRETRAINED = Path(__file__).parent / "pretrained"
 
 
@@ -61,7 +62,7 @@ def list_pretrained() -> list[str]:
 
 
 def find_agent(name: str | Path) -> Path:
-    """The file of an agent: as given, or of the pretrained agent of that name.
+    """The file of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
 
     Raises
     ------
@@ -69,8 +70,10 @@ def find_agent(name: str | Path) -> Path:
         If it is neither, with the nearest pretrained name.
     """
     given = Path(name)
-    if given.suffix == ".json" or given.exists():
+    if given.suffix == ".json" or given.is_file():
         return given
+    if (given / RUN_AGENT).is_file():
+        return given / RUN_AGENT
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(

@@ -176,8 +176,8 @@ def autopilot_command(
     model is unstable; the report then says so.
     """
     from agents.autopilot.run import build_autopilot
-    from agents.commands.identifying import given_options
     from agents.commands.terminal import progress_bars
+    from agents.identifying import given_options
     from agents.monte_carlo import Engine
 
     given = {

@@ -1,4 +1,4 @@
-"""Train an autopilot by PPO in calm water, keep it in a file, and fly it beside LQ.
+"""Train an autopilot by PPO on paths, keep it in a file, and fly it beside classical ones.
 
 python scripts/train_autopilot.py FOLDER
 """
@@ -8,12 +8,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from agents import LQ, fly, load_agent
+import numpy as np
+
+from agents import load_agent
+from agents.benchmarking.designs import design
+from agents.benchmarking.flying import episode_costs
 from agents.learning.plan import Given, make_plan
 from agents.learning.training import Progress, train
-from shipgym.models import load_model
 
-NEW_SEEDS = range(1_000_000, 1_000_100)
+NEW_SEEDS = np.arange(1_000_000, 1_000_100)
 
 
 def tell(now: Progress) -> None:
@@ -24,12 +27,12 @@ def tell(now: Progress) -> None:
 
 def main(folder: Path) -> None:
     """Train, or go on with a training that was stopped, then compare on episodes that nobody has seen."""
-    plan = make_plan(Given("ppo", environment="course-keeping", model="mariner", threads=2))
+    plan = make_plan(Given("ppo", environment="path-following", model="mariner", threads=2))
     train(plan, folder, resume=folder.exists(), tell=tell)
-    model = load_model("mariner")
-    for controller in (load_agent(folder / "agent.json", model), LQ.from_model(model)):
-        flights = fly(controller, model, seeds=list(NEW_SEEDS))
-        print(f"{controller.name}: mean cost of 100 new episodes {flights.cost.mean():.2f}")
+    task = plan.task
+    for controller in (load_agent(folder, task.ship), design("ilos", task), design("lq", task)):
+        costs = episode_costs(controller, task.engine(len(NEW_SEEDS)), NEW_SEEDS)
+        print(f"{controller.name}: mean cost of 100 new episodes {costs.mean():.1f}")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,7 @@
 
     python scripts/tune_controllers.py                      # what is missing in both files
     python scripts/tune_controllers.py --tasks mariner-calm --again
-    python scripts/tune_controllers.py --from-agents        # flies the oracle from the pretrained agents too
+    python scripts/tune_controllers.py --from-agents        # flies paths from the pretrained agents too
 
 Both files are written after every controller and task: killed at any moment, it goes on where it was. The
 oracle's costs of all scored episodes are kept in a third file. It flies again where more episodes are asked
@@ -60,7 +60,7 @@ def main() -> None:
     for task in tasks:
         tune_task(task, asked)
         refer(task, asked)
-        if asked.from_agents:
+        if asked.from_agents and task.environment == "path-following":
             fly_from_agent(task, asked.suite)
 
 
@@ -123,6 +123,8 @@ def fly(task: BenchmarkTask, start: Controller, cost: float, asked: argparse.Nam
 def fly_from_agent(task: BenchmarkTask, suite: str) -> None:
     """Fly the oracle from what the task's pretrained agent does; the cheaper of each episode is kept."""
     costs, known = _written(oracle_file(suite)), _written(reference_file(suite))
+    if known[task.name]["oracle_episodes"] < len(task.seeds):
+        raise SystemExit(f"{task.name}: the oracle flew too few episodes, fly all of them first")
     before = np.array(costs[task.name])
     agent = load_agent(f"{task.name}-ppo")
     flight = fly_oracle(task.ship, task.task, task.seeds, agent, OracleSettings(), task.parts[2])

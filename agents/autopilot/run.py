@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.autopilot.result import STEP_DEG, AutopilotResult, Pilot, Verification
-from agents.commands.identifying import identification_settings, identify_trials, trials_of
-from agents.commands.output import check_folder, whole_folder
+from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.monte_carlo import HERE, Engine, monte_carlo
+from agents.output import check_folder, whole_folder
 from identification.concerns import why_unstable
 from shipgym.checks import check_number
 from shipgym.errors import InputError, UnstableModelError

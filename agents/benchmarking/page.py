@@ -30,7 +30,7 @@ from agents.benchmarking.page_tables import (
 from agents.benchmarking.refly import Flight, Reflown, refly
 from agents.benchmarking.results import EPISODES, RESULTS, BenchmarkResult
 from agents.benchmarking.suite import N_EPISODES, load_suite
-from agents.commands.output import check_page
+from agents.output import check_page
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.episode import Episode
 from shipgym.pages import (

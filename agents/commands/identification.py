@@ -86,7 +86,7 @@ def identify_command(
 
 def _chosen(ship: Path, given: dict[str, Any], options: Sequence[str]) -> tuple[ShipFile, dict[str, Any]]:
     """The ship file, and the options: of the command line first."""
-    from agents.commands.identifying import given_options, identification_settings
+    from agents.identifying import given_options, identification_settings
     from shipgym.ship_file import ShipFile
 
     read = ShipFile.load(ship)
@@ -94,10 +94,10 @@ def _chosen(ship: Path, given: dict[str, Any], options: Sequence[str]) -> tuple[
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
-    from agents.commands.identifying import identify_ship
-    from agents.commands.output import check_folder, whole_folder
     from agents.commands.terminal import err, prediction_table, print_json
     from agents.commands.terminal import out as console
+    from agents.identifying import identify_ship
+    from agents.output import check_folder, whole_folder
     from identification.concerns import why_unstable
     from identification.result import FILES
 
@@ -130,10 +130,10 @@ def _judge(result: IdentificationResult) -> None:
 
 
 def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str | None, as_json: bool) -> None:
-    from agents.commands.identifying import compare_ship
-    from agents.commands.output import check_folder, whole_folder
     from agents.commands.terminal import comparison_table, err, print_json, warn
     from agents.commands.terminal import out as console
+    from agents.identifying import compare_ship
+    from agents.output import check_folder, whole_folder
     from identification.comparison import COMPARISON_FILES
 
     check_folder(out, COMPARISON_FILES)
@@ -177,9 +177,9 @@ def advise_command(
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
     is least certain.
     """
-    from agents.commands.identifying import identify_ship
     from agents.commands.terminal import err, print_json
     from agents.commands.terminal import out as console
+    from agents.identifying import identify_ship
     from identification.experiment import advise
 
     given = {"structure": structure, "method": method, "samples": samples}
@@ -216,10 +216,10 @@ def reduce_command(
     Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
     model is unstable.
     """
-    from agents.commands.identifying import reduce_ship
-    from agents.commands.output import check_folder, whole_folder
     from agents.commands.terminal import err, prediction_table, print_json
     from agents.commands.terminal import out as console
+    from agents.identifying import reduce_ship
+    from agents.output import check_folder, whole_folder
     from identification.result import FILES
     from shipgym.json_file import write_json
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.commands import output
+from agents import output
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
 from shipgym.manoeuvres.imo import judge_imo

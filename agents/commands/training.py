@@ -37,7 +37,7 @@ def train_command(
         ),
     ] = None,
     total_steps: Annotated[
-        int | None, typer.Option(min=1, help="Control intervals to learn from; default: the algorithm's.")
+        int | None, typer.Option(min=1, help="Decisions to learn from; default: those of the settings.")
     ] = None,
     settings: Annotated[
         Path | None, typer.Option(metavar="FILE.TOML", help="Settings that go before the tuned ones.")

@@ -35,7 +35,7 @@ def tune_command(
     ] = None,
     trials: Annotated[int, typer.Option(min=1, help="In all, those done before among them.")] = 20,
     total_steps: Annotated[
-        int | None, typer.Option(min=1, help="Of each trial; default: the algorithm's.")
+        int | None, typer.Option(min=1, help="Of each trial; default: those of the settings.")
     ] = None,
     settings: Annotated[
         Path | None, typer.Option(metavar="FILE.TOML", help="Settings to begin from; they are varied too.")

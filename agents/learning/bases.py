@@ -33,6 +33,10 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name == "tuned":
+        if not task.name:
+            raise InputError(
+                "base: 'tuned' found without a task of the suite, expected --task, or another base"
+            )
         return tuned("base", task, DEFAULT_SUITE)
     if name.endswith(".json"):
         agent = load_agent(name, task.ship)

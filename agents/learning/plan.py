@@ -77,6 +77,11 @@ class Plan:
         if self.settings.ships > SEEDS_EACH:
             raise InputError(f"ships: {self.settings.ships} found, expected at most {SEEDS_EACH}")
         check_whole(self.threads, "threads", at_least=1)
+        longest = self.task.task.episode_steps
+        if self.settings.hold > longest:
+            raise InputError(
+                f"hold: {self.settings.hold} found, expected at most an episode's {longest} steps"
+            )
         self._check_action()
         self.task.task.check_fits(self.task.ship)
 

@@ -16,8 +16,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from agents.commands.output import whole_folder
 from agents.learning.plan import Plan, check_same
+from agents.output import whole_folder
 from shipgym.checks import check_keys, check_table, check_whole
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json

@@ -13,7 +13,8 @@ n_epochs               2 to 12                                        ppo
 gae_lambda             0.85 to 1                                      ppo
 clip_range             0.1 to 0.4                                     ppo
 ent_coef               1e-6 to 1e-2, in its logarithm                 ppo
-log_std_init           -2 to 0.5                                      ppo
+log_std_init           -3 to 0.5                                      ppo
+hold                   1, 4, 16                                       ppo
 batch_size             128, 256, 512                                  sac, td3, tqc
 gradient_steps         2, 4, 8, 16                                    sac, td3, tqc
 tau                    1e-3 to 5e-2, in its logarithm                 sac, td3, tqc
@@ -81,7 +82,8 @@ SPACES: Mapping[str, Mapping[str, Dimension]] = {
         "gae_lambda": Reals(0.85, 1.0),
         "clip_range": Reals(0.1, 0.4),
         "ent_coef": Reals(1e-6, 1e-2, log=True),
-        "log_std_init": Reals(-2.0, 0.5),
+        "log_std_init": Reals(-3.0, 0.5),
+        "hold": Choice((1, 4, 16)),
     },
     "sac": {**ALL, **OFF_POLICY, "ent_coef": ENTROPY},
     "td3": {

@@ -18,7 +18,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
+from agents.benchmarking.suite import ENVIRONMENTS
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
+from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
 
 SCHEDULES = ("constant", "linear")
@@ -339,6 +341,8 @@ def load_settings(
         For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
+    check_choice(environment, ENVIRONMENTS, "environment")
+    check_choice(action, ACTIONS, "action")
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.learning").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = _parsed(text, where)

@@ -45,7 +45,7 @@ class Progress(NamedTuple):
     Attributes
     ----------
     steps, total : int
-        Control intervals learned from, and to learn from.
+        Decisions learned from, and to learn from.
     seconds : float
         Spent so far, those before it was resumed among them.
     cost, best_cost, lq_cost : float or None

@@ -156,16 +156,19 @@ def evaluated_evenly(plan: Plan) -> Plan:
 
 
 def train_trial(job: dict[str, Any]) -> dict[str, Any]:
-    """Train one trial; stop it when it is worse than finished ones were."""
+    """Train one trial; stop it when it is worse than finished ones were.
+
+    What a base does before anything is learned is no merit of the settings: step 0 does not count.
+    """
     from agents.learning.training import Progress, train
 
     plan = Plan.from_configuration(job["configuration"], threads=1)
     curve: list[tuple[int, float]] = []
 
     def tell(now: Progress) -> None:
-        if now.evaluated and now.cost is not None and now.best_cost is not None:
+        if now.evaluated and now.cost is not None and now.steps > 0:
             curve.append((now.steps, now.cost))
-            if now.best_cost > allowed(job["limits"], now.steps):
+            if _best_until(curve, now.steps) > allowed(job["limits"], now.steps):
                 raise _StoppedEarlyError
 
     try:
@@ -174,8 +177,8 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
         return {"cost": None, "curve": curve, "ended": "stopped early"}
     except InputError as error:
         return {"cost": None, "curve": curve, "ended": "diverged", "why": str(error)}
-    told = [(row["steps"], row["cost"]) for row in result.curve]
-    return {"cost": result.best_cost, "curve": told, "ended": "finished"}
+    told = [(row["steps"], row["cost"]) for row in result.curve if row["steps"] > 0]
+    return {"cost": min(cost for _, cost in told), "curve": told, "ended": "finished"}
 
 
 class _StoppedEarlyError(Exception):

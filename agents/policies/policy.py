@@ -219,8 +219,8 @@ class LearnedPolicy:
         return action.reshape(*given.shape[:-1], -1), memory
 
     def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
-        """Outputs that hold now: new ones of the ships whose last decision is over."""
-        due = held[:, 0] <= 0.0
+        """Outputs that hold now: new ones of the ships whose last decision is over, or was none."""
+        due = (held[:, 0] <= 0.0) | ~np.isfinite(held).all(axis=1)  # what was no number is not held
         now = held if not due.any() else np.where(due[:, None], self._outputs(inputs), held)
         now[:, 0] -= 1.0
         return now
@@ -245,6 +245,11 @@ class LearnedPolicy:
         nothing = np.zeros((n, 1 + OUTPUTS[self.action]), dtype=np.float32)
         if state is None:
             return present, None, nothing
+        if not isinstance(state, tuple) or len(state) != len(Memory._fields):
+            raise InputError(
+                f"state: {type(state).__name__} found, expected what the last predict handed back, or None "
+                f"where episodes begin"
+            )
         seen, inner, held = state
         expected = (n, past, rows.shape[1])
         if np.shape(seen) != (expected if ndim == 2 else expected[1:]):

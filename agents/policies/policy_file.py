@@ -63,6 +63,7 @@ LEARNED = (
     "format", "kind", "observation_names", "observation_scales", "action", "network", "history", "base",
     "authority", "hold", "environment", "model", "training",
 )  # fmt: skip
+LATER = {"hold": 1}  # what older files lack, and what it means
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 REMEDY = "take another copy of both files"
 
@@ -202,7 +203,7 @@ def _check_fields(content: Mapping[str, Any], expected: tuple[str, ...], where: 
         )
     check_keys(content, expected, where)
     for name in expected:
-        if name not in content:
+        if name not in content and name not in LATER:
             raise InputError(f"{where}: field '{name}' is missing; the file has {quoted(expected)}")
 
 
@@ -222,7 +223,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             history=content["history"],
             base=None if base is None else read_controller(_table(base, "base", where), f"{where}: base"),
             authority=content["authority"],
-            hold=content["hold"],
+            hold=content.get("hold", LATER["hold"]),
             env_id=place["id"],
             env_options=dict(check_table(place.get("options"), f"{where}: environment.options")),
             model_name=model["name"],

@@ -10,7 +10,7 @@ from pathlib import Path
 from string import Template
 
 import shipgym
-from agents.commands.output import check_page
+from agents.output import check_page
 from agents.replay.series import quantities, run
 from shipgym.episode import Episode
 from shipgym.errors import InputError

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.commands.identifying import identification_settings, identify_ship, parsed_options
+from agents.identifying import identification_settings, identify_ship, parsed_options
 from identification.methods import METHODS
 from shipgym import InputError, ShipFile, load_model
 from shipgym.identify_table import OPTIONS

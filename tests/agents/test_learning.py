@@ -10,6 +10,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 from agents.learning.algorithms import sb3_arguments
 from agents.learning.settings import load_settings
 from shipgym import ShipVecEnv
+from shipgym.errors import InputError
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHORT = {
@@ -69,3 +70,9 @@ def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one():
         assert (settings.base, settings.hold) == ("none", 1)
         assert settings == load_settings("ppo", given={"base": "none"})
     assert load_settings("sac").base == "none"
+
+
+def test_unknown_places_for_settings_are_refused():
+    for asked in ({"environment": "paths"}, {"action": "ruder"}):
+        with pytest.raises(InputError, match=f"{next(iter(asked))}: "):
+            load_settings("ppo", **asked)

@@ -1,6 +1,6 @@
 import pytest
 
-from agents.commands.output import check_folder, whole_folder
+from agents.output import check_folder, whole_folder
 from shipgym import InputError
 
 NAMES = ("model.json", "metrics.json")

@@ -97,6 +97,19 @@ def test_an_output_is_held_while_the_base_goes_on():
     np.testing.assert_array_equal(silent.predict(SEEN[2], state)[0], silent.predict(SEEN[2])[0])
 
 
+def test_what_was_no_number_is_not_held():
+    policy = random_policy(hold=4)
+    broken, state = policy.predict(np.where(np.arange(8) == 2, np.nan, SEEN[0]))
+    assert np.isnan(broken).all()
+    np.testing.assert_array_equal(policy.predict(SEEN[1], state)[0], policy.predict(SEEN[1])[0])
+
+
+@pytest.mark.parametrize("state", [3, (1, 2), "state"])
+def test_a_state_that_is_none_is_refused(state):
+    with pytest.raises(InputError, match=r"state: .* found, expected what the last predict handed back"):
+        random_policy(history=2).predict(SEEN, state)
+
+
 def test_the_network_adds_its_part_to_the_base():
     policy = random_policy(base=LQ_MARINER, authority=0.3)
     base, _ = LQ_MARINER.predict(SEEN)

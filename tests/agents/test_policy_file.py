@@ -249,3 +249,11 @@ def test_what_is_loaded_passes_the_conformance_suite(tmp_path):
     POLICIES["twice"].save(tmp_path / "agent.json")
     check_controller(load_agent(tmp_path / "agent.json"), MARINER, n_steps=5)
     assert isinstance(load_agent(tmp_path / "agent.json").fallback, LQ)
+
+
+def test_a_file_of_before_there_was_hold_is_read_and_a_run_s_folder_names_its_agent(tmp_path):
+    POLICIES["plain"].save(tmp_path / "agent.json")
+    content = json.loads((tmp_path / "agent.json").read_text())
+    del content["hold"]
+    (tmp_path / "agent.json").write_text(json.dumps(content))
+    np.testing.assert_array_equal(steered(load_agent(tmp_path)), steered(POLICIES["plain"]))

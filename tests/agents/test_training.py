@@ -219,6 +219,8 @@ def test_the_command_trains_and_resumes(tmp_path):
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
         (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
         (["train", "ppo", "--set", "base=none", "--set", "authority=0.5"], "without a base"),
+        (["train", "ppo", "--set", "base=tuned"], "base: 'tuned' found without a task of the suite"),
+        (["train", "ppo", "--set", "hold=1000"], "hold: 1000 found, expected at most an episode's 600 steps"),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),
         (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),

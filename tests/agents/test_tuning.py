@@ -177,3 +177,13 @@ def test_missing_optuna_is_told_with_its_extra(tmp_path, monkeypatch):
     monkeypatch.setattr("agents.learning.tuning.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[tune\]'"):
         tune(plan(), tmp_path / "study", 1)
+
+
+def test_what_a_base_does_before_anything_is_learned_does_not_count():
+    settings = {"base": "lq", "ships": 2, "n_steps": 8, "batch_size": 16, "total_steps": 32, "net_arch": [4]}
+    plan = make_plan(Given("ppo", settings=settings | {"evaluate_every": 16, "learning_rate": 1.0}))
+    told = train_trial({"configuration": plan.configuration(), "limits": []})
+    assert [steps for steps, _ in told["curve"]] == [16, 32]
+    assert told["cost"] == min(cost for _, cost in told["curve"]) > 30.0  # LQ: 26
+    stopped = train_trial({"configuration": plan.configuration(), "limits": [(16, 30.0)]})
+    assert (stopped["ended"], [steps for steps, _ in stopped["curve"]]) == ("stopped early", [16])
