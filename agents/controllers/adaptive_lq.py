@@ -125,12 +125,8 @@ class AdaptiveLQ(Stateful):
             rudder_weight=rudder_weight,
             rate_weight_s2=rate_weight_s2,
         )
-        about = straight_running(model)
         interval, time = start.design["dt"], length_time(model)
-        length, speed = model.particulars["length"], about.surge
-        steering, rudder = linearise(model, about)
-        prior = np.column_stack([steering, rudder, np.zeros(N_EQUATIONS)]) / units(length, speed)
-        prior[:, 3] = -prior[:, 0] * about.sway / speed - prior[:, 2] * about.rudder
+        length, speed = model.particulars["length"], straight_running(model).surge
         deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
         errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
         return cls(
@@ -155,7 +151,7 @@ class AdaptiveLQ(Stateful):
                 "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
                 "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
             },
-            prior=prior,
+            prior=prime_steering(model),
         )
 
     @property
@@ -325,6 +321,16 @@ def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:
     poles = np.linalg.eigvals(A + B[:, :, None] * rows[:, None, :])
     held: Flags = np.abs(poles).max(axis=1, initial=0.0) < 1.0
     return held
+
+
+def prime_steering(model: ShipModel) -> Floats:
+    """Prime coefficients of a model's linear steering about straight running, as `AdaptiveLQ.prior`."""
+    about = straight_running(model)
+    steering, rudder = linearise(model, about)
+    found: Floats = np.column_stack([steering, rudder, np.zeros(N_EQUATIONS)])
+    found /= units(model.particulars["length"], about.surge)
+    found[:, 3] = -found[:, 0] * about.sway / about.surge - found[:, 2] * about.rudder
+    return found
 
 
 def units(length: float, speed: float) -> Floats:
