@@ -21,7 +21,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.agent_file import load_agent
+from agents.agent_file import find_agent, load_agent
+from agents.benchmarking.contestants import file_hash
 from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
     CLASSICAL,
@@ -121,15 +122,21 @@ def fly(task: BenchmarkTask, start: Controller, cost: float, asked: argparse.Nam
 
 
 def fly_from_agent(task: BenchmarkTask, suite: str) -> None:
-    """Fly the oracle from what the task's pretrained agent does; the cheaper of each episode is kept."""
+    """Fly the oracle from what the task's pretrained agent does; the cheaper of each episode is kept.
+
+    The reference names the agent's file, so that the same agent is not flown from again.
+    """
     costs, known = _written(oracle_file(suite)), _written(reference_file(suite))
     if known[task.name]["oracle_episodes"] < len(task.seeds):
         raise SystemExit(f"{task.name}: the oracle flew too few episodes, fly all of them first")
+    agent_hash = file_hash(find_agent(f"{task.name}-ppo"))
+    if known[task.name].get("agent_sha256") == agent_hash:
+        return
     before = np.array(costs[task.name])
     agent = load_agent(f"{task.name}-ppo")
     flight = fly_oracle(task.ship, task.task, task.seeds, agent, OracleSettings(), task.parts[2])
     after = np.minimum(before, flight.costs)
-    known[task.name]["oracle"] = float(after.mean())
+    known[task.name] |= {"oracle": float(after.mean()), "agent_sha256": agent_hash}
     write_json({**costs, task.name: after.tolist()}, oracle_file(suite))
     write_json(known, reference_file(suite))
     print(f"{task.name:20s} oracle {before.mean():.2f} -> {after.mean():.2f}", flush=True)

@@ -53,6 +53,21 @@ Set = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="OPTION=VALUE", help="Any option of the table [identify]; repeatable."),
 ]
+Algorithm = Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
+Environment = Annotated[
+    str | None, typer.Option(help="course-keeping (default), path-following, or an environment's id.")
+]
+Model = Annotated[
+    str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")
+]
+Sea = Annotated[str | None, typer.Option(help="calm (default), slight, moderate or rough.")]
+TaskName = Annotated[
+    str | None, typer.Option(help="A task of the suite, in place of --env, --model and --sea.")
+]
+EnvironmentOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="NAME=VALUE", help="Any other keyword of the environment; repeatable."),
+]
 EngineName = Annotated[
     str, typer.Option("--engine", help="Where jobs are done: local (this machine) or ray.")
 ]

@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.commands.command import INTERRUPTED, Json, answered, fail
+from agents.commands.command import (
+    INTERRUPTED,
+    Algorithm,
+    Environment,
+    EnvironmentOptions,
+    Json,
+    Model,
+    Sea,
+    TaskName,
+    answered,
+    fail,
+)
 
 if TYPE_CHECKING:
     from agents.learning.plan import Given
@@ -18,24 +29,13 @@ if TYPE_CHECKING:
 
 @answered
 def train_command(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")],
+    algorithm: Algorithm,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run.")],
-    env: Annotated[
-        str | None, typer.Option(help="course-keeping (default), path-following, or an environment's id.")
-    ] = None,
-    model: Annotated[
-        str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")
-    ] = None,
-    sea: Annotated[str | None, typer.Option(help="calm (default), slight, moderate or rough.")] = None,
-    task: Annotated[
-        str | None, typer.Option(help="A task of the suite, in place of --env, --model and --sea.")
-    ] = None,
-    environment_options: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--option", metavar="NAME=VALUE", help="Any other keyword of the environment; repeatable."
-        ),
-    ] = None,
+    env: Environment = None,
+    model: Model = None,
+    sea: Sea = None,
+    task: TaskName = None,
+    environment_options: EnvironmentOptions = None,
     total_steps: Annotated[
         int | None, typer.Option(min=1, help="Decisions to learn from; default: those of the settings.")
     ] = None,

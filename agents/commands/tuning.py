@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.commands.command import Address, EngineName, Json, Workers, answered
+from agents.commands.command import (
+    Address,
+    Algorithm,
+    EngineName,
+    Environment,
+    EnvironmentOptions,
+    Json,
+    Model,
+    Sea,
+    TaskName,
+    Workers,
+    answered,
+)
 
 if TYPE_CHECKING:
     from agents.learning.tuning import Tuning
@@ -15,24 +27,13 @@ if TYPE_CHECKING:
 
 @answered
 def tune_command(
-    algorithm: Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")],
+    algorithm: Algorithm,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the study; one there goes on.")],
-    env: Annotated[
-        str | None, typer.Option(help="course-keeping (default), path-following, or an environment's id.")
-    ] = None,
-    model: Annotated[
-        str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")
-    ] = None,
-    sea: Annotated[str | None, typer.Option(help="calm (default), slight, moderate or rough.")] = None,
-    task: Annotated[
-        str | None, typer.Option(help="A task of the suite, in place of --env, --model and --sea.")
-    ] = None,
-    environment_options: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--option", metavar="NAME=VALUE", help="Any other keyword of the environment; repeatable."
-        ),
-    ] = None,
+    env: Environment = None,
+    model: Model = None,
+    sea: Sea = None,
+    task: TaskName = None,
+    environment_options: EnvironmentOptions = None,
     trials: Annotated[int, typer.Option(min=1, help="In all, those done before among them.")] = 20,
     total_steps: Annotated[
         int | None, typer.Option(min=1, help="Of each trial; default: those of the settings.")
