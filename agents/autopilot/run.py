@@ -14,7 +14,7 @@ from agents.identifying import identification_settings, identify_trials, trials_
 from agents.monte_carlo import HERE, Engine, monte_carlo
 from agents.output import check_folder, whole_folder
 from identification.concerns import why_unstable
-from shipgym.checks import check_number
+from shipgym.checks import check_number, quoted
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.json_file import write_json
 from shipgym.models import ShipModel
@@ -217,7 +217,13 @@ def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     from shipgym.envs.course_keeping_task import CourseKeepingTask
 
     shown = CourseKeepingTask().observed(model)
-    guest.check_fits([one.name for one in shown], [one.scale for one in shown], where)
+    names = [one.name for one in shown]
+    if more := [name for name in guest.observation_names if name not in names]:
+        raise InputError(
+            f"{where}: it observes {quoted(more)}, which course keeping does not show; expected an agent for "
+            "course keeping, such as mariner-calm-ppo; paths are flown by shipgym benchmark"
+        )
+    guest.check_fits(names, [one.scale for one in shown], where)
 
 
 def _told_apart(names: Sequence[str]) -> list[str]:

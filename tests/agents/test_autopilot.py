@@ -87,7 +87,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
         )
     else:
         random_policy(load_model("kvlcc2")).save(path)
-    said = "cross_track" if made_for == "paths" else "the scale of '.*' is"
+    said = "cross_track.*paths are flown by" if made_for == "paths" else "the scale of '.*' is"
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
