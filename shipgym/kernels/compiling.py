@@ -13,11 +13,14 @@ _Function = TypeVar("_Function", bound=Callable[..., object])
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken,
 # because the others would optimise NaN checks away and make results depend on the batch size.
 _SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+#: Of functions that kernels call: without entries for Python, where a call would crash, and for C; these take
+#: longer to compile than many of them.
+_INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def inlined(function: _Function) -> _Function:
-    """Compile a scalar function into each loop that calls it."""
-    compiled: _Function = njit(forceinline=True, **_SEMANTICS)(function)
+    """Compile a scalar function into each loop that calls it; Python cannot call it."""
+    compiled: _Function = njit(forceinline=True, **_INNER, **_SEMANTICS)(function)
     return compiled
 
 
@@ -27,13 +30,13 @@ def exact(function: _Function) -> _Function:
     What is also stored as it is summed could be contracted in one form of a loop and not in another; so costs
     and observations, which are, would depend on the batch size.
     """
-    compiled: _Function = njit(forceinline=True, error_model="numpy")(function)
+    compiled: _Function = njit(forceinline=True, **_INNER, error_model="numpy")(function)
     return compiled
 
 
 def rare(function: _Function) -> _Function:
     """Compile a function for one lane that is seldom called, and leave it out of the loops."""
-    compiled: _Function = njit(**_SEMANTICS)(function)
+    compiled: _Function = njit(**_INNER, **_SEMANTICS)(function)
     return compiled
 
 

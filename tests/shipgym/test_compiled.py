@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym.kernels.trigonometry import sin_cos, small_cosine, small_sin_cos, wrap
+from shipgym.kernels import trigonometry
 from shipgym.simulation import compiled
 from shipgym.simulation.generator import accelerations_source
+from tests.shipgym.outer import outer
+
+sin_cos, wrap = outer(trigonometry.sin_cos), outer(trigonometry.wrap)
+small_sin_cos, small_cosine = outer(trigonometry.small_sin_cos), outer(trigonometry.small_cosine)
 
 FLY = """
 import numpy as np, shipgym
