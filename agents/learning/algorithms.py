@@ -18,6 +18,7 @@ from agents.learning.residual import ResidualVecEnv
 from agents.learning.settings import (
     LEARNED,
     RUNNING,
+    OffPolicySettings,
     PPOSettings,
     SACSettings,
     Settings,
@@ -34,7 +35,7 @@ ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 SHARED = ("batch_size", "gamma")
 OF_PPO = ("n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
 OF_STORE = ("buffer_size", "learning_starts", "train_freq", "gradient_steps", "tau")
-OF_SAC = (*OF_STORE, "ent_coef")
+OF_SAC = (*OF_STORE, "ent_coef", "target_entropy")
 OF_TD3 = (*OF_STORE, "policy_delay", "target_policy_noise", "target_noise_clip")
 _OWN: dict[type[Settings], tuple[str, ...]] = {
     PPOSettings: OF_PPO,
@@ -105,7 +106,21 @@ def make_agent(plan: Plan, base: Controller | None) -> Any:
     kind = algorithm_class(plan.algorithm)
     ships = make_ships(plan, base)
     arguments = sb3_arguments(plan.settings, ships.action_space.shape)
-    return kind("MlpPolicy", ships, seed=plan.training_seed, **arguments)
+    agent = kind("MlpPolicy", ships, seed=plan.training_seed, **arguments)
+    if base is not None and isinstance(plan.settings, OffPolicySettings):
+        begin_as_base(agent)
+    return agent
+
+
+def begin_as_base(agent: Any) -> None:
+    """Let a policy that adds to a controller add nothing at first: its last layer is zero.
+
+    Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero anyway.
+    """
+    for actor in (agent.actor, getattr(agent, "actor_target", agent.actor)):  # SAC and TQC have no target
+        last = [layer for layer in actor.mu.modules() if isinstance(layer, torch.nn.Linear)][-1]
+        torch.nn.init.zeros_(last.weight)
+        torch.nn.init.zeros_(last.bias)
 
 
 def sb3_arguments(settings: Settings, action_shape: tuple[int, ...] = (1,)) -> dict[str, Any]:
@@ -123,6 +138,8 @@ def sb3_arguments(settings: Settings, action_shape: tuple[int, ...] = (1,)) -> d
         "activation_fn": ACTIVATIONS[settings.activation],
         "optimizer_kwargs": {"fused": True},  # half of the time of small networks is Adam's otherwise
     }
+    if isinstance(settings, OffPolicySettings):
+        network["net_arch"] = {"pi": list(settings.net_arch), "qf": list(settings.critic_arch)}
     if isinstance(settings, PPOSettings):
         network["log_std_init"] = settings.log_std_init
     if isinstance(settings, TD3Settings):

@@ -24,7 +24,7 @@ from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
 
 SCHEDULES = ("constant", "linear")
-RUNNING, LEARNED = "running", "learned"
+RUNNING, LEARNED, AUTO = "running", "learned", "auto"
 ACTIVATIONS = ("relu", "tanh")
 #: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
 #: task (but `direct_search.NO_BASES`), and a path that ends in .json is a controller's file.
@@ -55,7 +55,7 @@ class Settings:
     gamma : float
         Discount of a decision.
     net_arch : tuple of int
-        Widths of the hidden layers, of policy and value alike.
+        Widths of the hidden layers of the policy, and of PPO's value.
     activation : {"relu", "tanh"}
         Between the layers.
     history : int
@@ -97,6 +97,7 @@ class Settings:
         "authority": {"above": 0.0, "at_most": 2.0},
     }
     CHOICES: ClassVar[Mapping[str, Sequence[str]]] = {"schedule": SCHEDULES, "activation": ACTIVATIONS}
+    WIDTHS: ClassVar[tuple[str, ...]] = ("net_arch",)
 
     def __post_init__(self) -> None:
         for name, least in self.WHOLE.items():
@@ -105,12 +106,8 @@ class Settings:
             object.__setattr__(self, name, check_number(getattr(self, name), name, **bounds))
         for name, words in self.CHOICES.items():
             check_choice(getattr(self, name), words, name)
-        widths: Any = self.net_arch
-        if isinstance(widths, str) or not isinstance(widths, Sequence):
-            raise InputError(f"net_arch: {widths!r} found, expected widths of layers, such as [64, 64]")
-        for width in widths:
-            check_whole(width, "net_arch", at_least=1)
-        object.__setattr__(self, "net_arch", tuple(widths))
+        for name in self.WIDTHS:
+            object.__setattr__(self, name, check_widths(getattr(self, name), name))
         if self.reward_scale != RUNNING:
             check_number(self.reward_scale, "reward_scale", above=0.0, hint=f"or '{RUNNING}'")
         if not check_text(self.base, "base").endswith(".json"):
@@ -124,7 +121,7 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
-        return asdict(self) | {"net_arch": list(self.net_arch)}
+        return {name: list(value) if name in self.WIDTHS else value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True)
@@ -201,6 +198,8 @@ class OffPolicySettings(Settings):
         Of an update.
     tau : float
         Share by which the target network follows.
+    critic_arch : tuple of int
+        Widths of the hidden layers of the critics.
     """
 
     buffer_size: int
@@ -208,11 +207,13 @@ class OffPolicySettings(Settings):
     train_freq: int
     gradient_steps: int
     tau: float
+    critic_arch: tuple[int, ...]
 
     WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {
         "buffer_size": 1, "learning_starts": 0, "train_freq": 1, "gradient_steps": 1,
     }  # fmt: skip
     NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {"tau": {"above": 0.0, "at_most": 1.0}}
+    WIDTHS: ClassVar[tuple[str, ...]] = (*Settings.WIDTHS, "critic_arch")
 
     def _check_rollout(self) -> None:
         if self.buffer_size < self.ships:
@@ -229,13 +230,18 @@ class SACSettings(OffPolicySettings):
     ----------
     ent_coef : float or str
         Weight of the entropy; "auto" or "auto_0.1" adapts it, from that value.
+    target_entropy : float or "auto"
+        To what; "auto" is -1 for each command. One command deviates by 0.09 with -1, by 0.24 with 0.
     """
 
     ent_coef: float | str
+    target_entropy: float | str
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_entropy(self.ent_coef)
+        if self.target_entropy != AUTO:
+            check_number(self.target_entropy, "target_entropy", at_most=1.0, hint=f"or '{AUTO}'")
 
 
 @dataclass(frozen=True)
@@ -298,6 +304,15 @@ class TQCSettings(SACSettings):
 ALGORITHMS: Mapping[str, type[Settings]] = {
     "ppo": PPOSettings, "sac": SACSettings, "td3": TD3Settings, "tqc": TQCSettings,
 }  # fmt: skip
+
+
+def check_widths(value: Any, name: str) -> tuple[int, ...]:
+    """Widths of a network's hidden layers, if they are some."""
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(f"{name}: {value!r} found, expected widths of layers, such as [64, 64]")
+    for width in value:
+        check_whole(width, name, at_least=1)
+    return tuple(value)
 
 
 def check_entropy(value: Any) -> None:

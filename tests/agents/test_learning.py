@@ -7,8 +7,9 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
+from agents.benchmarking.suite import load_suite
 from agents.learning.algorithms import sb3_arguments
-from agents.learning.settings import load_settings
+from agents.learning.settings import ALGORITHMS, load_settings
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
 
@@ -58,18 +59,20 @@ def test_ppo_learns(name):
 
 
 def test_sac_learns():
-    agent = learned(SAC, COURSE, 2560, load_settings("sac", given=COARSE))
+    agent = learned(SAC, COURSE, 2560, load_settings("sac", given={"base": "none", **COARSE}))
     assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)
 
 
-def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one():
-    assert (load_settings("ppo").base, load_settings("ppo", "path-following").base) == ("lq", "ilos")
-    assert load_settings("ppo", "path-following", "container-path").base == "tuned"
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one(algorithm):
+    assert load_settings(algorithm).base == "lq"
+    assert load_settings(algorithm, "path-following").base == "ilos"
+    for task in load_suite().tasks:
+        assert load_settings(algorithm, "path-following", task.name).base == "tuned"
     for asked in ({"given": {"base": "none"}}, {"action": "rudder-discrete"}, {"action": "rudder-shaft"}):
-        settings = load_settings("ppo", "path-following", "container-path", **asked)
+        settings = load_settings(algorithm, "path-following", "container-path", **asked)
         assert (settings.base, settings.hold) == ("none", 1)
-        assert settings == load_settings("ppo", given={"base": "none"})
-    assert load_settings("sac").base == "none"
+        assert settings == load_settings(algorithm, given={"base": "none"})
 
 
 def test_unknown_places_for_settings_are_refused():

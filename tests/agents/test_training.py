@@ -21,6 +21,15 @@ from agents.learning.plan import EVALUATION_SEED, Given, make_plan, training_opt
 from agents.learning.training import train
 from shipgym.errors import InputError
 
+OFF_POLICY = {
+    "base": "none",
+    "ships": 4,
+    "learning_starts": 64,
+    "gradient_steps": 1,
+    "batch_size": 32,
+    "critic_arch": [12],
+    "total_steps": 144,
+}
 TINY = {
     "ppo": {
         "base": "none",
@@ -30,9 +39,9 @@ TINY = {
         "n_epochs": 2,
         "total_steps": 768,
     },
-    "sac": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
-    "td3": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
-    "tqc": {"ships": 4, "learning_starts": 64, "gradient_steps": 1, "batch_size": 32, "total_steps": 144},
+    "sac": OFF_POLICY,
+    "td3": OFF_POLICY,
+    "tqc": OFF_POLICY,
 }
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
 OPTIONS = [f"--option={name}={value}" for name, value in SHORT.items()]
@@ -140,10 +149,17 @@ def test_randomised_ships_sail_all_seas_at_many_speeds():
 
 def test_agents_have_the_settings():
     agent = make_agent(tiny("tqc", gamma=0.9, tau=0.1, activation="tanh"), None)
-    assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (0.9, 0.1, [8])
+    assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (0.9, 0.1, {"pi": [8], "qf": [12]})
     assert agent.policy_kwargs["activation_fn"].__name__ == "Tanh"
     assert agent.top_quantiles_to_drop_per_net == 2
     assert agent.lr_schedule(0.5) == pytest.approx(0.5 * agent.lr_schedule(1.0))
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
+def test_what_is_added_to_a_controller_is_nothing_at_first(algorithm):
+    result = train(tiny(algorithm, base="lq"))
+    assert result.curve[0]["cost"] == result.lq_cost
+    assert result.curve[-1]["cost"] != result.lq_cost
 
 
 def test_ships_that_learn_begin_one_after_another():
