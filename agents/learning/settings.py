@@ -4,7 +4,8 @@ The files in `hyperparameters/` hold the tuned ones, later tables before earlier
 
     [defaults]                          # every setting of the algorithm, to learn from nothing
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
-    [tasks.mariner-rough]               # those that differ on a task of a suite
+    [suite]                             # those that differ on every task of the suite
+    [tasks.mariner-rough]               # those that differ on one of them
 
 A file of a user's own, and `--set`, name settings without tables.
 """
@@ -18,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
-from agents.benchmarking.suite import ENVIRONMENTS
+from agents.benchmarking.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
@@ -361,15 +362,22 @@ def load_settings(
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.learning").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = _parsed(text, where)
-    check_keys(content, ("defaults", "residual", "tasks"), where)
+    check_keys(content, ("defaults", "residual", "suite", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
-    tables = [("residual", environment), ("tasks", task)]
-    if action != "rudder" or (given or {}).get("base") == "none":
-        tables = []
-    for table, name in tables:
-        own = check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
-        chosen |= _settings(own, kind, f"{where}: {table}.{name}")
+    if action == "rudder" and (given or {}).get("base") != "none":
+        known = any(task == one.name for one in load_suite().tasks)
+        for own, table in (
+            (_of(content, "residual", environment, where), f"residual.{environment}"),
+            (content.get("suite", {}) if known else {}, "suite"),
+            (_of(content, "tasks", task, where), f"tasks.{task}"),
+        ):
+            chosen |= _settings(own, kind, f"{where}: {table}")
     return make_settings(algorithm, chosen | dict(given or {}))
+
+
+def _of(content: Mapping[str, Any], table: str, name: str, where: str) -> Any:
+    """A table's table of that name."""
+    return check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:

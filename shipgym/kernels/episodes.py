@@ -63,10 +63,11 @@ N_STEP_FLAGS = 2  # of the flags, what `step` answers
 FLAGS = (
     TERMINATED, TRUNCATED, EXTRAPOLATING, *(TASK_INFO + k * LANES for k in range(N_INFO - N_FLAGS, N_INFO)),
 )  # fmt: skip
-# NumPy's numbers, since a function is compiled anew for each literal that it is called with.
+# NumPy's numbers, since a function is compiled anew for each literal that it is called with. Only `observe`
+# is given a literal 0: made for all lanes it is faster on paths.
 FIRST_LANE: Any = np.int64(0)
-WHOLE: Any = np.bool_(True)
-NEWS: Any = np.bool_(False)  # all but what `step` answers
+ALL_ROWS: Any = np.bool_(True)
+UNANSWERED_ROWS: Any = np.bool_(False)  # all but what `step` answers
 REFUSED = -1  # what `step` answers to commands that are no numbers
 POOL_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
 LARGEST_ROLL, LARGEST_ROLL_RATE = 0.5235987755982988, 0.1  # rad, rad/s: scales of what is seen
@@ -125,13 +126,15 @@ def show(state: Any, settings: Any, observations: Any, first: int, begin: int, e
 
 
 @rare
-def hand_over(state: Any, outcomes: Any, flags: Any, whole: bool, first: int, begin: int, end: int) -> None:
+def hand_over(
+    state: Any, outcomes: Any, flags: Any, all_rows: bool, first: int, begin: int, end: int
+) -> None:
     """Hand the outcome of some lanes over, one column a ship: all rows, or all but what `step` answers."""
-    for k in range(0 if whole else N_STEP, N_OUTCOME):
+    for k in range(0 if all_rows else N_STEP, N_OUTCOME):
         row = OUTCOME + k * LANES
         for lane in range(begin, end):
             outcomes[k, np.uintp(first + lane)] = state[np.uintp(row + lane)]
-    for k in range(0 if whole else N_STEP_FLAGS, len(FLAGS)):
+    for k in range(0 if all_rows else N_STEP_FLAGS, len(FLAGS)):
         row = FLAGS[k]
         for lane in range(begin, end):
             flags[k, np.uintp(first + lane)] = state[np.uintp(row + lane)] > 0.0
@@ -194,7 +197,7 @@ def begin_next(
     begin(state, lane, keys, tile, settings, pool, ship)
     observe(state, settings, ship, lane, lane + 1)
     show(state, settings, observations, first, lane, lane + 1)
-    hand_over(state, outcomes, flags, NEWS, first, lane, lane + 1)
+    hand_over(state, outcomes, flags, UNANSWERED_ROWS, first, lane, lane + 1)
 
 
 @inlined
@@ -263,7 +266,7 @@ def reset(
         if not next_one:
             observe(state, settings, ship, 0, lanes)
             show(state, settings, observations, first, FIRST_LANE, lanes)
-            hand_over(state, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+            hand_over(state, outcomes, flags, ALL_ROWS, first, FIRST_LANE, lanes)
 
 
 @inlined
@@ -296,7 +299,7 @@ def step(
         measure_all(state, keys, tile, settings, ship, lanes)
         observe(state, settings, ship, 0, lanes)
         show(state, settings, observations, first, FIRST_LANE, lanes)
-        hand_over(state, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+        hand_over(state, outcomes, flags, ALL_ROWS, first, FIRST_LANE, lanes)
         if next_ones:
             for lane in range(lanes):
                 if keeps_reading(state, lane):
