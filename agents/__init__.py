@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from agents.controllers.pid import PID
     from agents.controllers.robustness import MarginSpread, margin_spread
     from agents.controllers.scheduled_lq import ScheduledLQ
-    from agents.flight import Flights, StepResponses, fly, step_response
     from agents.policies.policy import LearnedPolicy
     from agents.policies.shield import Shielded, interventions
+    from agents.rollouts.flight import Flights, StepResponses, fly, step_response
 
 _HOME = {
     "AdaptiveLineOfSight": "agents.controllers.los_autopilot",
@@ -41,19 +41,19 @@ _HOME = {
     "BenchmarkResult": "agents.benchmarking.results",
     "Controller": "agents.controllers.controller",
     "FilteredPID": "agents.controllers.filtered_pid",
-    "Flights": "agents.flight",
+    "Flights": "agents.rollouts.flight",
     "Policy": "agents.controllers.controller",
     "ScheduledLQ": "agents.controllers.scheduled_lq",
     "Shielded": "agents.policies.shield",
-    "StepResponses": "agents.flight",
+    "StepResponses": "agents.rollouts.flight",
     "benchmark": "agents.benchmarking.run",
     "check_controller": "agents.controllers.checker",
-    "fly": "agents.flight",
+    "fly": "agents.rollouts.flight",
     "interventions": "agents.policies.shield",
     "load_agent": "agents.agent_file",
     "load_results": "agents.benchmarking.results",
     "margin_spread": "agents.controllers.robustness",
-    "step_response": "agents.flight",
+    "step_response": "agents.rollouts.flight",
 }
 
 __all__ = [

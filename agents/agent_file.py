@@ -10,7 +10,7 @@ from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.json_file import read_json
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 if TYPE_CHECKING:
     from agents.policies.policy import LearnedPolicy

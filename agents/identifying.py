@@ -7,14 +7,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification import IdentificationResult, identify
-from identification.comparison import Comparison, compare_methods
-from identification.methods import METHODS
-from identification.reduced import ReducedIdentification, identify_reduced
+from identification.design.reduced import ReducedIdentification, identify_reduced
+from identification.estimators.methods import METHODS
+from identification.validation.comparison import Comparison, compare_methods
 from shipgym.errors import InputError
-from shipgym.identify_table import check_options
-from shipgym.models.greybox import GREY_BOX
-from shipgym.ship_file import ShipFile
-from shipgym.trial import Trial
+from shipgym.ships.grey_box import GREY_BOX
+from shipgym.trials.identify_table import check_options
+from shipgym.trials.ship_file import ShipFile
+from shipgym.trials.trial import Trial
 
 RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
 MODELS = ("reference_model", "prior")  # options that may name a model's file

@@ -30,10 +30,10 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.task import Task
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.guidance import wrapped
 from shipgym.kernels import course_keeping, layout
 from shipgym.kernels import voyage_rows as rows
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
+from shipgym.tasks.guidance import wrapped
 
 Floats = NDArray[np.float64]
 

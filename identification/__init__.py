@@ -6,26 +6,29 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from identification.comparison import Comparison, compare_methods
-    from identification.cross_validation import cross_validate
-    from identification.experiment import Advice, advise
-    from identification.following import Course, follow
-    from identification.forces import ForceRegression, force_regression, identify_forces
-    from identification.lssvm import LSSVM, TruncatedLSSVM
-    from identification.options import Options
-    from identification.pipeline import identify
-    from identification.polynomial import polynomial_coefficients
-    from identification.recursive import (
+    from identification.design.experiment import Advice, advise
+    from identification.design.reduced import ReducedIdentification, identify_reduced
+    from identification.design.reduction import (
+        Reduction,
+        backward_elimination,
+        forward_selection,
+        sensitivity,
+    )
+    from identification.estimators.coefficient_history import Course, follow
+    from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
+    from identification.estimators.polynomial import polynomial_coefficients
+    from identification.estimators.recursive import (
         MultiInnovationLeastSquares,
         RecursiveLeastSquares,
         StochasticGradient,
     )
-    from identification.reduced import ReducedIdentification, identify_reduced
-    from identification.reduction import Reduction, backward_elimination, forward_selection, sensitivity
+    from identification.estimators.rm_svm import RMSVM
+    from identification.options import Options
+    from identification.pipeline import identify
+    from identification.regression.forces import ForceRegression, force_regression, identify_forces
+    from identification.regression.samples import Samples, build_samples
     from identification.result import IdentificationResult
-    from identification.rm_svm import RMSVM
-    from identification.samples import Samples, build_samples
-    from identification.tuning import (
+    from identification.search import (
         ArtificialBeeColony,
         DifferentialEvolution,
         GridSearch,
@@ -34,43 +37,45 @@ if TYPE_CHECKING:
         TunedLSSVM,
         minimise,
     )
+    from identification.validation.comparison import Comparison, compare_methods
+    from identification.validation.cross_validation import cross_validate
 
 _HOME = {
-    "Advice": "identification.experiment",
-    "ArtificialBeeColony": "identification.tuning",
-    "Comparison": "identification.comparison",
-    "Course": "identification.following",
-    "DifferentialEvolution": "identification.tuning",
-    "ForceRegression": "identification.forces",
-    "GridSearch": "identification.tuning",
+    "Advice": "identification.design.experiment",
+    "ArtificialBeeColony": "identification.search",
+    "Comparison": "identification.validation.comparison",
+    "Course": "identification.estimators.coefficient_history",
+    "DifferentialEvolution": "identification.search",
+    "ForceRegression": "identification.regression.forces",
+    "GridSearch": "identification.search",
     "IdentificationResult": "identification.result",
-    "LSSVM": "identification.lssvm",
-    "MultiInnovationLeastSquares": "identification.recursive",
+    "LSSVM": "identification.estimators.lssvm",
+    "MultiInnovationLeastSquares": "identification.estimators.recursive",
     "Options": "identification.options",
-    "ParticleSwarm": "identification.tuning",
-    "RecursiveLeastSquares": "identification.recursive",
-    "ReducedIdentification": "identification.reduced",
-    "Reduction": "identification.reduction",
-    "RMSVM": "identification.rm_svm",
-    "Samples": "identification.samples",
-    "SearchResult": "identification.tuning",
-    "StochasticGradient": "identification.recursive",
-    "TruncatedLSSVM": "identification.lssvm",
-    "TunedLSSVM": "identification.tuning",
-    "advise": "identification.experiment",
-    "backward_elimination": "identification.reduction",
-    "build_samples": "identification.samples",
-    "compare_methods": "identification.comparison",
-    "cross_validate": "identification.cross_validation",
-    "follow": "identification.following",
-    "force_regression": "identification.forces",
-    "forward_selection": "identification.reduction",
+    "ParticleSwarm": "identification.search",
+    "RecursiveLeastSquares": "identification.estimators.recursive",
+    "ReducedIdentification": "identification.design.reduced",
+    "Reduction": "identification.design.reduction",
+    "RMSVM": "identification.estimators.rm_svm",
+    "Samples": "identification.regression.samples",
+    "SearchResult": "identification.search",
+    "StochasticGradient": "identification.estimators.recursive",
+    "TruncatedLSSVM": "identification.estimators.lssvm",
+    "TunedLSSVM": "identification.search",
+    "advise": "identification.design.experiment",
+    "backward_elimination": "identification.design.reduction",
+    "build_samples": "identification.regression.samples",
+    "compare_methods": "identification.validation.comparison",
+    "cross_validate": "identification.validation.cross_validation",
+    "follow": "identification.estimators.coefficient_history",
+    "force_regression": "identification.regression.forces",
+    "forward_selection": "identification.design.reduction",
     "identify": "identification.pipeline",
-    "identify_forces": "identification.forces",
-    "identify_reduced": "identification.reduced",
-    "minimise": "identification.tuning",
-    "polynomial_coefficients": "identification.polynomial",
-    "sensitivity": "identification.reduction",
+    "identify_forces": "identification.regression.forces",
+    "identify_reduced": "identification.design.reduced",
+    "minimise": "identification.search",
+    "polynomial_coefficients": "identification.estimators.polynomial",
+    "sensitivity": "identification.design.reduction",
 }
 
 __all__ = [

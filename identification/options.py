@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from identification.folds import TRIALS
+from identification.validation.folds import TRIALS
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
-from shipgym.particulars import Particulars
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
 
 UNCERTAINTIES = ("analytic", "bootstrap")
 #: Those that `problem.pose` takes.
@@ -34,7 +34,7 @@ class Options:
     structure : str
         Terms of the model: a name of `shipgym.list_structures`.
     method : str
-        A name of `identification.methods.METHODS`.
+        A name of `identification.estimators.methods.METHODS`.
     samples : {"spline", "integral", "euler"}
         How the samples become a regression.
     service_shaft_speed : float, optional

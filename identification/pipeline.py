@@ -10,25 +10,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from identification.bootstrap import bootstrap_covariance, influence_covariance
-from identification.diagnostics import diagnose
-from identification.folds import TRIALS
-from identification.grey_box import bare_metrics
-from identification.guarded_fit import GuardedFit, guarded_fit
-from identification.methods import get_method
+from identification.estimators.methods import get_method
+from identification.estimators.threads import on_one_thread
 from identification.options import Options
-from identification.prediction import predict, trial_metrics
-from identification.prior import with_prior
-from identification.problem import Problem, pose
-from identification.refine import Refined, refine, split_settings
+from identification.regression.grey_box import bare_metrics
+from identification.regression.problem import Problem, pose
+from identification.regression.samples import Samples
 from identification.result import IdentificationResult
-from identification.samples import Samples
-from identification.threads import on_one_thread
-from identification.uncertainty import coefficient_covariance, joint_covariance
-from shipgym.models import GreyBox, ShipModel
-from shipgym.particulars import Particulars
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from identification.simulation_error.prior import with_prior
+from identification.simulation_error.refine import Refined, refine, split_settings
+from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
+from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
+from identification.validation.diagnostics import diagnose
+from identification.validation.folds import TRIALS
+from identification.validation.guarded_fit import GuardedFit, guarded_fit
+from identification.validation.prediction import predict, trial_metrics
+from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.diagnostics import EquationDiagnostics
-from identification.machine import Machine
-from identification.samples import Samples
-from identification.tuning import SearchResult
+from identification.estimators.estimator import Machine
+from identification.regression.samples import Samples
+from identification.search import SearchResult
+from identification.validation.diagnostics import EquationDiagnostics
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
-from shipgym.models import ShipModel
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
 from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
@@ -90,7 +90,7 @@ class IdentificationResult:
             Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was
             not given is marked as estimated.
         """
-        from identification.summary import summary_table
+        from identification.report.summary import summary_table
 
         return summary_table(self)
 

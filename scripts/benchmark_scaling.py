@@ -51,7 +51,7 @@ def head(title: str) -> None:
 def monte_carlo_table() -> None:
     """Manoeuvres, course stability, and PID and LQ in one episode each, over models drawn."""
     from agents import LQ, PID
-    from agents.monte_carlo import Engine, monte_carlo
+    from agents.verification.monte_carlo import Engine, monte_carlo
     from shipgym import load_model
 
     ship = load_model("mariner-tls-svm")

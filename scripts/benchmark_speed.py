@@ -27,13 +27,13 @@ from rich.table import Table
 
 import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
-from identification.dense_dual import dense_dual_solution
+from identification.estimators.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
 from shipgym.envs.registration import TASKS
 from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
-from shipgym.simulation.sensors import Sensors
-from shipgym.weather import Current, Waves, Weather, Wind
+from shipgym.sea import Current, Waves, Weather, Wind
+from shipgym.trials.sensors import Sensors
 
 Floats = NDArray[np.float64]
 

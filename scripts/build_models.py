@@ -14,8 +14,8 @@ import shipgym
 from identification import IdentificationResult, identify
 from shipgym import Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.models.catalogue import LIBRARY
-from shipgym.simulation.sensors import Sensors
+from shipgym.ships.catalogue import LIBRARY
+from shipgym.trials.sensors import Sensors
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

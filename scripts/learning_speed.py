@@ -9,8 +9,8 @@ import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.learning.algorithms import sb3_arguments
-from agents.learning.settings import load_settings
+from agents.training.algorithms import sb3_arguments
+from agents.training.settings import load_settings
 from shipgym import ShipVecEnv
 
 

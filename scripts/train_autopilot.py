@@ -12,9 +12,9 @@ import numpy as np
 
 from agents import load_agent
 from agents.benchmarking.designs import design
-from agents.benchmarking.flying import episode_costs
-from agents.learning.plan import Given, make_plan
-from agents.learning.training import Progress, train
+from agents.rollouts.flying import episode_costs
+from agents.training.plan import Given, make_plan
+from agents.training.training import Progress, train
 
 NEW_SEEDS = np.arange(1_000_000, 1_000_100)
 

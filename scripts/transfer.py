@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 from agents.benchmarking.transfer import CASES, N_RUNS, Transfer, save_transfer, transfer, transfer_case
-from agents.commands.terminal import progress_bars
+from agents.cli.terminal import progress_bars
 from identification.real_ships.data import Data
 from identification.real_ships.recipe import fitted
 from shipgym import InputError, ShipModel, load_model
-from shipgym.models.scaling import scale_model
+from shipgym.ships.scaling import scale_model
 
 ROOT = Path(__file__).parents[1]
 

@@ -34,10 +34,10 @@ from agents.benchmarking.direct_search import (
     tune,
     tuned_file,
 )
-from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.controllers.controller import Controller
 from agents.oracle import OracleSettings, fly_oracle
+from agents.rollouts.flying import episode_costs
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 

@@ -11,54 +11,61 @@ from typing import TYPE_CHECKING, Any
 from shipgym.envs.registration import register_environments
 
 if TYPE_CHECKING:
-    from shipgym import manoeuvres, plots, towing_tank, weather
+    from shipgym import manoeuvres, plots
+    from shipgym import sea as weather
     from shipgym.envs.checker import check_vector_env
+    from shipgym.envs.episode import Episode
     from shipgym.envs.recording import RecordEpisode
     from shipgym.envs.sb3 import ShipVecEnv
-    from shipgym.episode import Episode
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
-    from shipgym.models import ShipModel, list_models, list_structures, load_model, register_structure
-    from shipgym.models.checker import ModelCheck, check_ship_model
-    from shipgym.models.scaling import scale_model
-    from shipgym.models.stability import StraightLineStability, straight_line_stability
-    from shipgym.particulars import Particulars
-    from shipgym.ship_file import ShipFile
-    from shipgym.steering import SteeringGear
-    from shipgym.trial import Trial
-    from shipgym.weather.conditions import Current, Waves, Weather, Wind, sea_states
+    from shipgym.manoeuvres import towing_tank
+    from shipgym.sea.conditions import Current, Waves, Weather, Wind, sea_states
+    from shipgym.ships import ShipModel, list_models, list_structures, load_model, register_structure
+    from shipgym.ships.checker import ModelCheck, check_ship_model
+    from shipgym.ships.particulars import Particulars
+    from shipgym.ships.scaling import scale_model
+    from shipgym.ships.stability import StraightLineStability, straight_line_stability
+    from shipgym.ships.steering import SteeringGear
+    from shipgym.trials.ship_file import ShipFile
+    from shipgym.trials.trial import Trial
 
 __version__ = "0.1.0"
 
 _HOME = {
-    "Current": "shipgym.weather.conditions",
-    "Episode": "shipgym.episode",
+    "Current": "shipgym.sea.conditions",
+    "Episode": "shipgym.envs.episode",
     "InputError": "shipgym.errors",
     "ManoeuvreError": "shipgym.errors",
-    "ModelCheck": "shipgym.models.checker",
-    "Particulars": "shipgym.particulars",
+    "ModelCheck": "shipgym.ships.checker",
+    "Particulars": "shipgym.ships.particulars",
     "RecordEpisode": "shipgym.envs.recording",
-    "ShipFile": "shipgym.ship_file",
-    "ShipModel": "shipgym.models",
+    "ShipFile": "shipgym.trials.ship_file",
+    "ShipModel": "shipgym.ships",
     "ShipVecEnv": "shipgym.envs.sb3",
-    "SteeringGear": "shipgym.steering",
-    "StraightLineStability": "shipgym.models.stability",
-    "Trial": "shipgym.trial",
+    "SteeringGear": "shipgym.ships.steering",
+    "StraightLineStability": "shipgym.ships.stability",
+    "Trial": "shipgym.trials.trial",
     "UnstableModelError": "shipgym.errors",
-    "Waves": "shipgym.weather.conditions",
-    "Weather": "shipgym.weather.conditions",
-    "Wind": "shipgym.weather.conditions",
-    "check_ship_model": "shipgym.models.checker",
+    "Waves": "shipgym.sea.conditions",
+    "Weather": "shipgym.sea.conditions",
+    "Wind": "shipgym.sea.conditions",
+    "check_ship_model": "shipgym.ships.checker",
     "check_vector_env": "shipgym.envs.checker",
-    "list_models": "shipgym.models",
-    "list_structures": "shipgym.models",
-    "load_model": "shipgym.models",
-    "register_structure": "shipgym.models",
-    "scale_model": "shipgym.models.scaling",
-    "straight_line_stability": "shipgym.models.stability",
-    "sea_states": "shipgym.weather.conditions",
+    "list_models": "shipgym.ships",
+    "list_structures": "shipgym.ships",
+    "load_model": "shipgym.ships",
+    "register_structure": "shipgym.ships",
+    "scale_model": "shipgym.ships.scaling",
+    "straight_line_stability": "shipgym.ships.stability",
+    "sea_states": "shipgym.sea.conditions",
 }
 
-_SUBPACKAGES = ("manoeuvres", "plots", "towing_tank", "weather")
+_MODULES = {
+    "manoeuvres": "shipgym.manoeuvres",
+    "plots": "shipgym.plots",
+    "towing_tank": "shipgym.manoeuvres.towing_tank",
+    "weather": "shipgym.sea",
+}
 
 __all__ = [
     "Current",
@@ -96,8 +103,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import a public name when it is first used."""
-    if name in _SUBPACKAGES:
-        return import_module(f"shipgym.{name}")
+    if name in _MODULES:
+        return import_module(_MODULES[name])
     if name not in _HOME:
         raise AttributeError(f"module 'shipgym' has no attribute {name!r}")
     return getattr(import_module(_HOME[name]), name)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from shipgym.trial import Trial
+    from shipgym.trials.trial import Trial
 
 
 class InputError(ValueError):

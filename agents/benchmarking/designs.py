@@ -16,7 +16,7 @@ from agents.controllers.los_autopilot import LAWS
 from shipgym.checks import check_choice
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 INNER = "lq_"  # before settings of the LQ that a guidance law leads
 

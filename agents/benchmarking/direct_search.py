@@ -20,11 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.designs import INNER, design, no_path
-from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.los_autopilot import CRITICAL, LAWS
+from agents.rollouts.flying import episode_costs
 from shipgym.checks import check_choice, check_table, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import RUDDER_WEIGHT

@@ -27,12 +27,12 @@ from agents.benchmarking.page_tables import (
     ranking_table,
     scores_table,
 )
-from agents.benchmarking.refly import Flight, Reflown, refly
 from agents.benchmarking.results import EPISODES, RESULTS, BenchmarkResult
 from agents.benchmarking.suite import N_EPISODES, load_suite
 from agents.output import check_page
+from agents.rollouts.refly import Flight, Reflown, refly
+from shipgym.envs.episode import Episode
 from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.episode import Episode
 from shipgym.pages import (
     NONE,
     Html,
@@ -51,7 +51,7 @@ from shipgym.whole_file import write_text
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-    from agents.autopilot.run import Progress
+    from agents.verification.chain import Progress
 
 PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE
 from agents.benchmarking.results import BenchmarkResult
-from shipgym.episode import Episode
+from shipgym.envs.episode import Episode
 from shipgym.plots import GRID, INK, MUTED, axis, compact, graph_objects, layout, line, subplots, translucent
 
 if TYPE_CHECKING:

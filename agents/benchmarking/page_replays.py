@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE
 from agents.benchmarking.page_figures import styles
-from agents.benchmarking.refly import SAME_COST, Flight, Reflown, cost_of
 from agents.benchmarking.results import BenchmarkResult
-from agents.replay.page import player
-from agents.replay.series import quantities, run
+from agents.rollouts.refly import SAME_COST, Flight, Reflown, cost_of
+from agents.rollouts.replay_page import player
+from agents.rollouts.replay_series import quantities, run
 
 Floats = NDArray[np.float64]
 

@@ -36,8 +36,8 @@ from shipgym.envs.ship_env import read_options
 from shipgym.envs.task import Task
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel
 
 #: Environments by their names in suites and on the command line: id, and class of task.
 ENVIRONMENTS: Mapping[str, tuple[str, type[Task]]] = {

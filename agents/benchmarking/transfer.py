@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import tune
-from agents.benchmarking.flying import fly_task
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controllers.controller import Controller, Policy
 from agents.engines.jobs import run_jobs
+from agents.rollouts.flying import fly_task
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
-from shipgym.models import ShipModel, load_model
+from shipgym.ships import ShipModel, load_model
 
 Floats = NDArray[np.float64]
 
@@ -189,9 +189,9 @@ def transfer(
 
 def learn(job: dict[str, Any]) -> str:
     """One training run, begun or gone on with; returns the file of its agent."""
-    from agents.learning.plan import Plan
-    from agents.learning.settings import load_settings
-    from agents.learning.training import train
+    from agents.training.plan import Plan
+    from agents.training.settings import load_settings
+    from agents.training.training import train
 
     case = _case(job)
     task = case.learned_in(job["learner"])

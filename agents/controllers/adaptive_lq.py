@@ -2,7 +2,7 @@
 
 Sources: Astrom & Wittenmark 1995, Adaptive Control, chapter 4 (self-tuning regulators, certainty
 equivalence); van Amerongen 1982, Adaptive steering of ships; Song 2020, chapter 4 (TMILS,
-`identification.recursive`).
+`identification.estimators.recursive`).
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from agents.controllers.batched_lq import lq_rows, sampled_ships
 from agents.controllers.linear_loop import SIGNALS, length_time
 from agents.controllers.lq import LQ
 from agents.controllers.stateful import Flags, Stateful, heading_error
-from identification.recursive_kernels import scalar_updates
+from identification.estimators.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
 from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
-from shipgym.models.linear import LARGEST_RUDDER, linearise, straight_running
-from shipgym.simulation.sensors import SEA_TRIAL
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import LARGEST_RUDDER, linearise, straight_running
+from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
 

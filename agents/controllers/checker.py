@@ -15,7 +15,7 @@ from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.task import Task
 from shipgym.errors import InputError
-from shipgym.models import ShipModel, load_model
+from shipgym.ships import ShipModel, load_model
 
 Observations = NDArray[np.float32]
 

@@ -26,7 +26,7 @@ from agents.controllers.linear_loop import (
 )
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 Action = NDArray[np.float32]

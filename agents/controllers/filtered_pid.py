@@ -19,8 +19,8 @@ from agents.controllers.pid import PID
 from agents.controllers.stateful import Flags, Stateful, heading_error
 from shipgym.checks import check_number
 from shipgym.envs.task import control_interval
-from shipgym.guidance import wrapped
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
+from shipgym.tasks.guidance import wrapped
 
 Floats = NDArray[np.float64]
 

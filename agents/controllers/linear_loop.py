@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from shipgym.envs.task import RATE_WEIGHT
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
-from shipgym.models.linear import StraightRunning, linearise, nomoto_of, straight_running
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import StraightRunning, linearise, nomoto_of, straight_running
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

@@ -4,9 +4,9 @@ The path-following environment shows the heading error against its own line-of-s
 work out another course from the cross-track error and hand the heading error against that to the autopilot.
 
 Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3 (line of sight);
-Borhaug, Pavlov & Pettersen 2008 (integral line of sight, see `shipgym.guidance`); Fossen 2023, An adaptive
-line-of-sight (ALOS) guidance law for path following of aircraft and marine craft, IEEE Transactions on
-Control Systems Technology 31 (adaptive).
+Borhaug, Pavlov & Pettersen 2008 (integral line of sight, see `shipgym.tasks.guidance`); Fossen 2023, An
+adaptive line-of-sight (ALOS) guidance law for path following of aircraft and marine craft, IEEE Transactions
+on Control Systems Technology 31 (adaptive).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import INTEGRAL_ZONE
 from shipgym.errors import InputError
-from shipgym.guidance import PathPosition, integral_line_of_sight, wrapped
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
+from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
 
 Floats = NDArray[np.float64]
 

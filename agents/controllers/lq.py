@@ -26,7 +26,7 @@ from agents.controllers.linear_loop import (
 )
 from shipgym.checks import check_number
 from shipgym.envs.task import RUDDER_WEIGHT, control_interval
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 

@@ -28,10 +28,10 @@ from agents.controllers.lq import LQ, lq_gain
 from agents.controllers.stateful import Flags, Stateful, heading_error
 from shipgym.checks import check_number
 from shipgym.envs.task import RUDDER_WEIGHT, control_interval
-from shipgym.guidance import wrapped
-from shipgym.models import ShipModel
-from shipgym.models.linear import StraightRunning, linearise
-from shipgym.simulation.sensors import SEA_TRIAL
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import StraightRunning, linearise
+from shipgym.tasks.guidance import wrapped
+from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
 

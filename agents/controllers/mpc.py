@@ -27,7 +27,7 @@ from agents.controllers.stateful import Flags, Stateful
 from shipgym.checks import check_number
 from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import Margins
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import ACTIONS, RUDDER_ORDERS, Observed, Task
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Numbers = NDArray[np.float32]
 

@@ -52,9 +52,9 @@ from shipgym.checks import check_keys, check_number, check_table, check_text, ch
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
-from shipgym.models import ShipModel
-from shipgym.models.model_file import read_envelope
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel
+from shipgym.ships.model_file import read_envelope
 from shipgym.whole_file import write_bytes
 
 Tensors = dict[str, NDArray[Any]]

@@ -31,7 +31,7 @@ from shipgym.checks import check_number
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
-from shipgym.models import Envelope, ShipModel
+from shipgym.ships import Envelope, ShipModel
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -13,13 +13,13 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
 from identification.papers.row import Paper, Row
 from identification.pipeline import identify
-from identification.samples import build_samples
+from identification.regression.samples import build_samples
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.models import ShipModel, load_model
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel, load_model
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

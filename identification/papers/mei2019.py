@@ -26,8 +26,8 @@ from identification.papers.mei2019_targets import (
     virtual,
 )
 from identification.papers.row import Paper, Row
-from identification.similarity import correlations, select_reference
-from shipgym.models import ShipModel, load_model
+from identification.simulation_error.similarity import correlations, select_reference
+from shipgym.ships import ShipModel, load_model
 
 Pair = tuple[float | None, float | None]  # their way, at best
 

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.folds import LARGEST_RUDDER, TRIALS
-from identification.grey_box import structure_samples
-from identification.guarded_fit import with_coefficients
-from identification.methods import fit_all, get_method
+from identification.estimators.methods import fit_all, get_method
 from identification.pipeline import identify
+from identification.regression.grey_box import structure_samples
+from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.samples import build_samples
-from identification.similarity import select_reference
+from identification.simulation_error.similarity import select_reference
+from identification.validation.folds import LARGEST_RUDDER, TRIALS
+from identification.validation.guarded_fit import with_coefficients
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.models import GreyBox, ShipModel, converted_model, load_model
-from shipgym.trial import Trial
+from shipgym.ships import GreyBox, ShipModel, converted_model, load_model
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -14,16 +14,16 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
 from identification.papers.row import Paper, Requirement, Row
 from identification.pipeline import identify
+from identification.regression.samples import Samples, build_samples
 from identification.result import IdentificationResult
-from identification.samples import Samples, build_samples
-from identification.tuning import TunedLSSVM
-from identification.tuning.objectives import held_out_error, time_blocks
+from identification.search import TunedLSSVM
+from identification.search.objectives import held_out_error, time_blocks
 from shipgym.manoeuvres import zigzag
-from shipgym.models import get_structure, load_model, register_structure
-from shipgym.trial import Trial
+from shipgym.ships import get_structure, load_model, register_structure
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

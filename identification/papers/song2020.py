@@ -13,16 +13,16 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.following import follow
+from identification.estimators.coefficient_history import follow
+from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.papers.row import Paper, Row
 from identification.papers.song2020_container import container_rows
 from identification.pipeline import identify
-from identification.recursive import MultiInnovationLeastSquares
 from shipgym.manoeuvres import zigzag
-from shipgym.models import ShipModel
-from shipgym.particulars import Particulars
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

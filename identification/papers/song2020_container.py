@@ -14,16 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.papers.row import Row
 from identification.pipeline import identify
-from identification.recursive import MultiInnovationLeastSquares
-from identification.tuning import TunedLSSVM
+from identification.search import TunedLSSVM
 from shipgym.kernels import container as own
 from shipgym.manoeuvres import zigzag, zigzag_indices
-from shipgym.models import load_model
-from shipgym.models.inertia import inertia
-from shipgym.models.terms import read_terms
-from shipgym.trial import Trial
+from shipgym.ships import load_model
+from shipgym.ships.inertia import inertia
+from shipgym.ships.terms import read_terms
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 Fit = Callable[[Floats, Floats], Floats]

@@ -14,9 +14,9 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.dense_dual import dense_dual_multipliers
-from identification.forces import FORCES, ForceRegression, fit_forces, force_variances
-from identification.lssvm import LSSVM, TruncatedLSSVM
+from identification.design.reduction import Reduction
+from identification.estimators.dense_dual import dense_dual_multipliers
+from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.papers.row import Paper, Row
 from identification.papers.xu2020_tank import (
     NOISE,
@@ -30,8 +30,8 @@ from identification.papers.xu2020_tank import (
     noise_sizes,
     step_by_step,
 )
-from identification.reduction import Reduction
-from shipgym.models.pmm import TABLE_11
+from identification.regression.forces import FORCES, ForceRegression, fit_forces, force_variances
+from shipgym.ships.pmm import TABLE_11
 
 Floats = NDArray[np.float64]
 

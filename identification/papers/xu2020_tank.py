@@ -15,12 +15,12 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.forces import FORCES, ForceRegression, force_regression
-from identification.reduction import Reduction, backward_elimination
-from shipgym.models.pmm import PMM38, TABLE_11, xu_ship
-from shipgym.particulars import Particulars
-from shipgym.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
-from shipgym.trial import Trial
+from identification.design.reduction import Reduction, backward_elimination
+from identification.regression.forces import FORCES, ForceRegression, force_regression
+from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.pmm import PMM38, TABLE_11, xu_ship
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

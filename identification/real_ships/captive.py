@@ -2,7 +2,8 @@
 
 81 steady conditions of drift, rudder and propeller loading, without yaw or acceleration: what they tell is
 the hull's response to drift and the rudder's force, not inertia or damping of yaw, so the tables of
-`identification.forces`, which begin with inertia, do not apply; the estimator and the reduction do.
+`identification.regression.forces`, which begin with inertia, do not apply; the estimator and the
+reduction do.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import TruncatedLSSVM
+from identification.design.reduction import FOLDS, Reduction, backward_elimination
+from identification.estimators.lssvm import TruncatedLSSVM
 from identification.real_ships.data import Data
 from identification.real_ships.section import Section, number, table
-from identification.reduction import FOLDS, Reduction, backward_elimination
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shipgym.errors import InputError
-from shipgym.models import ShipModel, converted_model
-from shipgym.particulars import Particulars
-from shipgym.ship_file import ShipFile
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel, converted_model
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.ship_file import ShipFile
+from shipgym.trials.trial import Trial
 
 CHANNELS = ("x", "y", "psi", "u", "v", "r", "delta", "n")
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from identification.pipeline import identify
-from identification.prediction import predict
 from identification.real_ships.data import Data, MeasuredShip
 from identification.real_ships.measures import Floats
 from identification.real_ships.section import Section, number, table
-from shipgym.models import ShipModel
-from shipgym.trial import Trial
+from identification.validation.prediction import predict
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
 
 SHIP, EVERY = "esso_osaka_3m", 2
 REFERENCE = "tanker"
@@ -80,8 +80,8 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
 
 def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
     """The reference ship at this scale; `speed` of the ship file is that of the fastest approach."""
-    from shipgym.models import converted_model
-    from shipgym.steering import SteeringGear
+    from shipgym.ships import converted_model
+    from shipgym.ships.steering import SteeringGear
 
     return converted_model(REFERENCE, ship.particulars, ship.steering or SteeringGear(), shaft)
 
@@ -130,7 +130,7 @@ def _size(ship: MeasuredShip) -> list[str]:
 
 def _repaired(ship: MeasuredShip) -> str:
     """How many values of u the repair replaces, by run."""
-    from identification.preprocess import repaired
+    from identification.regression.preprocess import repaired
 
     counts = {
         name: dict(repaired(trial).repaired) for name, trial in ship.runs.items() if name.startswith("zigzag")

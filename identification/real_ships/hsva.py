@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.guard import reasons_unstable
 from identification.pipeline import identify
-from identification.prediction import predict
 from identification.real_ships.data import Data, MeasuredShip
 from identification.real_ships.measures import (
     MEASURES,
@@ -30,8 +28,10 @@ from identification.real_ships.recipe import (
     with_fixed_pull,
 )
 from identification.real_ships.section import Section, table
+from identification.validation.guard import reasons_unstable
+from identification.validation.prediction import predict
 from shipgym.manoeuvres import TurningIndices
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 SHIP, EVERY = "kvlcc2_hsva", 4
 #: Zigzags that switch at 5 or 10 degrees; those that switch at 1 degree are left aside.

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from identification.pipeline import identify
-from identification.prediction import predict
 from identification.real_ships.data import Data, MeasuredShip
 from identification.real_ships.hsva import OURS
 from identification.real_ships.hsva import RUNS as HSVA_RUNS
@@ -32,9 +31,10 @@ from identification.real_ships.recipe import (
     refined,
 )
 from identification.real_ships.section import Section, number, table
-from shipgym.models import ShipModel
-from shipgym.models.scaling import scale_model
-from shipgym.trial import Trial
+from identification.validation.prediction import predict
+from shipgym.ships import ShipModel
+from shipgym.ships.scaling import scale_model
+from shipgym.trials.trial import Trial
 
 SHIP, HSVA_EVERY = "kvlcc2_marin", 4
 #: Advance and tactical diameter to starboard, ship lengths: measured, printed in Mei 2019.

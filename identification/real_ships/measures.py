@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.prediction import predict, trial_metrics
 from identification.real_ships.section import number
+from identification.validation.prediction import predict, trial_metrics
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import TurningIndices, turning_circle, turning_indices
-from shipgym.models import ShipModel
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

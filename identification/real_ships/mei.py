@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from identification.pipeline import identify
-from identification.prediction import predict, trial_metrics
 from identification.real_ships.data import Data, MeasuredShip
 from identification.real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
 from identification.real_ships.measures import (
@@ -19,7 +18,8 @@ from identification.real_ships.measures import (
     zigzag_errors,
 )
 from identification.real_ships.section import Section, number, table
-from shipgym.models import ShipModel
+from identification.validation.prediction import predict, trial_metrics
+from shipgym.ships import ShipModel
 
 EVERY = 2  # about 1 Hz, as in the paper
 RUN = "zz_20_m"

@@ -12,18 +12,18 @@ from typing import Any
 
 import numpy as np
 
-from identification.guard import reasons_unstable
-from identification.guarded_fit import with_coefficients
-from identification.methods import FitTask, get_method
+from identification.estimators.methods import FitTask, get_method
 from identification.pipeline import identify
-from identification.prior import Prior, fit_toward, reference_prior
 from identification.real_ships.data import MeasuredShip
 from identification.real_ships.measures import zigzag_errors
+from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.samples import build_samples
-from shipgym.models import ShipModel, get_structure, register_structure
-from shipgym.models.structures import prime_terms
-from shipgym.steering import SteeringGear
+from identification.simulation_error.prior import Prior, fit_toward, reference_prior
+from identification.validation.guard import reasons_unstable
+from identification.validation.guarded_fit import with_coefficients
+from shipgym.ships import ShipModel, get_structure, register_structure
+from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import prime_terms
 
 REFERENCE = "kvlcc2-l7"
 STRENGTHS = (0.0, 0.01, 0.03, 0.1, 0.2)

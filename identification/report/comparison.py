@@ -27,7 +27,7 @@ from shipgym.plots import PALETTE, axis, graph_objects, layout, line, subplots
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-    from identification.comparison import Comparison, Standing
+    from identification.validation.comparison import Comparison, Standing
 
 Floats = NDArray[np.float64]
 

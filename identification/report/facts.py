@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.concerns import concerns
+from identification.validation.warnings import concerns
 from shipgym.pages import NONE, Html, card, html, join, number, paragraph, section
 
 if TYPE_CHECKING:

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.diagnostics import autocorrelation, cross_correlation, without_overlap
-from identification.lssvm import TruncatedLSSVM
+from identification.estimators.lssvm import TruncatedLSSVM
 from identification.report.predictions import legend_above, overview_figure, prediction_figure
-from identification.tuning.search import BAND, LOG_C
-from identification.uncertainty import residuals
+from identification.search.search import BAND, LOG_C
+from identification.uncertainty.covariance import residuals
+from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
 from shipgym.plots import (
     LIMIT,
     MEASURED,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from identification.concerns import why_unstable
 from identification.report.coefficients import coefficients_section
 from identification.report.facts import concerns_list, data_card, quality_card, remedy_section, ship_card
 from identification.report.figures import (
@@ -16,7 +15,8 @@ from identification.report.figures import (
     truncated,
 )
 from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
-from identification.summary import undetermined
+from identification.report.summary import undetermined
+from identification.validation.warnings import why_unstable
 from shipgym.pages import (
     Html,
     card,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shipgym.plots import AXES, MEASURED, MODEL, axis, layout, line, subplots
-from shipgym.trial import Trial
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -25,12 +25,12 @@ from shipgym.pages import (
     section,
     table,
 )
-from shipgym.particulars import ADDED_MASSES
-from shipgym.trial import Trial
+from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from identification.result import IdentificationResult
-    from shipgym.models import ShipModel
+    from shipgym.ships import ShipModel
 
 KNOT = 1852.0 / 3600.0
 PRIME = 1e-5

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipgym.checks import check_number, check_whole
 from shipgym.envs.task import COMMON_INFO, Task
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 

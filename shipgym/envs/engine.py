@@ -18,7 +18,7 @@ from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.kernels import layout, weather_rows
 from shipgym.kernels import voyage_rows as rows
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]

@@ -10,7 +10,7 @@ from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.ship_env import ShipEnv
 from shipgym.envs.ship_vector_env import ShipVectorEnv
 from shipgym.envs.task import Task
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 
 class PathFollowingEngine(Engine):

@@ -12,10 +12,10 @@ import numpy as np
 from shipgym.checks import check_number, check_whole
 from shipgym.envs.task import COMMON_INFO, Observed, Task
 from shipgym.errors import InputError
-from shipgym.guidance import Path
 from shipgym.kernels import layout
 from shipgym.kernels import voyage_rows as rows
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
+from shipgym.tasks.guidance import Path
 
 TURN_HORIZON = 10.0  # ship lengths ahead at which a turn comes into sight
 

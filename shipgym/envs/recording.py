@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_text
-from shipgym.episode import Episode
+from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 Observation = TypeVar("Observation")

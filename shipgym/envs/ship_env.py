@@ -18,7 +18,7 @@ from shipgym.envs.task import RUDDER_ORDERS, Task
 from shipgym.envs.tiles import REFUSED
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.models import ShipModel, load_model
+from shipgym.ships import ShipModel, load_model
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]

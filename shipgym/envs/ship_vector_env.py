@@ -17,7 +17,7 @@ from shipgym.envs.screen import named_rows
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options, spaces
 from shipgym.envs.task import RUDDER_ORDERS, Task
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterable
 
 from shipgym.errors import InputError
-from shipgym.models import ShipModel
+from shipgym.ships import ShipModel
 
 
 def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:

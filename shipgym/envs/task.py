@@ -16,11 +16,11 @@ from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.kernels import layout
 from shipgym.kernels import voyage_rows as rows
-from shipgym.models import ShipModel
-from shipgym.simulation.orders import turns_astern
-from shipgym.simulation.sensors import SEA_TRIAL
-from shipgym.simulation.weather_column import as_weather
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.sea.weather_column import as_weather
+from shipgym.ships import ShipModel
+from shipgym.ships.orders import turns_astern
+from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
 Sea = str | Weather

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from shipgym.envs.task import Task
 from shipgym.envs.variety import SmallFleet
 from shipgym.kernels import layout
-from shipgym.models import ShipModel
-from shipgym.simulation.weather_column import weather_column
+from shipgym.sea.weather_column import weather_column
+from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 REFUSED = -1  # the kernel's answer to commands that are no numbers

@@ -12,10 +12,10 @@ import numpy as np
 
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.models import ShipModel, load_model
-from shipgym.models.structures import Structure
-from shipgym.particulars import Particulars
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel, load_model
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.structures import Structure
 
 POOL_SIZE = 256  # ships drawn from what is continuous
 POOL_SEED = 20260101

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.zigzags import number_of_steps
-from shipgym.models.ship_model import Seed, ShipModel
-from shipgym.simulation.conditions import Conditions
-from shipgym.simulation.simulate import simulate
-from shipgym.trial import Trial
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships.conditions import Conditions
+from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.simulate import simulate
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
-from shipgym.trial import Trial
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

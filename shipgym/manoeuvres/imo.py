@@ -11,7 +11,7 @@ import numpy as np
 from shipgym.checks import check_number
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of, worst
 from shipgym.manoeuvres.standard import Manoeuvre, speed_changes, turning_circles, zigzags
-from shipgym.models.ship_model import ShipModel
+from shipgym.ships.ship_model import ShipModel
 
 DRAWS = 100  # of an identified ship
 STOPPING_LIMIT = 15.0  # ship lengths

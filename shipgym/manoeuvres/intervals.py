@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.standard import standard_manoeuvres
-from shipgym.models.ship_model import ShipModel
+from shipgym.ships.ship_model import ShipModel
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]

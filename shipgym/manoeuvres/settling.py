@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.kernels import layout
-from shipgym.models.ship_model import ShipModel
-from shipgym.simulation.conditions import Conditions, Passage
-from shipgym.simulation.simulate import as_trial, unstable
-from shipgym.trial import Trial
+from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import as_trial, unstable
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -16,10 +16,10 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.settling import Voyage
-from shipgym.models.ship_model import Seed, ShipModel
-from shipgym.simulation.conditions import Conditions
-from shipgym.trial import Trial
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships.conditions import Conditions
+from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]

@@ -30,9 +30,9 @@ from shipgym.manoeuvres.stopping import (
 )
 from shipgym.manoeuvres.turning import TurningIndices, turning_circle, turning_indices
 from shipgym.manoeuvres.zigzags import ZigzagIndices, zigzag, zigzag_indices
-from shipgym.models.linear import is_course_stable
-from shipgym.models.ship_model import ShipModel
-from shipgym.trial import Trial
+from shipgym.ships.linear import is_course_stable
+from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.trial import Trial
 
 LENGTHS = 40.0  # duration of a zigzag or a turning circle, in times to travel one ship length
 STEPS_PER_LENGTH = 50  # of their simulation

@@ -11,11 +11,11 @@ from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, ship_length
 from shipgym.manoeuvres.settling import Voyage
-from shipgym.models.equations import Equations
-from shipgym.models.ship_model import Seed, ShipModel
-from shipgym.simulation.conditions import Conditions
-from shipgym.trial import Trial
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships.conditions import Conditions
+from shipgym.ships.equations import Equations
+from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.trials.trial import Trial
 
 LONGEST = 300.0  # of a stopping trial, L / U0
 ACCELERATION = 40.0  # duration of an acceleration, L / U0

@@ -11,10 +11,10 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, ship_length
 from shipgym.manoeuvres.zigzags import number_of_steps
-from shipgym.models.ship_model import Seed, ShipModel
-from shipgym.simulation.simulate import simulate
-from shipgym.trial import Trial
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.simulate import simulate
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
-from shipgym.models.ship_model import Seed, ShipModel
-from shipgym.simulation.conditions import Conditions, Passage
-from shipgym.simulation.simulate import as_trial, unstable
-from shipgym.trial import Trial
-from shipgym.weather.conditions import Weather
+from shipgym.sea.conditions import Weather
+from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.simulate import as_trial, unstable
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

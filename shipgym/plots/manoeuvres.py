@@ -27,7 +27,7 @@ from shipgym.plots.style import (
 )
 from shipgym.plots.style import line as drawn
 from shipgym.plots.trials import AXES, history_figure, quantity, thinned
-from shipgym.trial import Trial
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 from shipgym.plots.style import axis, compact, graph_objects, layout, line_styles, subplots
-from shipgym.trial import Trial
+from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -14,7 +14,7 @@ def demo():
 @pytest.fixture(scope="session")
 def chain(tmp_path_factory):
     """The whole chain on the demo's trials, once: the folder written, the result, the stages told."""
-    from agents.autopilot.run import build_autopilot
+    from agents.verification.chain import build_autopilot
 
     folder = tmp_path_factory.mktemp("chain") / "report"
     stages = []

@@ -7,7 +7,7 @@ import numpy as np
 from agents import LearnedPolicy
 from agents.policies.network import Network
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 

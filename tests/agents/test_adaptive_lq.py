@@ -15,9 +15,9 @@ from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.conversions import nomoto, nomoto2_ship
-from shipgym.models.linear import linearise, straight_running
+from shipgym.ships import load_model
+from shipgym.ships.conversions import nomoto, nomoto2_ship
+from shipgym.ships.linear import linearise, straight_running
 
 MARINER = load_model("mariner")
 GENTLE = CourseKeepingTask(course_change_deg=10.0, episode_steps=2000)

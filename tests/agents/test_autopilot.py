@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from agents import LQ, LineOfSight, fly
-from agents.autopilot.page import write_report
-from agents.autopilot.result import verification_metrics
-from agents.autopilot.run import build_autopilot, verify
-from agents.commands.terminal import ranking_table
-from agents.spread import manoeuvre_spread
+from agents.cli.terminal import ranking_table
+from agents.verification.chain import build_autopilot, verify
+from agents.verification.index_uncertainty import manoeuvre_spread
+from agents.verification.page import write_report
+from agents.verification.result import verification_metrics
 from identification import identify
-from identification.concerns import concerns
+from identification.validation.warnings import concerns
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy

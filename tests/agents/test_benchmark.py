@@ -11,7 +11,7 @@ from agents.benchmarking.designs import design
 from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
-from agents.commands.benchmark_tables import ranking_table
+from agents.cli.benchmark_tables import ranking_table
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
@@ -93,7 +93,7 @@ def test_what_was_flown_is_kept_and_not_flown_again(folder, copy, monkeypatch):
         "agents.benchmarking.run.fly_task",
         lambda policy, *rest: flown.append(policy.name) or original(policy, *rest),
     )
-    from agents.benchmarking.flying import fly_task as original
+    from agents.rollouts.flying import fly_task as original
 
     result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
     assert flown == ["lq"]  # los leads the LQ where there is no path; pid and lq are there

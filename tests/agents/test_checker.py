@@ -7,7 +7,7 @@ from agents import LQ, LQG, PID, check_controller
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 

@@ -134,8 +134,8 @@ def test_an_interruption_leaves_nothing_and_exits_with_130(demo, tmp_path, monke
     def interrupted(*_args, **_settings):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("agents.autopilot.page.write_report", interrupted)
-    monkeypatch.setattr("agents.autopilot.run.why_unstable", lambda _: "for the test")
+    monkeypatch.setattr("agents.verification.page.write_report", interrupted)
+    monkeypatch.setattr("agents.verification.chain.why_unstable", lambda _: "for the test")
     answer = shipgym("autopilot", demo, "--out", tmp_path / "report")
     assert answer.exit_code == 130
     assert "interrupted, nothing was written" in answer.stderr

@@ -9,9 +9,9 @@ import pytest
 
 from agents import LQ, PID, load_agent
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.mariner import mariner
-from shipgym.steering import SteeringGear
+from shipgym.ships import load_model
+from shipgym.ships.mariner import mariner
+from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")
 DESIGNS = {

@@ -23,14 +23,14 @@ from agents.benchmarking.direct_search import (
     tune,
     tuned,
 )
-from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controllers.los_autopilot import LAWS
-from agents.learning.bases import design_base
+from agents.rollouts.flying import episode_costs
+from agents.training.bases import design_base
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
-from shipgym.models import load_model
-from shipgym.models.conversions import nomoto, nomoto2_ship
+from shipgym.ships import load_model
+from shipgym.ships.conversions import nomoto, nomoto2_ship
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
 NOISY = BenchmarkTask("noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0})

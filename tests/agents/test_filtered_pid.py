@@ -7,7 +7,7 @@ from agents import PID, FilteredPID, check_controller, fly, load_agent, step_res
 from agents.controllers.filtered_pid import LEAD, TURN, notch_band
 from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 INFINITE = float("inf")

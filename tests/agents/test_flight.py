@@ -8,8 +8,8 @@ import pytest
 from agents import LQ, PID, fly, step_response
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.mariner import mariner
+from shipgym.ships import load_model
+from shipgym.ships.mariner import mariner
 
 MARINER = load_model("mariner")
 PILOT = PID.from_model(MARINER)

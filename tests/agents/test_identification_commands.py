@@ -8,9 +8,9 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.identifying import identification_settings, identify_ship, parsed_options
-from identification.methods import METHODS
+from identification.estimators.methods import METHODS
 from shipgym import InputError, ShipFile, load_model
-from shipgym.identify_table import OPTIONS
+from shipgym.trials.identify_table import OPTIONS
 
 #: Every option of [identify], set to something that is not its default, of a method that has it.
 SETTINGS = {

@@ -16,8 +16,8 @@ from agents import (
 from shipgym.envs.path_following import PathFollowingEngine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.weather.conditions import Current, Weather
+from shipgym.sea.conditions import Current, Weather
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]

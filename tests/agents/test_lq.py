@@ -13,9 +13,9 @@ from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.conversions import nomoto, nomoto2_ship
-from shipgym.steering import SteeringGear
+from shipgym.ships import load_model
+from shipgym.ships.conversions import nomoto, nomoto2_ship
+from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")
 LENGTH_TIME = 160.93 / 7.7175

@@ -12,10 +12,10 @@ from agents.controllers.lqg import kalman_gain, rudder_response, wave_model
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.conversions import nomoto, nomoto2_ship
-from shipgym.models.linear import straight_running
-from shipgym.steering import SteeringGear
+from shipgym.ships import load_model
+from shipgym.ships.conversions import nomoto, nomoto2_ship
+from shipgym.ships.linear import straight_running
+from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, fly
-from agents.monte_carlo import Engine, monte_carlo
-from agents.spread import manoeuvre_spread
+from agents.verification.index_uncertainty import manoeuvre_spread
+from agents.verification.monte_carlo import Engine, monte_carlo
 from shipgym import InputError, load_model
 
 DRAWS, SEED = 28, 3  # two jobs

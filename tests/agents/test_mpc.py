@@ -12,8 +12,8 @@ from agents import LQ, MPC, check_controller, fly, load_agent
 from agents.controllers.linear_loop import SIGNALS, rate_weight
 from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.steering import SteeringGear
+from shipgym.ships import load_model
+from shipgym.ships.steering import SteeringGear
 
 pytest.importorskip("osqp", reason="extra mpc is not installed")
 MARINER = load_model("mariner")

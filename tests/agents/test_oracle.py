@@ -10,7 +10,7 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 QUICK = OracleSettings(

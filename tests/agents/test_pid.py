@@ -14,9 +14,9 @@ from agents.controllers.pid import optimal_poles, place_poles
 from shipgym.envs.course_keeping_task import observation_scales
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.linear import Nomoto, nomoto
-from shipgym.steering import SteeringGear
+from shipgym.ships import load_model
+from shipgym.ships.linear import Nomoto, nomoto
+from shipgym.ships.steering import SteeringGear
 
 MARINER = load_model("mariner")
 

@@ -10,8 +10,8 @@ from agents.policies.policy import ORDERS, Memory, order_numbers
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.mariner import mariner
+from shipgym.ships import load_model
+from shipgym.ships.mariner import mariner
 from tests.agents.policies import MARINER, random_network, random_policy
 
 RNG = np.random.default_rng(1)

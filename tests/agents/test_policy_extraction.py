@@ -12,11 +12,11 @@ from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
-from agents.learning.residual import ResidualVecEnv
 from agents.policies.policy import order_numbers
+from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 COURSE = "shipgym/CourseKeeping-v0"
 MARINER = load_model("mariner")

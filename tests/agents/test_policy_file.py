@@ -12,9 +12,9 @@ from safetensors.numpy import load_file, save_file
 from agents import LQ, PID, Shielded, check_controller, load_agent
 from agents.policies.shield import Limits
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.mariner import mariner
-from shipgym.weather import Current, Weather
+from shipgym.sea import Current, Weather
+from shipgym.ships import load_model
+from shipgym.ships.mariner import mariner
 from tests.agents.policies import MARINER, random_policy
 
 IDENTIFIED = load_model("mariner-tls-svm")
@@ -77,7 +77,7 @@ def test_no_torch_is_needed(tmp_path):
     POLICIES["shielded"].save(tmp_path / "agent.json")
     code = (
         "import sys; import numpy as np\n"
-        "from agents import load_agent; from shipgym.models import load_model\n"
+        "from agents import load_agent; from shipgym.ships import load_model\n"
         "agent = load_agent(sys.argv[1], load_model('mariner-tls-svm'))\n"
         "agent.predict(np.zeros(8, np.float32))\n"
         "assert not {'torch', 'stable_baselines3', 'onnx'} & set(sys.modules)"

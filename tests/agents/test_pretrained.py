@@ -5,11 +5,11 @@ import pytest
 
 from agents import load_agent
 from agents.benchmarking.contestants import check_fits, pretrained
-from agents.benchmarking.flying import episode_costs
 from agents.benchmarking.suite import load_suite
 from agents.controllers.controller import model_hash
-from agents.learning.plan import Given, make_plan
 from agents.policies.policy import LearnedPolicy
+from agents.rollouts.flying import episode_costs
+from agents.training.plan import Given, make_plan
 
 SUITE = load_suite()
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode

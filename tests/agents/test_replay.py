@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.replay.page import names, replay_page, write_replay
-from agents.replay.series import outcome, rounded, series
+from agents.rollouts.replay_page import names, replay_page, write_replay
+from agents.rollouts.replay_series import outcome, rounded, series
 from shipgym import Episode, InputError
 
 STEPS, DT = 40, 5.0

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from agents.replay.page import replay_page, write_replay
+from agents.rollouts.replay_page import replay_page, write_replay
 from tests.agents.browser import COMMAND, Browser
 from tests.agents.test_replay import DT, STEPS, episode
 

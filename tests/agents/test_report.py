@@ -6,7 +6,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from agents.autopilot.figures import band, translucent
+from agents.verification.figures import band, translucent
 from shipgym.pages import Html, figure, fixed, html, number, percent, table
 from shipgym.plots import graph_objects
 

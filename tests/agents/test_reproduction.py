@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.commands.reproduction import missed, page, papers_of
+from agents.cli.reproduction import missed, page, papers_of
 from identification.papers import CASES, PAPERS, Row
 from identification.papers.requirements import REQUIREMENTS
 

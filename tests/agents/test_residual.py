@@ -7,10 +7,10 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from agents import LQ, LQG, IntegralLineOfSight, LearnedPolicy, load_agent
-from agents.learning.residual import ResidualVecEnv
+from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 MARINER = load_model("mariner")

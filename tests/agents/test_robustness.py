@@ -8,7 +8,7 @@ import pytest
 from agents import LQ, LQG, PID, margin_spread
 from agents.controllers.robustness import MarginSpread
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
 

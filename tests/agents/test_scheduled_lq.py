@@ -7,7 +7,7 @@ from agents import LQ, ScheduledLQ, check_controller, fly, load_agent
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 MARINER, KVLCC2 = load_model("mariner"), load_model("kvlcc2")
 

@@ -9,7 +9,7 @@ from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
-from shipgym.models import load_model
+from shipgym.ships import load_model
 from tests.agents.policies import MARINER, random_policy
 
 IDENTIFIED = load_model("mariner-tls-svm")

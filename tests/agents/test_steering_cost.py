@@ -8,7 +8,7 @@ from scipy.optimize import minimize
 
 from agents import LQ, PID, fly
 from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 SEEDS = np.arange(64)
 MARINER = load_model("mariner")

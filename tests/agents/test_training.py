@@ -13,12 +13,12 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import load_agent
-from agents.benchmarking.flying import episode_costs
 from agents.cli import app
-from agents.learning import training
-from agents.learning.algorithms import make_agent, make_ships, set_deviation
-from agents.learning.plan import EVALUATION_SEED, Given, make_plan, training_options
-from agents.learning.training import train
+from agents.rollouts.flying import episode_costs
+from agents.training import training
+from agents.training.algorithms import make_agent, make_ships, set_deviation
+from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
+from agents.training.training import train
 from shipgym.errors import InputError
 
 OFF_POLICY = {

@@ -7,11 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.learning.plan import Given, make_plan
-from agents.learning.search_space import SPACES, Choice, Wholes, with_parameters
-from agents.learning.settings import ALGORITHMS, load_settings
-from agents.learning.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
-from agents.monte_carlo import Engine
+from agents.training.plan import Given, make_plan
+from agents.training.search_space import SPACES, Choice, Wholes, with_parameters
+from agents.training.settings import ALGORITHMS, load_settings
+from agents.training.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
+from agents.verification.monte_carlo import Engine
 from shipgym.errors import InputError
 
 optuna = pytest.importorskip("optuna", reason="optuna is not installed")
@@ -174,7 +174,7 @@ def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
 
 
 def test_missing_optuna_is_told_with_its_extra(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.learning.tuning.find_spec", lambda name: None)
+    monkeypatch.setattr("agents.training.tuning.find_spec", lambda name: None)
     with pytest.raises(InputError, match=r"pip install 'shipgym\[tune\]'"):
         tune(plan(), tmp_path / "study", 1)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification import Samples, identify
-from identification.bootstrap import bootstrap_covariance, influence_covariance, moving_blocks
-from identification.methods import fit_all, get_method
-from identification.uncertainty import joint_covariance
+from identification.estimators.methods import fit_all, get_method
+from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance, moving_blocks
+from identification.uncertainty.covariance import joint_covariance
 from shipgym import InputError, ShipModel, Trial
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification import Comparison, compare_methods
-from identification.comparison import COMPARISON_FILES
+from identification.validation.comparison import COMPARISON_FILES
 from shipgym import InputError, ShipModel, Trial
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, identify
-from identification.diagnostics import autocorrelation, check_trials, variance_inflation
+from identification.validation.diagnostics import autocorrelation, check_trials, variance_inflation
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

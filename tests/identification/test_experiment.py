@@ -9,10 +9,10 @@ import pytest
 
 import shipgym
 from identification import build_samples
-from identification.experiment import advise, fisher_information, standard_candidates
+from identification.design.experiment import advise, fisher_information, standard_candidates
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.models import get_structure
+from shipgym.ships import get_structure
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
 COEFFICIENTS = {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0}

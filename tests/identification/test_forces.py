@@ -9,11 +9,11 @@ import pytest
 
 import shipgym
 from identification import identify
-from identification.forces import force_regression, identify_forces
+from identification.regression.forces import force_regression, identify_forces
 from shipgym import InputError, Particulars, ShipModel, Trial
-from shipgym.models.pmm import PMM18, PMM38, TABLE_11, xu_ship
-from shipgym.models.structures import get_structure
-from shipgym.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
+from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
+from shipgym.ships.pmm import PMM18, PMM38, TABLE_11, xu_ship
+from shipgym.ships.structures import get_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(

@@ -10,15 +10,15 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.folds import of_largest_rudder
-from identification.pattern_search import pattern_search
+from identification.estimators.rm_svm import NEARLY, RMSVM
 from identification.report.figures import search_figure
-from identification.rm_svm import NEARLY, RMSVM
-from identification.similarity import correlations, select_reference, similarity_vector
+from identification.search.pattern_search import pattern_search
+from identification.simulation_error.similarity import correlations, select_reference, similarity_vector
+from identification.validation.folds import of_largest_rudder
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
-from shipgym.particulars import Particulars
+from shipgym.ships.particulars import Particulars
 
 #: Mei 2019, Table 4: block coefficient, L/B, B/T, L/V0 in s, rudder area by L T.
 TABLE_4 = {
@@ -137,7 +137,7 @@ def test_coordinate_descent_and_minimal_optimisation_agree(
     X = rng.standard_normal((150, 3)) @ [[1.0, 0.5, 0.0], [0.0, 1.0, 0.3], [0.0, 0.0, 1.0]]
     y = X @ [1.0, -2.0, 0.5] + rng.standard_normal(150)
     quick = RMSVM(C=weight, epsilon=band).fit(X, y)
-    monkeypatch.setattr("identification.rm_svm.MOST_SWEEPS", 1)
+    monkeypatch.setattr("identification.estimators.rm_svm.MOST_SWEEPS", 1)
     exact = RMSVM(C=weight, epsilon=band).fit(X, y)
     assert quick.coef_ == pytest.approx(exact.coef_, abs=5e-3)
     assert not np.array_equal(quick.coef_, exact.coef_)
@@ -170,7 +170,7 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
 ) -> None:
     """The least weight with which a fit of the 10/10s predicts the 20/20 nearly as well as with any."""
     weights = (0.0, 0.03, 3.0)
-    monkeypatch.setattr("identification.rm_svm.WEIGHTS", weights)
+    monkeypatch.setattr("identification.estimators.rm_svm.WEIGHTS", weights)
     settings = {"method": "rm-svm", "reference_model": "tanker", "regression": "ls-svm"}
     provenance = fit(target, trials, **settings, folds="largest-rudder").model.provenance or {}
     errors = []

@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, guarded_fit, identify
-from identification.guard import hard_turn_features, reasons_unstable
+from identification import IdentificationResult, identify
+from identification.validation import guarded_fit
+from identification.validation.guard import hard_turn_features, reasons_unstable
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

@@ -10,9 +10,9 @@ from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
-from identification.comparators import LinearSupportVectorMachine
-from identification.decomposition import decompose_triangle, triangle
-from identification.dense_dual import dense_dual_solution, dense_truncated_solution
+from identification.estimators.comparators import LinearSupportVectorMachine
+from identification.estimators.dense_dual import dense_dual_solution, dense_truncated_solution
+from identification.regression.decomposition import decompose_triangle, triangle
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]

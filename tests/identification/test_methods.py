@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from identification import ArtificialBeeColony, cross_validate, identify
-from identification.free_running import free_running_error
-from identification.methods import METHODS
+from identification.estimators.methods import METHODS
+from identification.search.free_running import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

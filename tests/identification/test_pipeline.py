@@ -11,7 +11,7 @@ import shipgym
 from identification import IdentificationResult, identify
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.simulation import open_loop
+from shipgym.ships.simulate import open_loop
 
 
 def errors_percent(result: IdentificationResult, truth: ShipModel) -> dict[str, float]:

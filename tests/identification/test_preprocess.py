@@ -7,9 +7,16 @@ import pytest
 from scipy.interpolate import make_smoothing_spline
 
 from identification import identify
-from identification.preprocess import median, noise_level, repaired, savitzky_golay, smooth, smooth_kinematics
-from identification.preprocess.kinematics import current_of
-from identification.preprocess.spline import Reinsch
+from identification.regression.preprocess import (
+    median,
+    noise_level,
+    repaired,
+    savitzky_golay,
+    smooth,
+    smooth_kinematics,
+)
+from identification.regression.preprocess.kinematics import current_of
+from identification.regression.preprocess.spline import Reinsch
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

@@ -10,14 +10,18 @@ import pytest
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.formulas import clarke_derivatives, formula_coefficients, kijima_derivatives
-from identification.prior import reference_prior
-from identification.samples import build_samples
+from identification.regression.samples import build_samples
+from identification.simulation_error.formulas import (
+    clarke_derivatives,
+    formula_coefficients,
+    kijima_derivatives,
+)
+from identification.simulation_error.prior import reference_prior
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.models.linear import steering_state_space
-from shipgym.models.structures import get_structure
+from shipgym.ships.linear import steering_state_space
+from shipgym.ships.structures import get_structure
 
 NOISE = {"psi": np.radians(0.1), "u": 0.01, "v": 0.01, "r": np.radians(0.1), "delta": np.radians(0.1)}
 

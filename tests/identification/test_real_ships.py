@@ -16,7 +16,7 @@ from identification.real_ships.measures import turns, zigzag_errors
 from identification.real_ships.section import Section, marks, number, put, table
 from shipgym import InputError, ShipModel
 from shipgym.manoeuvres import zigzag
-from shipgym.models import load_model
+from shipgym.ships import load_model
 
 SHIPS = Path(__file__).parents[1] / "ships"
 MEASURED_RUNS = Path(__file__).parents[2].parent / "shared" / "data"

@@ -9,8 +9,12 @@ import pytest
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import identify
-from identification.following import follow
-from identification.recursive import MultiInnovationLeastSquares, RecursiveLeastSquares, StochasticGradient
+from identification.estimators.coefficient_history import follow
+from identification.estimators.recursive import (
+    MultiInnovationLeastSquares,
+    RecursiveLeastSquares,
+    StochasticGradient,
+)
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 

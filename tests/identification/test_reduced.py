@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from identification import ReducedIdentification, identify_reduced
-from identification.reduced import zigzag_sensitivity
+from identification.design.reduced import zigzag_sensitivity
 from shipgym import InputError, ShipModel, Trial
-from shipgym.models import get_structure
+from shipgym.ships import get_structure
 
 
 @pytest.fixture(scope="module")

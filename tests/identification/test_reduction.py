@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from identification import build_samples
-from identification.reduction import (
+from identification.design.reduction import (
     backward_elimination,
     forward_selection,
     reduce,
@@ -18,7 +18,7 @@ from identification.reduction import (
 )
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.models import get_structure
+from shipgym.ships import get_structure
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 NAMES = tuple("abcdefgh")

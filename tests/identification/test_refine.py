@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, build_samples, identify
-from identification.guarded_fit import guarded_fit
-from identification.methods import get_method
-from identification.refine import Refinement, refine
-from identification.segments import Shooter, compared_channels, cut
+from identification.estimators.methods import get_method
+from identification.simulation_error.refine import Refinement, refine
+from identification.simulation_error.segments import Shooter, compared_channels, cut
+from identification.validation.guarded_fit import guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 

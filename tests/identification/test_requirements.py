@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from identification.papers import get_paper, requirements
 from identification.papers.requirements import MEANINGS, REQUIREMENTS, duality_gap
-from shipgym.models.structures import STRUCTURES
+from shipgym.ships.structures import STRUCTURES
 
 ROOT = Path(__file__).parents[2]
 
@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 def rows():
     """Measured with a surge of its own, which is forgotten again."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("shipgym.models.structures.STRUCTURES", dict(STRUCTURES))
+        patch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
         yield list(get_paper("requirements").rows())
 
 

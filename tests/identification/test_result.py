@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, identify
-from identification.diagnostics import cross_correlation
 from identification.report.figures import rudder_at_windows
 from identification.result import FILES
+from identification.validation.diagnostics import cross_correlation
 from shipgym import ShipFile, ShipModel, Trial
 
 ROOT = Path(__file__).parents[2]

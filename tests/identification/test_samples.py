@@ -8,7 +8,7 @@ import pytest
 from identification import IdentificationResult, Samples, build_samples, identify
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.simulation import open_loop
+from shipgym.ships.simulate import open_loop
 
 
 def mismatch(model: ShipModel, samples: Samples) -> float:

@@ -4,8 +4,8 @@ import pytest
 from identification.papers import get_paper, song2020, song2020_container
 from identification.papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded, regressors
 from shipgym.kernels import container as own
-from shipgym.models import load_model
-from shipgym.models.structures import MMG_4DOF
+from shipgym.ships import load_model
+from shipgym.ships.structures import MMG_4DOF
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_with_the_noise_of_instruments_they_come_within_one_per_cent(rows):
 
 def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
     """The package's tanh(omega e) / omega, of omega 0, is the plain innovation."""
-    from identification.recursive import StochasticGradient
+    from identification.estimators.recursive import StochasticGradient
 
     X, y = song2020.regression("norrbin")
     ours, _ = song2020.gradient(X[:500], y[:500])

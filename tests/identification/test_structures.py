@@ -12,8 +12,8 @@ import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
-from shipgym.models.linear import nomoto
-from shipgym.models.structures import STRUCTURES, get_structure
+from shipgym.ships.linear import nomoto
+from shipgym.ships.structures import STRUCTURES, get_structure
 
 L, U0, N0 = 160.93, 7.7175, 1.2
 PARTICULARS = Particulars(length=L, speed=U0)  # accelerations need no mass
@@ -207,7 +207,7 @@ def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
 
 
 def test_a_registered_table_is_identified_by_its_name(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(STRUCTURES))
+    monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
     shipgym.register_structure("drag", {"u": "du, r^2", "r": "r, |r| r, delta"}, source="a user's own")
     ship = ship_of("drag", {"a_du": -0.01, "a_r2": -300.0, "c_r": -0.03, "c_|r|r": -3.0, "c_d": 2e-3})
     fit = identify(zigzags(ship), "drag", particulars=PARTICULARS)

@@ -17,8 +17,8 @@ from identification import (
     TunedLSSVM,
     minimise,
 )
-from identification.tuning.objectives import held_out_error, time_blocks, training_error
-from identification.tuning.search import Optimiser
+from identification.search.objectives import held_out_error, time_blocks, training_error
+from identification.search.search import Optimiser
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]

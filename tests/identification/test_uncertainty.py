@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification import Samples, build_samples
-from identification.methods import fit_all, get_method
-from identification.uncertainty import coefficient_covariance, joint_covariance
+from identification.estimators.methods import fit_all, get_method
+from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from shipgym import ShipModel, Trial
 
 

@@ -2,7 +2,7 @@ import pytest
 
 from identification.papers import xu2020, xu2020_tank
 from identification.papers.xu2020 import TABLE_12
-from shipgym.models.pmm import PMM18, PMM38, TABLE_11
+from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
 
 
 @pytest.fixture(scope="module")

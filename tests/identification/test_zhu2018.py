@@ -10,7 +10,7 @@ from identification.papers.zhu2018 import (
     steering_forms,
 )
 from identification.papers.zhu2018.fits import SEARCHES
-from identification.prediction import predict
+from identification.validation.prediction import predict
 
 
 def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():

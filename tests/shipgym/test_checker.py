@@ -8,7 +8,7 @@ import pytest
 
 import shipgym
 from shipgym import Particulars, ShipModel, SteeringGear, check_ship_model
-from shipgym.models.structures import get_structure
+from shipgym.ships.structures import get_structure
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import shipgym
+from shipgym.engine import compiled
+from shipgym.engine.generator import accelerations_source
 from shipgym.kernels import trigonometry
-from shipgym.simulation import compiled
-from shipgym.simulation.generator import accelerations_source
 from tests.shipgym.outer import outer
 
 sin_cos, wrap = outer(trigonometry.sin_cos), outer(trigonometry.wrap)

@@ -12,7 +12,7 @@ from scipy.signal import lsim
 
 import shipgym
 from shipgym import InputError, Particulars, SteeringGear, straight_line_stability
-from shipgym.models.conversions import (
+from shipgym.ships.conversions import (
     Nomoto,
     linear_steering_ship,
     nomoto,
@@ -25,7 +25,7 @@ from shipgym.models.conversions import (
     steering_state_space,
     transfer_function,
 )
-from shipgym.models.ship_model import ShipModel
+from shipgym.ships.ship_model import ShipModel
 
 MARINER = shipgym.load_model("mariner")
 SHIP = Particulars(length=160.93, speed=7.7175)

@@ -20,7 +20,7 @@ from shipgym.envs.course_keeping_task import (
     observation_scales,
 )
 from shipgym.envs.task import control_interval
-from shipgym.models import Envelope
+from shipgym.ships import Envelope
 
 ID = "shipgym/CourseKeeping-v0"
 

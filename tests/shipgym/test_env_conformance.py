@@ -15,8 +15,8 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 import shipgym
 from shipgym import InputError
 from shipgym.envs.registration import TASKS, VARIANTS
-from shipgym.models import ShipModel
-from shipgym.weather import Current, Weather, Wind
+from shipgym.sea import Current, Weather, Wind
+from shipgym.ships import ShipModel
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 IDS = [f"shipgym/{task}{variant}-v0" for task in TASKS for variant in VARIANTS]
@@ -139,7 +139,7 @@ def test_wrong_actions_of_rudder_and_shaft():
     [
         ({"sae": "calm"}, "unknown key 'sae'. Did you mean 'sea'"),
         ({"course_change": 10.0}, "Did you mean 'course_change_deg'"),
-        ({"sea": 3}, "sea: 3 found, expected a Weather of shipgym.weather or the name"),
+        ({"sea": 3}, "sea: 3 found, expected a Weather of shipgym.sea or the name"),
         ({"sea": []}, "sea: none found"),
         ({"sea": ["calm", "rugh"]}, "sea: 'rugh' found.*Did you mean 'rough'"),
         ({"action": "ruder"}, "action: 'ruder' found.*Did you mean 'rudder'"),
@@ -188,7 +188,7 @@ def test_a_count_that_is_none(count):
 
 
 def test_a_ship_without_a_rudder_is_refused(monkeypatch):
-    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(shipgym.models.structures.STRUCTURES))
+    monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(shipgym.ships.structures.STRUCTURES))
     shipgym.register_structure("drifting", {"v": "v, |v| v", "r": "v, r"})
     mariner = shipgym.load_model("mariner")
     drifting = ShipModel(

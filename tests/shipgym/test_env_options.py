@@ -10,9 +10,9 @@ import shipgym
 from shipgym import InputError
 from shipgym.envs.task import ROLL_SCALE, RUDDER_ORDERS
 from shipgym.envs.variety import N_SPEEDS, POOL_SIZE
-from shipgym.models import Envelope
-from shipgym.simulation.sensors import SEA_TRIAL
-from shipgym.weather import Waves, Weather, Wind
+from shipgym.sea import Waves, Weather, Wind
+from shipgym.ships import Envelope
+from shipgym.trials.sensors import SEA_TRIAL
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 UNBOUND = {"course_change_deg": 0.0, "max_heading_error_deg": 180.0}

@@ -7,9 +7,9 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ShipModel, manoeuvres
-from shipgym.models.container import container
-from shipgym.models.kvlcc2 import kvlcc2, kvlcc2_l7
-from shipgym.models.tanker import tanker
+from shipgym.ships.container import container
+from shipgym.ships.kvlcc2 import kvlcc2, kvlcc2_l7
+from shipgym.ships.tanker import tanker
 from tests.shipgym.reference import table
 
 

@@ -14,11 +14,11 @@ import shipgym
 from shipgym import ShipModel
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
-from shipgym.models import converted_model, grey_box
-from shipgym.models.checker import check_ship_model
-from shipgym.models.linear import nomoto
-from shipgym.models.scaling import scale_model
-from shipgym.models.structures import get_structure, register_structure
+from shipgym.ships import converted_model, grey_box
+from shipgym.ships.checker import check_ship_model
+from shipgym.ships.linear import nomoto
+from shipgym.ships.scaling import scale_model
+from shipgym.ships.structures import get_structure, register_structure
 
 
 @pytest.fixture(scope="module")

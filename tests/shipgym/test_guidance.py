@@ -4,7 +4,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipgym import InputError
-from shipgym.guidance import Path, PathPosition, integral_line_of_sight, line_of_sight, random_path, wrapped
+from shipgym.tasks.guidance import (
+    Path,
+    PathPosition,
+    integral_line_of_sight,
+    line_of_sight,
+    random_path,
+    wrapped,
+)
 
 EAST_THEN_SOUTH = Path([[0.0, 0.0], [0.0, 1000.0], [-500.0, 1000.0]])
 coordinates = st.floats(-2000.0, 2000.0)

@@ -7,8 +7,8 @@ import pytest
 from scipy.signal import lsim
 
 from shipgym.errors import InputError
-from shipgym.models import load_model
-from shipgym.models.linear import (
+from shipgym.ships import load_model
+from shipgym.ships.linear import (
     StraightRunning,
     is_course_stable,
     linearise,

@@ -7,7 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
-from shipgym.simulation import open_loop
+from shipgym.ships.simulate import open_loop
 
 
 @pytest.mark.parametrize(

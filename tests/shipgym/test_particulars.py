@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shipgym.errors import InputError
-from shipgym.particulars import ADDED_MASSES, FIELDS, Particulars, clarke_added_masses
+from shipgym.ships.particulars import ADDED_MASSES, FIELDS, Particulars, clarke_added_masses
 
 MARINER = {"length": 160.93, "beam": 23.17, "draught": 8.23, "speed": 7.7175}
 KVLCC2 = {

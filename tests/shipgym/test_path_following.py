@@ -13,10 +13,10 @@ import shipgym
 from shipgym import InputError
 from shipgym.envs.path_following import PathFollowingEngine
 from shipgym.envs.path_following_task import TURN_HORIZON, PathFollowingTask
-from shipgym.guidance import Path, line_of_sight, wrapped
 from shipgym.kernels import layout, path_following
 from shipgym.kernels import voyage_rows as rows
-from shipgym.weather import Current, Waves, Weather, Wind
+from shipgym.sea import Current, Waves, Weather, Wind
+from shipgym.tasks.guidance import Path, line_of_sight, wrapped
 
 ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner

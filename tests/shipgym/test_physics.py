@@ -7,9 +7,9 @@ import pytest
 
 import shipgym
 from shipgym import manoeuvres, scale_model
-from shipgym.models.catalogue import REFERENCE_SHIPS
-from shipgym.models.inertia import inertia
-from shipgym.models.term_table import Structure
+from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.ships.inertia import inertia
+from shipgym.ships.term_table import Structure
 
 SHIPS = tuple(REFERENCE_SHIPS)
 MIRRORED = ("y", "psi", "v", "r", "p", "phi", "delta")

@@ -19,7 +19,7 @@ from shipgym.envs.rendering import (
     Renderer,
     Scene,
 )
-from shipgym.weather import Current, Weather, Wind
+from shipgym.sea import Current, Weather, Wind
 
 LENGTH, BEAM = 160.0, 40.0
 SHIP = Scene(5000.0, -300.0, 0.0, 0.0, LENGTH, BEAM, np.radians(35.0), np.zeros((0, 2)))

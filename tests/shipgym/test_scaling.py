@@ -8,8 +8,8 @@ import pytest
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, scale_model
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.models import Envelope
-from shipgym.models.structures import get_structure
+from shipgym.ships import Envelope
+from shipgym.ships.structures import get_structure
 
 NUMBERS = {
     "steering5": [-0.06, -2.3, -0.9, -0.08, -1e-3, -0.104, -0.03, 3.7e-3],

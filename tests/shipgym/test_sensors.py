@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Trial, load_model, manoeuvres
-from shipgym.simulation import SEA_TRIAL, Sensor, Sensors
+from shipgym.trials.sensors import SEA_TRIAL, Sensor, Sensors
 
 N = 40_000
 

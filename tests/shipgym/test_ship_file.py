@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shipgym.errors import InputError
-from shipgym.ship_file import ShipFile
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.ship_file import ShipFile
+from shipgym.trials.trial import Trial
 
 SHIPS = Path(__file__).parents[1] / "ships"
 DATA = Path(__file__).parents[2].parent / "shared" / "data"

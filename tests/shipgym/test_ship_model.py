@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError, ShipModel, UnstableModelError
-from shipgym.models import Envelope
-from shipgym.simulation import open_loop
+from shipgym.ships import Envelope
+from shipgym.ships.simulate import open_loop
 
 
 @pytest.fixture(scope="module")

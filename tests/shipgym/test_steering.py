@@ -5,7 +5,7 @@ import math
 import pytest
 
 from shipgym.errors import InputError
-from shipgym.steering import SteeringGear
+from shipgym.ships.steering import SteeringGear
 
 
 def test_limit_and_rate_are_in_radians():

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
-from shipgym.models.linear import nomoto
-from shipgym.models.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
+from shipgym.ships.linear import nomoto
+from shipgym.ships.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
 
 speeds = st.floats(2.0, 10.0)
 FREE = [name for name, table in STRUCTURES.items() if not table.captive]
@@ -201,7 +201,7 @@ def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():
 
 
 def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, monkeypatch):
-    monkeypatch.setattr("shipgym.models.structures.STRUCTURES", dict(STRUCTURES))
+    monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
     table = shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"})
     assert shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}) == table
     ship = virtual_ship("mine", **{"b_v": -0.05, "c_r": -0.1, "c_d": 0.002, "c_r2v/U": 0.1})

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, Trial, load_model, towing_tank
-from shipgym.towing_tank import Tank
+from shipgym import InputError, Trial, load_model
+from shipgym.manoeuvres import towing_tank
+from shipgym.manoeuvres.towing_tank import Tank
 
 SMALL = 1e-4  # of the speed: so small that only the linear derivatives are felt
 L, U, RHO = 160.93, 7.7175, 1025.0
@@ -157,7 +158,7 @@ def test_a_force_trial_is_a_file_like_any_other(mariner, tmp_path):
     again = Trial.from_csv(tmp_path / "yaw.csv", kind="captive")
     assert again.sha256 == trial.sha256
     assert (trial.kind, trial.length) == ("captive", L)
-    assert "pure_yaw" in dir(shipgym.towing_tank)
+    assert "pure_yaw" in dir(shipgym.manoeuvres.towing_tank)
 
 
 def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_path):

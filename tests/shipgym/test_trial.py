@@ -10,9 +10,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shipgym.errors import InputError
-from shipgym.trial import Trial
-from shipgym.trial_import import rotate_to_body
-from shipgym.units import QUANTITIES, UNITS, si_factor
+from shipgym.trials.trial import Trial
+from shipgym.trials.trial_import import rotate_to_body
+from shipgym.trials.units import QUANTITIES, UNITS, si_factor
 
 T = np.linspace(0.0, 60.0, 301)
 

@@ -8,14 +8,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
-from shipgym.models import get_structure
-from shipgym.models.inertia import inertia
-from shipgym.weather import slow_drift, wave_drift, wave_motion, wave_spectrum
-from shipgym.weather.drift import added_resistance, reflection_coefficients
-from shipgym.weather.estimates import GRAVITY, weather_particulars
-from shipgym.weather.harmonics import evaluate_cosines, evaluate_sines
-from shipgym.weather.mobility import MOBILITY_ROWS, mobility, mobility_matrix, roll_inertia
-from shipgym.weather.waves import draught_attenuation
+from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
+from shipgym.sea.drift import added_resistance, reflection_coefficients
+from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.harmonics import evaluate_cosines, evaluate_sines
+from shipgym.sea.mobility import MOBILITY_ROWS, mobility, mobility_matrix, roll_inertia
+from shipgym.sea.waves import draught_attenuation
+from shipgym.ships import get_structure
+from shipgym.ships.inertia import inertia
 
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
 KVLCC2 = weather_particulars(load_model("kvlcc2").particulars)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Waves, load_model
-from shipgym.weather import (
+from shipgym.sea import (
     encounter_frequency,
     jonswap,
     pierson_moskowitz,
@@ -12,10 +12,10 @@ from shipgym.weather import (
     wave_filter,
     wave_motion,
 )
-from shipgym.weather.estimates import GRAVITY, weather_particulars
-from shipgym.weather.harmonics import circle, evaluate_cosines
-from shipgym.weather.motions import heading_response, roll_response
-from shipgym.weather.waves import spread
+from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.harmonics import circle, evaluate_cosines
+from shipgym.sea.motions import heading_response, roll_response
+from shipgym.sea.waves import spread
 
 GAMMAS = [1.0, 2.0, 3.3, 7.0]
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]

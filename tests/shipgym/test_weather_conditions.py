@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shipgym import Current, InputError, Waves, Weather, Wind, sea_states
-from shipgym.weather import WindTable
+from shipgym.sea import WindTable
 
 TABLE = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0))
 

@@ -14,12 +14,12 @@ from shipgym import InputError, manoeuvres
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.kernels import random
-from shipgym.simulation import Sensors, open_loop
-from shipgym.simulation.conditions import Conditions, Passage
-from shipgym.simulation.simulate import simulate
-from shipgym.weather import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
-from shipgym.weather.drift import wave_drift
-from shipgym.weather.mobility import mobility_matrix
+from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
+from shipgym.sea.drift import wave_drift
+from shipgym.sea.mobility import mobility_matrix
+from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.simulate import open_loop, simulate
+from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer
 
 GALE = Weather(
@@ -174,7 +174,7 @@ def test_gusts_have_the_variance_of_their_spectrum(mariner):
 def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, monkeypatch, dt):
     """With a body on which nothing acts, so that it keeps its course: variance, correlation and yaw rate."""
     none = lambda waves, ship: replace(wave_drift(waves, ship), X=ZERO, Y=ZERO, N=ZERO)  # noqa: E731
-    monkeypatch.setattr("shipgym.simulation.weather_column.wave_drift", none)
+    monkeypatch.setattr("shipgym.sea.weather_column.wave_drift", none)
     waves, steps = Waves(3.25, 9.7, 60.0), 40000
     model, state = inert(mariner, mariner.particulars["speed"])
     trial = ahead(model, Weather(waves=waves), steps, dt, state=state)

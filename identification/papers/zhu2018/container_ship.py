@@ -14,7 +14,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
 from identification.papers.row import Row
 from identification.papers.zhu2018.fits import (
     MOST_C,
@@ -29,12 +29,12 @@ from identification.papers.zhu2018.fits import (
     steering_fit,
     steering_terms,
 )
-from identification.prediction import predict
-from identification.tuning import TunedLSSVM
+from identification.search import TunedLSSVM
+from identification.validation.prediction import predict
 from shipgym.manoeuvres import zigzag
-from shipgym.models import ShipModel
-from shipgym.models.container import container
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.ships.container import container
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

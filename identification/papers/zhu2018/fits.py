@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.coefficients import with_accelerations
-from identification.lssvm import LSSVM
-from identification.machine import Machine
-from identification.samples import Samples, build_samples
-from identification.tuning import TunedLSSVM
-from shipgym.models import ShipModel, get_structure
-from shipgym.models.structures import ZHU, accelerations
-from shipgym.trial import Trial
+from identification.estimators.estimator import Machine
+from identification.estimators.lssvm import LSSVM
+from identification.regression.coefficients import with_accelerations
+from identification.regression.samples import Samples, build_samples
+from identification.search import TunedLSSVM
+from shipgym.ships import ShipModel, get_structure
+from shipgym.ships.structures import ZHU, accelerations
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -13,18 +13,18 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
+from identification.estimators.recursive import RecursiveLeastSquares
 from identification.papers.row import Row
 from identification.papers.zhu2018.fits import every
 from identification.pipeline import identify
-from identification.prediction import predict
-from identification.recursive import RecursiveLeastSquares
-from identification.samples import build_samples
+from identification.regression.samples import build_samples
+from identification.validation.prediction import predict
 from shipgym.manoeuvres import zigzag
-from shipgym.models import ShipModel, get_structure
-from shipgym.particulars import Particulars
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel, get_structure
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -14,17 +14,17 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
 from identification.papers.row import Row
 from identification.pipeline import identify
-from identification.tuning import TunedLSSVM
+from identification.search import TunedLSSVM
 from shipgym.manoeuvres import zigzag
-from shipgym.models import ShipModel
-from shipgym.models.conversions import nomoto1_ship
-from shipgym.particulars import Particulars
-from shipgym.simulation.sensors import Sensor, Sensors
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.ships.conversions import nomoto1_ship
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.sensors import Sensor, Sensors
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 

@@ -40,8 +40,8 @@ from identification.papers.zhu2018.fits import (
     term_columns,
 )
 from identification.papers.zhu2018.steering_forms import CHOSEN, MOST_C, structure_of
-from identification.prediction import predict
-from identification.tuning import TunedLSSVM
+from identification.search import TunedLSSVM
+from identification.validation.prediction import predict
 
 Floats = NDArray[np.float64]
 

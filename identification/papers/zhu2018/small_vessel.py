@@ -18,13 +18,13 @@ from identification.papers.row import Row
 from identification.papers.zhu2018.fits import Difference, every, mean_square, search, steer, steering_fit
 from identification.papers.zhu2018.steering_forms import MOST_C
 from identification.pipeline import identify
-from identification.prediction import predict
+from identification.validation.prediction import predict
 from shipgym.manoeuvres import zigzag
-from shipgym.models import ShipModel
-from shipgym.particulars import Particulars
-from shipgym.simulation.sensors import Sensor, Sensors
-from shipgym.steering import SteeringGear
-from shipgym.trial import Trial
+from shipgym.ships import ShipModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.sensors import Sensor, Sensors
+from shipgym.trials.trial import Trial
 
 STRUCTURE = "steering5"
 COEFFICIENTS = {

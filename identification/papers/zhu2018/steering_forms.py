@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from identification.lssvm import LSSVM
+from identification.estimators.lssvm import LSSVM
 from identification.papers.row import Row
 from identification.papers.zhu2018.container_ship import (
     INTERVAL,
@@ -32,9 +32,9 @@ from identification.papers.zhu2018.fits import (
     steering_fit,
     term_columns,
 )
-from identification.prediction import predict
-from shipgym.models import ShipModel
-from shipgym.trial import Trial
+from identification.validation.prediction import predict
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
 
 AIM = {"v": 0.02, "r": 0.005}  # of the chosen pair
 TOOLBOX_LIMIT = 10.0  # deg, of the rudder in the MSS toolbox's container ship

@@ -1,0 +1,308 @@
+"""The command `shipgym`: each subcommand imports what it needs when it is called.
+
+Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage, with one message on
+standard error and nothing written; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from agents.cli.benchmark import benchmark_command
+from agents.cli.command import (
+    FAILED,
+    Address,
+    EngineName,
+    HoldOut,
+    Json,
+    Method,
+    Objective,
+    Preprocessing,
+    Prior,
+    PriorStrength,
+    Rank,
+    Reference,
+    Repair,
+    Samples,
+    Set,
+    ShipFileArgument,
+    Structure,
+    Uncertainty,
+    Weight,
+    Workers,
+    answered,
+    fail,
+)
+from agents.cli.export import export_command
+from agents.cli.identification import advise_command, identify_command, reduce_command
+from agents.cli.training import train_command
+from agents.cli.tuning import tune_command
+
+if TYPE_CHECKING:
+    from agents.verification.result import AutopilotResult
+
+app = typer.Typer(
+    help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import shipgym
+
+        typer.echo(f"shipgym {shipgym.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def shipgym_command(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
+
+
+app.command("identify")(identify_command)
+app.command("advise")(advise_command)
+app.command("reduce")(reduce_command)
+app.command("export")(export_command)
+app.command("train")(train_command)
+app.command("tune")(tune_command)
+app.command("benchmark")(benchmark_command)
+
+
+@app.command("trials")
+@answered
+def trials_command(
+    model: Annotated[
+        str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
+    ],
+    out: Annotated[
+        Path | None, typer.Option(metavar="PLOTS.HTML", help="Write figures to this file.")
+    ] = None,
+    draws: Annotated[
+        int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
+    ] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
+    depth: Annotated[
+        float | None, typer.Option(metavar="M", help="Depth of the water, m; default: deep water.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Put a model through the standard manoeuvres and judge it by the IMO criteria.
+
+    Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
+    indices of an identified model come with their 95 % intervals.
+    """
+    from agents.cli.standard_trials import check_page, standard_trials, write_page
+    from agents.cli.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
+    from agents.cli.terminal import out as console
+    from shipgym.ships import load_model
+
+    ship = load_model(model)
+    water_depth = float("inf") if depth is None else depth
+    ship.check_depth(water_depth)
+    if out is not None:
+        check_page(out)
+    with progress_bars(not as_json) as progress:
+        tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
+        found = standard_trials(ship, draws, seed, tell, water_depth)
+    if out is not None:
+        write_page(ship, found, out)
+    if as_json:
+        print_json({"model": ship.name, "seed": seed, **found.to_dict()})
+        return
+    console.print(manoeuvre_table(found.indices, found.water))
+    console.print()
+    if found.criteria:
+        console.print(criteria_table(found.criteria))
+    else:
+        console.print("The IMO criteria are made for deep water: leave --depth out to judge by them.")
+    for name, criterion in found.criteria.items():
+        if criterion.note:
+            console.print(f"{name}: {criterion.note}", soft_wrap=True)
+    for name, reason in found.refused.items():
+        warn(f"no {name}: {reason}")
+    if out is not None:
+        console.print(f"\nwritten: {out}", soft_wrap=True)
+
+
+@app.command("autopilot")
+@answered
+def autopilot_command(
+    ship: ShipFileArgument,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
+    draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes flown.")] = 0,
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    preprocessing: Preprocessing = None,
+    repair: Repair = None,
+    uncertainty: Uncertainty = None,
+    prior: Prior = None,
+    prior_strength: PriorStrength = None,
+    reference: Reference = None,
+    hold_out: HoldOut = None,
+    objective: Objective = None,
+    rank: Rank = None,
+    weight: Weight = None,
+    options: Set = None,
+    agents: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--agent",
+            metavar="AGENT",
+            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+        ),
+    ] = None,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
+    as_json: Json = False,
+) -> None:
+    """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
+
+    Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
+    model is unstable; the report then says so.
+    """
+    from agents.cli.terminal import progress_bars
+    from agents.identifying import given_options
+    from agents.verification.chain import build_autopilot
+    from agents.verification.monte_carlo import Engine
+
+    given = {
+        "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
+        "repair": repair, "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
+        "reference_model": reference, "hold_out": hold_out or None, "objective": objective, "rank": rank,
+        "C": weight,
+    }  # fmt: skip
+    chosen = given_options(given, options or ())
+    with progress_bars(not as_json) as progress:
+        result = build_autopilot(
+            ship, out, draws=draws, seed=seed, options=chosen, agents=agents or (), progress=progress,
+            where=Engine(engine, workers, address),
+        )  # fmt: skip
+    _told(result, out / "report.html", draws, as_json)
+
+
+def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+    """Print the result of the chain; fail for an unstable model."""
+    from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
+    from agents.cli.terminal import out as console
+    from identification.validation.warnings import concerns
+
+    if as_json:
+        print_json({**result.metrics, "report": str(report)})
+    elif result.verification is not None:
+        found = result.verification.manoeuvres
+        console.print(prediction_table(result.identification))
+        console.print()
+        console.print(criteria_table(found.criteria))
+        console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
+        console.print(ranking_table(result))
+        console.print()
+    if not result.stable:
+        fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
+    for concern in concerns(result.identification):
+        warn(concern)
+    for name, reason in (result.verification.refused if result.verification else {}).items():
+        warn(f"no {name.upper()} autopilot: {reason}")
+    if not as_json:
+        console.print(f"report: {report}", soft_wrap=True)
+
+
+@app.command("replay")
+@answered
+def replay_command(
+    episodes: Annotated[
+        list[Path], typer.Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
+) -> None:
+    """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
+    from agents.cli.terminal import out as console
+    from agents.rollouts.replay_page import write_replay
+
+    write_replay(episodes, out)
+    console.print(f"written: {out}", soft_wrap=True)
+
+
+@app.command("reproduce")
+@answered
+def reproduce_command(
+    paper: Annotated[
+        str,
+        typer.Argument(
+            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
+        ),
+    ],
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
+
+    Exits with 1 if an aim is missed.
+    """
+    from agents.cli.reproduction import missed, page, papers_of, reproduce, terminal_table
+    from agents.cli.terminal import err, print_json
+    from agents.cli.terminal import out as console
+    from shipgym.whole_file import write_text
+
+    names = papers_of(paper)
+    with err.status("starting") as status:
+        results = reproduce(names, tell=status.update)
+    if markdown is not None:
+        write_text(page(results), markdown)
+    if as_json:
+        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
+    else:
+        for name, rows in results.items():
+            console.print(terminal_table(name, rows))
+            console.print()
+        if markdown is not None:
+            console.print(f"written: {markdown}", soft_wrap=True)
+    late = missed(results)
+    if late:
+        fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
+
+
+@app.command("doctor")
+@answered
+def doctor_command(as_json: Json = False) -> None:
+    """Check the installation: versions, cache, optional packages, the import name agents.
+
+    Exits with 1 if something does not work.
+    """
+    from agents.cli.doctor import examine_installation
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json
+
+    findings = examine_installation()
+    if as_json:
+        print_json({"findings": [finding.to_dict() for finding in findings]})
+    else:
+        for finding in findings:
+            console.print(finding.line(), soft_wrap=True)
+    if any(finding.state == "wrong" for finding in findings):
+        raise typer.Exit(FAILED)
+
+
+def main() -> None:
+    """Run the command line."""
+    app(prog_name="shipgym")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,152 @@
+"""The command `shipgym benchmark`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from agents.cli.command import FAILED, INTERRUPTED, Json, answered, fail
+
+if TYPE_CHECKING:
+    from agents.benchmarking.results import BenchmarkResult
+    from agents.verification.chain import Progress
+
+
+@answered
+def benchmark_command(
+    controllers: Annotated[
+        str | None,
+        typer.Option(
+            help="Who takes part, separated by commas: classical controllers (pid, lq, mpc, ...), tuned-pid, "
+            "pretrained agents (ppo, sac), files of agents, module:function, name=...; default: all "
+            "classical ones."
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
+    ] = None,
+    suite: Annotated[str, typer.Option(help="Tasks by the name of their suite.")] = "shipgym-v1",
+    tasks: Annotated[str | None, typer.Option(help="Only these tasks of it, separated by commas.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; default: as many as there are cores.")
+    ] = None,
+    engine: Annotated[str, typer.Option(help="local processes, or ray.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Of a ray cluster.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on in a folder that holds results, or parts of them.")
+    ] = False,
+    episodes: Annotated[
+        int, typer.Option(min=1, max=100, help="The first so many of each task: for a quick look.")
+    ] = 100,
+    page: Annotated[
+        bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
+    ] = True,
+    verify: Annotated[
+        Path | None,
+        typer.Option(metavar="RESULTS", help="Instead, fly a sample of these results again and compare."),
+    ] = None,
+    sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify flies.")] = 8,
+    tolerance: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Relative difference of costs that --verify allows; default: see docs."),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Fly controllers through the tasks of a suite, in the same episodes, and rank them.
+
+    With --verify: exits with 1 if what is flown again differs from the file.
+    """
+    if verify is not None:
+        _verify(verify, sample, tolerance, workers, as_json)
+        return
+    from agents.benchmarking.contestants import CLASSICAL
+    from agents.benchmarking.run import benchmark
+    from agents.cli.terminal import progress_bars
+
+    if out is None:
+        fail("--out: no folder found, expected one for the results: --out results/", 2)
+        return
+    try:
+        with progress_bars(not as_json) as progress:
+            result = benchmark(
+                controllers if controllers is not None else CLASSICAL,
+                suite,
+                None if tasks is None else tasks.split(","),
+                out,
+                workers,
+                engine,
+                progress,
+                address=address,
+                resume=resume,
+                episodes=episodes,
+            )
+            _remove_page(out)  # of other results, where these were gone on with
+            if page:
+                _write_page(result, out, workers, progress)
+    except KeyboardInterrupt:
+        fail(f"interrupted; what was flown is kept in {out}: go on with --resume", INTERRUPTED)
+        return
+    _told(result, out, as_json)
+
+
+def _remove_page(out: Path) -> None:
+    from agents.benchmarking.page import PAGE
+
+    (out / PAGE).unlink(missing_ok=True)
+
+
+def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progress: Progress | None) -> None:
+    """Write the page; the results are there even where it cannot be, without plotly."""
+    from agents.benchmarking.page import PAGE, write_page
+    from agents.cli.terminal import warn
+    from shipgym.errors import InputError
+
+    try:
+        write_page(result, out / PAGE, workers=workers, progress=progress)
+    except InputError as error:
+        warn(f"there is no {PAGE}: {error}")
+
+
+def _told(result: BenchmarkResult, out: Path, as_json: bool) -> None:
+    """Print the ranking, or all of the summary."""
+    from agents.cli.benchmark_tables import costs_table, ranking_table
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json, warn
+
+    if as_json:
+        print_json(result.summary)
+        return
+    console.print(ranking_table(result))
+    console.print()
+    console.print(costs_table(result))
+    console.print(f"\nwritten: {out}", soft_wrap=True)
+    for name, about in result.summary["contestants"].items():
+        for task, why in about["refused"].items():
+            warn(f"{name} did not fly {task}: {why}")
+    for task, by_name in result.summary["tasks"].items():
+        for name, found in by_name.items():
+            if found["failed"]:
+                warn(f"{name} failed in {found['failed']} episodes of {task}: {found['failure']}")
+    if result.summary["seeds"]["count"] < 100:
+        warn(f"{result.summary['seeds']['count']} of 100 episodes: for a quick look, not for a ranking")
+
+
+def _verify(path: Path, sample: int, tolerance: float | None, workers: int | None, as_json: bool) -> None:
+    """Print what was compared; fail where it differs."""
+    from agents.benchmarking.verification import verify
+    from agents.cli.benchmark_tables import verification_table
+    from agents.cli.terminal import err, print_json
+    from agents.cli.terminal import out as console
+
+    with err.status("flying a sample again"):
+        checks = verify(path, sample=sample, tolerance=tolerance, workers=workers)
+    if as_json:
+        print_json({"checks": [check.to_dict() for check in checks]})
+    else:
+        console.print(verification_table(checks))
+    wrong = [f"{check.contestant} on {check.task}" for check in checks if not check.passed]
+    if wrong:
+        fail(f"{path}: {len(wrong)} of {len(checks)} differ: {'; '.join(wrong)}", FAILED)

@@ -1,0 +1,102 @@
+"""Tables that `shipgym benchmark` prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from agents.cli.terminal import plain_table
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from agents.benchmarking.results import BenchmarkResult
+    from agents.benchmarking.verification import Check
+
+
+def ranking_table(result: BenchmarkResult) -> Table:
+    """Contestants, the best first."""
+    summary = result.summary
+    about = f"{len(result.tasks)} tasks of {summary['seeds']['count']} episodes"
+    table = plain_table(f"{summary['suite']['name']}: {about}, best first")
+    table.add_column("contestant")
+    for heading in (
+        "score", "95 %", "cost by\nthe lowest", "tasks", "runs", "lost\ncontrol", "failed", "us by\naction",
+    ):  # fmt: skip
+        table.add_column(heading, justify="right")
+    for entry in summary["ranking"]:
+        name = entry["name"]
+        times = [
+            by_name[name]["microseconds_per_action"]
+            for by_name in summary["tasks"].values()
+            if name in by_name and by_name[name]["microseconds_per_action"] is not None  # the oracle has none
+        ]
+        failed = entry["failed"]
+        table.add_row(
+            name,
+            number(entry["score"]["value"], 3),
+            between(entry["score"], 3),
+            number(entry["relative_cost"], 3),
+            str(entry["tasks"]),
+            str(summary["contestants"][name]["runs"]),
+            str(entry["lost"]),
+            f"[bold red]{failed}[/]" if failed else "0",
+            number(sum(times) / len(times) if times else None, 2),
+        )
+    return table
+
+
+def costs_table(result: BenchmarkResult) -> Table:
+    """Mean cost of an episode with its interval, one line a task and contestant, the lowest first."""
+    table = plain_table("Mean cost of an episode, 95 % interval; the lowest first")
+    table.add_column("task")
+    table.add_column("contestant")
+    for heading in ("cost", "95 %", "score", "lost", "success"):
+        table.add_column(heading, justify="right")
+    for task, by_name in result.summary["tasks"].items():
+        ordered = sorted(by_name.items(), key=lambda item: item[1]["cost"]["value"])
+        for k, (name, found) in enumerate(ordered):
+            success = found["metrics"].get("success", {}).get("mean")
+            table.add_row(
+                task if k == 0 else "",
+                name,
+                number(found["cost"]["value"], 2),
+                between(found["cost"], 2),
+                number(found["score"]["value"], 2),
+                str(found["lost"] + found["failed"]),
+                "-" if success is None else f"{100.0 * success:.0f} %",
+            )
+    return table
+
+
+def verification_table(checks: Sequence[Check]) -> Table:
+    """What was flown again."""
+    table = plain_table("Flown again")
+    for heading in ("contestant", "task"):
+        table.add_column(heading)
+    for heading in ("episodes", "difference"):
+        table.add_column(heading, justify="right")
+    for heading in ("verdict", "note"):
+        table.add_column(heading, overflow="fold")
+    for check in checks:
+        table.add_row(
+            check.contestant,
+            check.task,
+            str(check.episodes),
+            "none" if check.exact else f"{check.difference:.1e}",
+            "[green]the same[/]" if check.exact else "[green]close[/]" if check.passed else "[red]differs[/]",
+            check.note,
+        )
+    return table
+
+
+def number(value: float | None, decimals: int) -> str:
+    """A number, a dash where there is none."""
+    return "-" if value is None else f"{value:.{decimals}f}"
+
+
+def between(interval: Mapping[str, Any], decimals: int) -> str:
+    """An interval, a dash where there is none."""
+    if interval["low"] is None:
+        return "-"
+    return f"{interval['low']:.{decimals}f} to {interval['high']:.{decimals}f}"

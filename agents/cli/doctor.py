@@ -1,0 +1,133 @@
+"""What `shipgym doctor` looks at: versions, the cache of compiled ships, optional packages, names."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from platformdirs import user_cache_path
+from rich.markup import escape
+
+import shipgym
+from shipgym.engine.compiled import CACHE_VARIABLE
+
+NEEDED = ("numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs")
+EXTRAS = {
+    "report": ("plotly",),
+    "rl": ("torch", "stable-baselines3", "safetensors"),
+    "ray": ("ray",),
+    "render": ("pygame-ce",),
+}
+MARKS = {"fine": "[green]ok    [/]", "absent": "[dim]absent[/]", "wrong": "[bold red]wrong [/]"}
+OURS = ("shipgym", "identification", "agents")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing looked at.
+
+    Attributes
+    ----------
+    what : str
+    state : {"fine", "absent", "wrong"}
+        "absent": an option that is not installed; "wrong": something does not work.
+    detail : str
+        What was found and, where needed, what to do.
+    """
+
+    what: str
+    state: str
+    detail: str
+
+    def to_dict(self) -> dict[str, str]:
+        """Plain values, ready for JSON."""
+        return asdict(self)
+
+    def line(self) -> str:
+        """One line for the terminal, with rich's markup."""
+        mark = {"fine": "[green]ok    [/]", "absent": "[dim]absent[/]", "wrong": "[bold red]wrong [/]"}[
+            self.state
+        ]
+        return f"{mark}  {self.what:<20} {escape(self.detail)}"
+
+
+def examine_installation() -> list[Finding]:
+    """Everything that `shipgym doctor` reports, in order."""
+    findings = [
+        Finding(
+            "shipgym",
+            "fine",
+            f"{shipgym.__version__}, Python {platform.python_version()}, {platform.platform()}",
+        )
+    ]
+    findings += [_needed(name) for name in NEEDED]
+    findings += [_extra(extra, names) for extra, names in EXTRAS.items()]
+    findings.append(cache_finding())
+    findings += [name_finding(name) for name in OURS]
+    return findings
+
+
+def _version(distribution: str) -> str | None:
+    try:
+        return importlib.metadata.version(distribution)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _needed(name: str) -> Finding:
+    version = _version(name)
+    if version is None:
+        return Finding(name, "wrong", "not installed: pip install shipgym installs it")
+    return Finding(name, "fine", version)
+
+
+def _extra(extra: str, names: tuple[str, ...]) -> Finding:
+    versions = {name: _version(name) for name in names}
+    missing = [name for name, version in versions.items() if version is None]
+    if missing:
+        return Finding(f"extra {extra}", "absent", f"{', '.join(missing)}: pip install 'shipgym[{extra}]'")
+    return Finding(
+        f"extra {extra}", "fine", ", ".join(f"{name} {version}" for name, version in versions.items())
+    )
+
+
+def cache_finding() -> Finding:
+    """Whether compiled ships can be kept, so that a second start is fast."""
+    folder = Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        return Finding(
+            "cache",
+            "wrong",
+            f"{folder} cannot be written ({error.strerror}): every process compiles its ships anew; set "
+            f"{CACHE_VARIABLE} to a folder that can be",
+        )
+    return Finding("cache", "fine", os.fspath(folder))
+
+
+def name_finding(name: str) -> Finding:
+    """Whether an import name is this project's alone; `agents` is also that of other distributions."""
+    owners = set(importlib.metadata.packages_distributions().get(name, ()))
+    others = sorted(owners - {"shipgym"})
+    if others:
+        return Finding(
+            f"import {name}",
+            "wrong",
+            f"also a package of {', '.join(others)}, they overwrite each other: use an environment without",
+        )
+    found = importlib.util.find_spec(name)
+    folder = None if found is None or found.origin is None else Path(found.origin).resolve().parent
+    home = Path(shipgym.__file__).resolve().parents[1]
+    if folder is None or folder.parent != home:
+        return Finding(
+            f"import {name}", "wrong", f"leads to {folder}, expected {home / name}: install shipgym again"
+        )
+    return Finding(f"import {name}", "fine", os.fspath(folder))

@@ -1,0 +1,246 @@
+"""Commands that identify: `identify`, `advise` and `reduce`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from agents.cli.command import (
+    FAILED,
+    HoldOut,
+    Json,
+    Method,
+    Objective,
+    Preprocessing,
+    Prior,
+    PriorStrength,
+    Rank,
+    Reference,
+    Repair,
+    Samples,
+    Set,
+    ShipFileArgument,
+    Structure,
+    Uncertainty,
+    Weight,
+    answered,
+    fail,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from identification import IdentificationResult
+    from shipgym.trials.ship_file import ShipFile
+
+Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
+
+
+@answered
+def identify_command(
+    ship: ShipFileArgument,
+    out: Out,
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    preprocessing: Preprocessing = None,
+    repair: Repair = None,
+    uncertainty: Uncertainty = None,
+    prior: Prior = None,
+    prior_strength: PriorStrength = None,
+    reference: Reference = None,
+    hold_out: HoldOut = None,
+    objective: Objective = None,
+    rank: Rank = None,
+    weight: Weight = None,
+    options: Set = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Fit several methods and rank them on the trials held out.")
+    ] = False,
+    methods: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or all.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Identify a manoeuvring model from recorded trials; write model, metrics, settings and report.
+
+    Options not given here are those of the ship file's table [identify]. With --compare the methods are
+    ranked on the trials held out, and comparison and models are written instead.
+
+    Exits with 1 if the identified model is unstable.
+    """
+    given = {
+        "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
+        "repair": repair, "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
+        "reference_model": reference, "hold_out": hold_out or None, "objective": objective, "rank": rank,
+        "C": weight,
+    }  # fmt: skip
+    read, settings = _chosen(ship, given, options or ())
+    if compare or methods is not None:
+        _compare(read, settings, out, methods, as_json)
+    else:
+        _identify(read, settings, out, as_json)
+
+
+def _chosen(ship: Path, given: dict[str, Any], options: Sequence[str]) -> tuple[ShipFile, dict[str, Any]]:
+    """The ship file, and the options: of the command line first."""
+    from agents.identifying import given_options, identification_settings
+    from shipgym.trials.ship_file import ShipFile
+
+    read = ShipFile.load(ship)
+    return read, identification_settings(read, given_options(given, options))
+
+
+def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
+    from agents.cli.terminal import err, prediction_table, print_json
+    from agents.cli.terminal import out as console
+    from agents.identifying import identify_ship
+    from agents.output import check_folder, whole_folder
+    from identification.result import FILES
+    from identification.validation.warnings import why_unstable
+
+    check_folder(out, FILES)
+    with err.status("identifying"):
+        result = identify_ship(read, settings)
+    with whole_folder(out, FILES) as draft:
+        result.save(draft)
+    instability = why_unstable(result)
+    if as_json:
+        print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
+    else:
+        if instability is None:
+            console.print(result.summary(), markup=False, soft_wrap=True)
+            console.print(prediction_table(result))
+        console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
+    _judge(result)
+
+
+def _judge(result: IdentificationResult) -> None:
+    """Fail for an unstable model, else warn of what has to be known."""
+    from agents.cli.terminal import warn
+    from identification.validation.warnings import concerns, why_unstable
+
+    instability = why_unstable(result)
+    if instability is not None:
+        fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
+    for concern in concerns(result):
+        warn(concern)
+
+
+def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str | None, as_json: bool) -> None:
+    from agents.cli.terminal import comparison_table, err, print_json, warn
+    from agents.cli.terminal import out as console
+    from agents.identifying import compare_ship
+    from agents.output import check_folder, whole_folder
+    from identification.validation.comparison import COMPARISON_FILES
+
+    check_folder(out, COMPARISON_FILES)
+    with err.status("comparing"):
+        found = compare_ship(read, settings, methods)
+    with whole_folder(out, COMPARISON_FILES) as draft:
+        found.save(draft)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        console.print(comparison_table(found))
+        console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
+    for name, reason in found.refused.items():
+        warn(f"{name} was not fitted: {reason}")
+    for name, left in found.left_out.items():
+        warn(f"{name} does not know, and was not given: {', '.join(left)}")
+    first = found.standings[0]
+    if not first.stable or first.error is None:
+        fail("no method gives a model that stays stable on every trial held out", FAILED)
+
+
+@answered
+def advise_command(
+    ship: ShipFileArgument,
+    criterion: Annotated[
+        str, typer.Option(help="What to shrink: c (one coefficient), D (volume) or E (longest axis).")
+    ] = "c",
+    coefficient: Annotated[
+        str | None, typer.Option(help="Of the criterion c; default: the least certain one.")
+    ] = None,
+    number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    options: Set = None,
+    as_json: Json = False,
+) -> None:
+    """Tell what the trials tell of each coefficient, and which manoeuvres to run next.
+
+    Condition number, variance inflation and Fisher information of each trial; then zigzags, turning circles
+    and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
+    is least certain.
+    """
+    from agents.cli.terminal import err, print_json
+    from agents.cli.terminal import out as console
+    from agents.identifying import identify_ship
+    from identification.design.experiment import advise
+
+    given = {"structure": structure, "method": method, "samples": samples}
+    read, settings = _chosen(ship, given, options or ())
+    with err.status("identifying"):
+        result = identify_ship(read, settings)
+        used = [trial for trial in result.trials if trial.use == "fit"]
+        advice = advise(result.model, used, None, criterion, coefficient, number)
+    if as_json:
+        print_json(advice.to_dict())
+        return
+    console.print(str(advice), markup=False, soft_wrap=True)
+    console.print(f"run next: {', then '.join(advice.chosen)}", soft_wrap=True)
+
+
+@answered
+def reduce_command(
+    ship: ShipFileArgument,
+    out: Out,
+    direction: Annotated[
+        str, typer.Option(help="backward (drop terms one by one) or forward (add them).")
+    ] = "backward",
+    tolerance: Annotated[
+        float, typer.Option(min=0.0, help="By how much the R2 of stretches held out may fall.")
+    ] = 1e-3,
+    structure: Structure = None,
+    method: Method = None,
+    samples: Samples = None,
+    options: Set = None,
+    as_json: Json = False,
+) -> None:
+    """Drop the terms that the trials do not need, and identify with those that are left.
+
+    Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
+    model is unstable.
+    """
+    from agents.cli.terminal import err, prediction_table, print_json
+    from agents.cli.terminal import out as console
+    from agents.identifying import reduce_ship
+    from agents.output import check_folder, whole_folder
+    from identification.result import FILES
+    from shipgym.json_file import write_json
+
+    names = (*FILES, "reduction.json")
+    check_folder(out, names)
+    given = {"structure": structure, "method": method, "samples": samples}
+    read, settings = _chosen(ship, given, options or ())
+    with err.status("reducing"):
+        found = reduce_ship(read, settings, direction, tolerance)
+        fields = found.to_dict()
+    with whole_folder(out, names) as draft:
+        found.reduced.save(draft)
+        write_json(fields, draft / "reduction.json")
+    if as_json:
+        print_json(fields)
+    else:
+        for q, reduction in found.reductions.items():
+            console.print(f"equation of {q}")
+            console.print(str(reduction), markup=False, soft_wrap=True)
+        console.print(prediction_table(found.full, "with all terms"))
+        console.print(prediction_table(found.reduced, "with the terms left"))
+        count = fields["terms"]
+        console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
+    _judge(found.reduced)

@@ -1,0 +1,272 @@
+"""What the commands print: results to standard output, progress and messages to standard error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+if TYPE_CHECKING:
+    from agents.training.training import Progress as Training
+    from agents.verification.chain import Progress
+    from agents.verification.result import AutopilotResult
+    from identification import IdentificationResult
+    from identification.validation.comparison import Comparison
+    from shipgym.manoeuvres import Criterion, IndexInterval
+
+WIDTH_WITHOUT_TERMINAL = 110
+
+out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
+err = Console(stderr=True, highlight=False)
+
+
+def plain_table(title: str) -> Table:
+    """A table without lines, its title to the left."""
+    return Table(
+        title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
+        padding=(0, 2, 0, 0),
+    )  # fmt: skip
+
+
+def print_json(fields: Mapping[str, Any]) -> None:
+    """One JSON object and nothing else, for programs to read."""
+    print(json.dumps(fields, indent=1, allow_nan=False))
+
+
+def warn(message: str) -> None:
+    """A warning on standard error."""
+    err.print(Text.assemble(("warning: ", "bold yellow"), message), soft_wrap=True)
+
+
+def fail(message: str) -> None:
+    """The one message of an error on standard error, as it is."""
+    err.print(Text.assemble(("error: ", "bold red"), message), soft_wrap=True)
+
+
+@contextmanager
+def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
+    """Bars on standard error, one for each stage.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether to show any.
+
+    Yields
+    ------
+    callable or None
+        To be told stage, units done and total.
+    """
+    if not shown or not err.is_terminal:
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    described = TextColumn("{task.description:<30}")
+    with Progress(described, BarColumn(bar_width=32), TimeElapsedColumn(), console=err) as bars:
+        tasks: dict[str, Any] = {}
+
+        def tell(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        yield tell
+
+
+@contextmanager
+def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | None]:
+    """A bar of a training on standard error, or a line for each evaluation where that is no terminal.
+
+    Parameters
+    ----------
+    shown : bool
+        Whether to show anything.
+
+    Yields
+    ------
+    callable or None
+        To be told the progress.
+    """
+    if not shown:
+        yield None
+        return
+    if not err.is_terminal:
+
+        def line(now: Training) -> None:
+            if now.evaluated:
+                err.print(
+                    f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: {_costs(now)}", soft_wrap=True
+                )
+
+        yield line
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    told = TextColumn("{task.fields[costs]}")
+    with Progress(
+        TextColumn("training"), BarColumn(bar_width=32), TaskProgressColumn(), TimeRemainingColumn(), told,
+        console=err,
+    ) as bars:  # fmt: skip
+        task = bars.add_task("training", total=None, costs="")
+        yield lambda now: bars.update(task, completed=now.steps, total=now.total, costs=_costs(now))
+
+
+def _costs(now: Training) -> str:
+    """Costs of a training so far, beside LQ's."""
+    lq = "" if now.lq_cost is None else f", LQ {now.lq_cost:.2f}"
+    return "" if now.cost is None else f"cost {now.cost:.2f}, best {now.best_cost:.2f}{lq}"
+
+
+def prediction_table(result: IdentificationResult, what: str = "") -> Table:
+    """Errors of the open-loop simulation of each trial, and its indices."""
+    title = "Open-loop simulation of the trials: root mean square errors"
+    table = plain_table(f"{title}, {what}" if what else title)
+    table.add_column("trial", overflow="fold")
+    table.add_column("use")
+    for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
+        table.add_column(heading, justify="right")
+    table.add_column("measured -> predicted", no_wrap=True)
+    for name, metrics in result.metrics["trials"].items():
+        rmse = metrics["rmse"]
+        angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
+        errors = [_number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
+        found = "[bold red]ran away[/]" if metrics["diverged"] else _indices(metrics)
+        table.add_row(PurePath(name).name, metrics["use"], *errors, found)
+    return table
+
+
+def comparison_table(comparison: Comparison) -> Table:
+    """Methods by how well they predict the trials held out, the best first."""
+    held = "each trial in turn" if comparison.in_turn else "trials held out"
+    table = plain_table(f"Methods by how they predict {held}")
+    table.add_column("method")
+    table.add_column("model")
+    for heading in ("error by\nspread", "heading\ndeg", "yaw rate\ndeg/s", "ran away\ntrials"):
+        table.add_column(heading, justify="right")
+    for standing in comparison.standings:
+        table.add_row(
+            standing.method,
+            "stable" if standing.stable else "[bold red]unstable[/]",
+            _number(standing.error, 4),
+            _number(standing.heading_deg, 2),
+            _number(standing.yaw_rate_deg_s, 4),
+            str(standing.ran_away),
+        )
+    return table
+
+
+def _indices(metrics: Mapping[str, Any]) -> str:
+    names = {
+        "overshoot_1_deg": "1st",
+        "overshoot_2_deg": "2nd",
+        "advance_lengths": "advance",
+        "tactical_diameter_lengths": "diameter",
+    }
+    return "\n".join(
+        f"{text} {_number(metrics[name]['measured'], 2)} -> {_number(metrics[name]['predicted'], 2)}"
+        for name, text in names.items()
+        if metrics.get(name) is not None
+    )
+
+
+def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water") -> Table:
+    """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
+    drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
+    table = plain_table(f"Manoeuvres from service speed in {water}")
+    table.add_column("manoeuvre")
+    table.add_column("index")
+    table.add_column("value", justify="right")
+    if drawn:
+        table.add_column("95 % interval", justify="right")
+        table.add_column("draws without value", justify="right")
+    for manoeuvre, indices in rows.items():
+        for k, (name, index) in enumerate(indices.items()):
+            cells = [manoeuvre if k == 0 else "", name, _number(index.value, 2)]
+            if drawn:
+                cells += [_interval(index.interval), str(index.n_ran_away + index.n_never_reached)]
+            table.add_row(*cells)
+    return table
+
+
+def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
+    """IMO criteria, with interval and probability of passing where there are models drawn."""
+    drawn = any(criterion.share_passed is not None for criterion in criteria.values())
+    table = plain_table("IMO criteria, resolution MSC.137(76)")
+    table.add_column("criterion")
+    for heading in ("value", *(["95 % interval"] if drawn else []), "limit"):
+        table.add_column(heading, justify="right")
+    for heading in ("unit", "verdict"):
+        table.add_column(heading)
+    if drawn:
+        table.add_column("draws that pass", justify="right")
+    table.add_column("paragraph")
+    for name, criterion in criteria.items():
+        cells = [
+            _number(criterion.value, 2),
+            _number(criterion.limit, 2),
+            criterion.unit,
+            _verdict(criterion),
+        ]
+        if drawn:
+            cells.insert(1, _interval(criterion.interval))
+            share = criterion.share_passed
+            cells.append("-" if share is None else f"{100.0 * share:.1f} %")
+        table.add_row(name, *cells, criterion.source.rpartition(" ")[2])
+    return table
+
+
+def _verdict(criterion: Criterion) -> str:
+    if criterion.passed is None:
+        return "not assessable"
+    return "[green]passes[/]" if criterion.passed else "[red]fails[/]"
+
+
+def _interval(interval: tuple[float, float] | None) -> str:
+    return "-" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
+
+
+def ranking_table(result: AutopilotResult) -> Table:
+    """Autopilots over the models drawn, the best first."""
+    metrics = result.metrics
+    table = plain_table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
+    table.add_column("autopilot")
+    headings = (
+        "cost, mean", "cost, 95 %", "heading rmse, deg", "rudder, deg/min", "gain margin",
+        "phase margin, deg", "lost control",
+    )  # fmt: skip
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for name in metrics["ranking"]:
+        found = metrics["controllers"][name]
+        margins = found["margins"] or {}
+        table.add_row(
+            name.upper(),
+            _number(found["cost_mean"], 2),
+            _number(found["cost_quantile_95"], 2),
+            _number(found["heading_rmse_deg_mean"], 2),
+            _number(found["rudder_travel_deg_min_mean"], 1),
+            _margin(margins, "gain_margin", 2),
+            _margin(margins, "phase_margin_deg", 1),
+            str(found["lost_control"]),
+        )
+    return table
+
+
+def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
+    """A margin of an autopilot: without bound where null, and none where it is learned."""
+    if name not in margins:
+        return "-"
+    return "inf" if margins[name] is None else _number(margins[name], decimals)
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return "-" if value is None else f"{value:.{decimals}f}"

@@ -1,0 +1,129 @@
+"""The command that trains: `train`."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from agents.cli.command import (
+    INTERRUPTED,
+    Algorithm,
+    Environment,
+    EnvironmentOptions,
+    Json,
+    Model,
+    Sea,
+    TaskName,
+    answered,
+    fail,
+)
+
+if TYPE_CHECKING:
+    from agents.training.plan import Given
+    from agents.training.training import TrainingResult
+
+
+@answered
+def train_command(
+    algorithm: Algorithm,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run.")],
+    env: Environment = None,
+    model: Model = None,
+    sea: Sea = None,
+    task: TaskName = None,
+    environment_options: EnvironmentOptions = None,
+    total_steps: Annotated[
+        int | None, typer.Option(min=1, help="Decisions to learn from; default: those of the settings.")
+    ] = None,
+    settings: Annotated[
+        Path | None, typer.Option(metavar="FILE.TOML", help="Settings that go before the tuned ones.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=799, help="Of everything drawn; default: 0.")] = None,
+    randomise: Annotated[
+        bool | None,
+        typer.Option(
+            "--randomise", help="Learn on ships drawn from the posterior, in all seas, at all speeds."
+        ),
+    ] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="Of torch and the ships; default: 1.")] = None,
+    max_seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="Stop after this time; --resume goes on.")
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Train an autopilot by reinforcement learning; write its policy, learning curve and checkpoints.
+
+    Killed at any moment, the run goes on with --resume at its last checkpoint, at most a minute old, and ends
+    as if it had never stopped. With --resume what is not given is as it was, and what is given must be.
+    """
+    from agents.training.plan import Given
+    from agents.training.settings import parsed_settings
+
+    own = parsed_settings(set_ or ()) | ({} if total_steps is None else {"total_steps": total_steps})
+    given = Given(
+        algorithm, env, model, sea, task, parsed_settings(environment_options or (), "--option"), settings,
+        own, seed, randomise, threads,
+    )  # fmt: skip
+    result = _train(given, out, resume, max_seconds, as_json)
+    _told(result, out, as_json)
+
+
+def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_json: bool) -> TrainingResult:
+    """Check what is given before anything heavy is imported or written, then train."""
+    from agents.cli.terminal import training_bar, warn
+    from agents.training import run_folder
+    from agents.training.plan import make_plan
+
+    stored = None
+    if resume:
+        stored = run_folder.read_plan(out)
+    else:
+        run_folder.check_new(out)
+    plan = make_plan(given, stored)
+    if resume:
+        run_folder.check_resumable(out, plan)
+        for line in run_folder.other_versions(out):
+            warn(f"the run began with other versions: {line}; it may not go on bit for bit")
+    from agents.training.training import train
+
+    command = shlex.join(["shipgym", *sys.argv[1:]])
+    try:
+        with training_bar(not as_json) as tell:
+            return train(plan, out, resume=resume, max_seconds=max_seconds, tell=tell, command=command)
+    except KeyboardInterrupt:
+        kept = (out / run_folder.CHECKPOINT).is_file()
+        fail(f"interrupted; go on with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
+        raise  # not reached: `fail` leaves
+
+
+def _told(result: TrainingResult, out: Path, as_json: bool) -> None:
+    """Print what came out."""
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json
+
+    if as_json:
+        print_json({**result.to_dict(), "agent": str(out / "agent.json")})
+        return
+    if result.resumed_from is not None:
+        console.print(f"resumed at step {result.resumed_from:,}")
+    lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"
+    found = f"cost of an episode held out: {result.best_cost:.2f}{lq}"
+    console.print(f"{found} (step {result.best_steps:,} of {result.steps:,})", soft_wrap=True)
+    reached = result.lq_reached
+    if reached is not None:
+        console.print(f"LQ's cost reached at step {reached['steps']:,}, after {reached['seconds']:.0f} s")
+    if not result.finished:
+        total = result.plan.settings.total_steps
+        console.print(
+            f"stopped at step {result.steps:,} of {total:,}: go on with --resume --out {out}", soft_wrap=True
+        )
+    console.print(f"written: {out / 'agent.json'}", soft_wrap=True)

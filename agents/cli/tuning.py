@@ -1,0 +1,116 @@
+"""The command that tunes: `tune`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from agents.cli.command import (
+    Address,
+    Algorithm,
+    EngineName,
+    Environment,
+    EnvironmentOptions,
+    Json,
+    Model,
+    Sea,
+    TaskName,
+    Workers,
+    answered,
+)
+
+if TYPE_CHECKING:
+    from agents.training.tuning import Tuning
+
+
+@answered
+def tune_command(
+    algorithm: Algorithm,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the study; one there goes on.")],
+    env: Environment = None,
+    model: Model = None,
+    sea: Sea = None,
+    task: TaskName = None,
+    environment_options: EnvironmentOptions = None,
+    trials: Annotated[int, typer.Option(min=1, help="In all, those done before among them.")] = 20,
+    total_steps: Annotated[
+        int | None, typer.Option(min=1, help="Of each trial; default: those of the settings.")
+    ] = None,
+    settings: Annotated[
+        Path | None, typer.Option(metavar="FILE.TOML", help="Settings to begin from; they are varied too.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SETTING=VALUE", help="A setting that is not varied; repeatable."),
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, max=799, help="Of the trainings and of the search.")] = 0,
+    randomise: Annotated[
+        bool,
+        typer.Option(
+            "--randomise", help="Learn on ships drawn from the posterior, in all seas, at all speeds."
+        ),
+    ] = False,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
+    as_json: Json = False,
+) -> None:
+    """Seek the settings with which an agent learns best (Optuna), and write them for `train --settings`.
+
+    Four trials are proposed at a time, so more than four workers are of no use. Killed at any moment, the
+    same command goes on with the trials that were not done.
+    """
+    from agents.cli.terminal import progress_bars
+    from agents.training.plan import Given, make_plan
+    from agents.training.settings import parsed_settings
+    from agents.training.tuning import evaluated_evenly, tune
+    from agents.verification.monte_carlo import Engine
+
+    fixed = parsed_settings(set_ or ())
+    own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
+    options = parsed_settings(environment_options or (), "--option")
+    where = Engine(engine, workers, address)
+    where.check()
+    plan = make_plan(
+        Given(algorithm, env, model, sea, task, options, settings, own, seed, randomise, threads=1)
+    )
+    if "evaluate_every" not in fixed:
+        plan = evaluated_evenly(plan)
+    with progress_bars(not as_json) as bars:
+        tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
+        found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
+    _told(found, out, as_json)
+
+
+def _told(found: Tuning, out: Path, as_json: bool) -> None:
+    """Print what came out."""
+    from dataclasses import asdict
+
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import plain_table, print_json
+    from agents.training.tuning import BEST
+
+    if as_json:
+        print_json(
+            {
+                "trials": [asdict(trial) for trial in found.trials],
+                "best": found.best.number,
+                "settings": str(out / BEST),
+            }
+        )
+        return
+    table = plain_table("Trials by the mean cost of an episode held out, best first")
+    for heading in ("trial", "cost", "ended", "what was varied"):
+        table.add_column(heading, justify="right" if heading in ("trial", "cost") else "left")
+    for trial in sorted(found.trials, key=lambda one: (one.cost is None, one.cost or 0.0)):
+        varied = ", ".join(f"{name} {_short(value)}" for name, value in trial.parameters.items())
+        cost = "-" if trial.cost is None else f"{trial.cost:.3f}"
+        table.add_row(str(trial.number), cost, trial.ended, varied or "nothing: as it was")
+    console.print(table)
+    console.print(f"\nwritten: {out / BEST}", soft_wrap=True)
+
+
+def _short(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

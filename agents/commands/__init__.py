@@ -1,1 +1,0 @@
-"""The subcommands of `shipgym` and what they print and write."""

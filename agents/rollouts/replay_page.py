@@ -1,0 +1,121 @@
+"""The replay page: recorded episodes in one HTML file that needs neither network nor installation."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+import shipgym
+from agents.output import check_page
+from agents.rollouts.replay_series import quantities, run
+from shipgym.envs.episode import Episode
+from shipgym.errors import InputError
+from shipgym.whole_file import write_text
+
+
+def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
+    """Write the replay page of recorded episodes.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        Episode files, of one ship or of several; the page lays them over each other.
+    out : str or Path
+        The HTML file; one that exists is replaced.
+
+    Raises
+    ------
+    InputError
+        If there is no episode, one cannot be read, or the page cannot be written; nothing is written then.
+    """
+    target = Path(out)
+    check_page(target)
+    if not paths:
+        raise InputError("episodes: none found, expected at least one episode file")
+    sources = [Path(path) for path in paths]
+    episodes = [Episode.load(path) for path in sources]
+    write_text(replay_page(dict(zip(names(sources), episodes, strict=True))), target)
+
+
+def replay_page(episodes: Mapping[str, Episode]) -> str:
+    """The page of episodes by name.
+
+    Parameters
+    ----------
+    episodes : mapping of str to Episode
+        What the legend calls each.
+
+    Returns
+    -------
+    str
+        HTML that loads nothing.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not episodes:
+        raise InputError("episodes: none found, expected at least one")
+    runs = [run(name, episode) for name, episode in episodes.items()]
+    ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
+    data = json.dumps({"runs": runs, "quantities": quantities(runs)}, allow_nan=False)
+    return player(f"Replay: {ships}", _script_safe(data))
+
+
+def player(title: str, data: str) -> str:
+    """The page about data of runs.
+
+    Parameters
+    ----------
+    title : str
+        Of the window.
+    data : str
+        JSON of `runs` and `quantities` (`agents.rollouts.replay_series`) as a script element may hold it; or
+        what will be put in its place.
+
+    Returns
+    -------
+    str
+        HTML that loads nothing.
+    """
+    return Template(_part("template")).substitute(
+        title=escape(title),
+        version=escape(shipgym.__version__),
+        chart=_part("chart"),
+        player=_part("player"),
+        data=data,
+    )
+
+
+def names(paths: Sequence[Path]) -> list[str]:
+    """What to call files: their names without ending, with as many folders as tell them apart.
+
+    One that is given twice is numbered.
+    """
+    stems = [path.absolute().with_suffix("").parts for path in paths]
+    deepest = max(len(stem) for stem in stems)
+    for depth in range(1, deepest + 1):
+        called = ["/".join(stem[-depth:]).replace("//", "/") for stem in stems]
+        if len(set(called)) == len(set(stems)):
+            break
+    return [name if k == 0 else f"{name} ({k + 1})" for name, k in zip(called, _earlier(called), strict=True)]
+
+
+def _earlier(called: Sequence[str]) -> list[int]:
+    """How often each name stood before."""
+    return [called[:i].count(name) for i, name in enumerate(called)]
+
+
+def _part(name: str) -> str:
+    """One of the files of which the page is made."""
+    return files("agents.rollouts").joinpath(f"{name}.html").read_text(encoding="utf-8")
+
+
+def _script_safe(text: str) -> str:
+    """JSON that cannot end the script element it stands in."""
+    return text.replace("<", "\\u003c")

@@ -1,0 +1,178 @@
+"""What the replay page shows of an episode: its states in the units in which they are read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.envs.episode import Episode
+
+Floats = NDArray[np.float64]
+
+DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
+BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
+COURSE_ORDERS = ("set_point", "course_order", "heading_order", "desired_course", "los_course")
+SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by itself
+CROSS_TRACK = ("cross_track_error", "cross_track")
+
+
+class Quantity(NamedTuple):
+    """One history: its name and unit, its line, the order for it, dashed, and a name for little room."""
+
+    label: str
+    unit: str
+    decimals: int
+    line: str
+    order: str | None = None
+    short: str | None = None
+
+
+#: What may be shown, in this order; a quantity that no episode has is left out.
+QUANTITIES = (
+    Quantity("heading", "deg", 1, "psi", "course_order"),
+    Quantity("cross-track error", "m", 1, "cross_track_error", short="cross-track"),
+    Quantity("heading error", "deg", 1, "heading_error"),
+    Quantity("rudder", "deg", 1, "delta", "rudder_order"),
+    Quantity("speed through water", "m/s", 2, "speed", short="speed"),
+    Quantity("yaw rate", "deg/s", 2, "yaw_rate"),
+    Quantity("heel", "deg", 1, "heel"),
+    Quantity("shaft speed", "1/min", 1, "shaft_speed"),
+    Quantity("reward so far", "", 2, "reward_so_far"),
+)
+
+
+def run(name: str, episode: Episode) -> dict[str, Any]:
+    """An episode ready for the page's JSON.
+
+    Parameters
+    ----------
+    name : str
+        What the legend calls it.
+    episode : Episode
+
+    Returns
+    -------
+    dict
+        What it is, the ship to draw, the path, series of n + 1 values each, and under `other` what was
+        recorded and is shown by no other name, SI units.
+    """
+    told, path = {**episode.info, **episode.states}, episode.waypoints
+    shown = {*SHOWN, _first(COURSE_ORDERS, told), _first(CROSS_TRACK, told)}
+    other = {key: values for key, values in told.items() if key not in shown}
+    return {
+        "name": name,
+        "environment": episode.environment,
+        "model": episode.model,
+        "seed": None if episode.seed is None else str(episode.seed),  # longer than numbers are in a browser
+        "number": episode.number,
+        "dt": episode.dt,
+        "steps": episode.n_steps,
+        "length": episode.length,
+        "beam": BEAM * episode.length if episode.beam is None else episode.beam,
+        "rudderLimit": float(np.degrees(episode.rudder_limit)),
+        "outcome": outcome(episode),
+        "total": float(np.sum(episode.rewards)),
+        "waypoints": None if path is None else [rounded(point) for point in path],
+        "corridor": episode.corridor,
+        "series": {key: rounded(values) for key, values in series(episode).items()},
+        "parts": {key: rounded(values) for key, values in _after_steps(episode.reward_parts).items()},
+        "rewards": rounded(np.append(0.0, episode.rewards)),
+        "other": {key: rounded(values) for key, values in other.items()},
+    }
+
+
+def series(episode: Episode) -> dict[str, Floats]:
+    """What is shown over time, each of shape (n_steps + 1,); angles in degrees.
+
+    Headings go through north without a jump, from one within 0 to 360 degrees at the start.
+    """
+    states, commands = episode.states, episode.commands
+    heading = np.unwrap(states["psi"])
+    heading -= 2.0 * np.pi * np.floor(heading[0] / (2.0 * np.pi))
+    found: dict[str, Floats] = {
+        "x": states["x"],
+        "y": states["y"],
+        "psi": np.degrees(heading),
+        "delta": np.degrees(states["delta"]),
+        "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
+    }
+    if "u" in states:
+        found["speed"] = np.hypot(states["u"], states["v"]) if "v" in states else np.abs(states["u"])
+    for shown, name in (("yaw_rate", "r"), ("heel", "phi")):
+        if name in states:
+            found[shown] = np.degrees(states[name])
+    if "delta" in commands:
+        found["rudder_order"] = np.degrees(_before_steps(commands["delta"]))
+    if "n" in states:
+        found["shaft_speed"] = 60.0 * states["n"]
+    elif "n" in commands:
+        found["shaft_speed"] = 60.0 * _before_steps(commands["n"])
+    order = _first(COURSE_ORDERS, states)
+    if order is not None:
+        error = np.remainder(states[order] - heading + np.pi, 2.0 * np.pi) - np.pi
+        found["heading_error"] = np.degrees(error)
+        found["course_order"] = np.degrees(heading + error)  # so that it stands beside the heading
+    told = {**episode.info, **states}
+    cross_track = _first(CROSS_TRACK, told)
+    if cross_track is not None:
+        found["cross_track_error"] = told[cross_track]
+    return {**found, **_weather(states)}
+
+
+def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The histories and read-outs that some of the runs have."""
+    return [
+        quantity._asdict() for quantity in QUANTITIES if any(quantity.line in run["series"] for run in runs)
+    ]
+
+
+def outcome(episode: Episode) -> str:
+    """How an episode ended, in a word or two."""
+    if episode.success:
+        return "success"
+    if episode.terminated:
+        return "terminated"
+    ended = "time limit" if episode.truncated else "cut off"
+    return ended if episode.success is None else f"{ended}, no success"
+
+
+def _first(names: Sequence[str], states: Mapping[str, Floats]) -> str | None:
+    """The first of some names that is recorded."""
+    return next((name for name in names if name in states), None)
+
+
+def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
+    """Wind and current where they are recorded and blow or flow at all."""
+    found: dict[str, Floats] = {}
+    if "wind_speed" in states and "wind_from" in states and np.any(states["wind_speed"]):
+        found["wind_speed"] = states["wind_speed"]
+        found["wind_from"] = np.degrees(states["wind_from"]) % 360.0
+    if "current_north" in states and "current_east" in states:
+        north, east = states["current_north"], states["current_east"]
+        speed = np.hypot(north, east)
+        if np.any(speed):
+            found["current_speed"] = speed
+            found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
+    return found
+
+
+def _before_steps(values: Floats) -> Floats:
+    """Orders at the samples from which on they hold; the last one up to the end."""
+    return np.append(values, values[-1:])
+
+
+def _after_steps(parts: Mapping[str, Floats]) -> dict[str, Floats]:
+    """What steps earned at the samples where they end; nothing at the beginning."""
+    return {name: np.append(0.0, values) for name, values in parts.items()}
+
+
+def rounded(values: Floats) -> list[float]:
+    """Numbers with the digits that the page keeps."""
+    array = np.asarray(values, dtype=float)
+    size = np.floor(np.log10(np.maximum(np.abs(array), 1e-12)))
+    power = 10.0 ** np.clip(DIGITS - 1.0 - size, 0.0, DIGITS + 2.0)
+    short: list[float] = (np.round(array * power) / power).tolist()
+    return short

@@ -1,0 +1,185 @@
+"""Agents of stable-baselines3 and sb3-contrib by our settings, and the ships that they learn from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from stable_baselines3 import PPO, SAC, TD3
+from stable_baselines3.common.noise import NormalActionNoise
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
+
+from agents.controllers.controller import Controller
+from agents.training.plan import Plan, training_options
+from agents.training.residual import ResidualVecEnv
+from agents.training.settings import (
+    LEARNED,
+    RUNNING,
+    OffPolicySettings,
+    PPOSettings,
+    SACSettings,
+    Settings,
+    TD3Settings,
+    TQCSettings,
+)
+from shipgym.envs.sb3 import ShipVecEnv
+from shipgym.errors import InputError
+from shipgym.kernels import layout
+from shipgym.kernels import voyage_rows as rows
+
+ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
+#: Settings that go to the algorithms by their own names, and those that go by others.
+SHARED = ("batch_size", "gamma")
+OF_PPO = ("n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
+OF_STORE = ("buffer_size", "learning_starts", "train_freq", "gradient_steps", "tau")
+OF_SAC = (*OF_STORE, "ent_coef", "target_entropy")
+OF_TD3 = (*OF_STORE, "policy_delay", "target_policy_noise", "target_noise_clip")
+_OWN: dict[type[Settings], tuple[str, ...]] = {
+    PPOSettings: OF_PPO,
+    SACSettings: OF_SAC,
+    TQCSettings: OF_SAC,
+    TD3Settings: OF_TD3,
+}
+
+
+class StaggeredShips(ShipVecEnv):
+    """Ships whose first episodes are truncated one after another, evenly over the length of one.
+
+    Else all of them would begin at once, again and again, and a rollout show one part of episodes only.
+    """
+
+    def reset(self) -> NDArray[np.float32]:
+        """Begin an episode in each row, each of them of another age."""
+        observations: NDArray[np.float32] = super().reset()
+        memory = self.memory()
+        ages = memory["states"][:, rows.STEPS : rows.STEPS + layout.LANES]
+        lanes = np.arange(self.num_envs)
+        longest = self.vector_env.task.episode_steps
+        ages[lanes // layout.LANES, lanes % layout.LANES] += lanes * longest // self.num_envs
+        self.remember(memory)
+        return observations
+
+
+def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
+    """The ships that a plan's agent learns from, as it sees and steers them."""
+    ships: VecEnv = StaggeredShips(
+        plan.task.env_id,
+        plan.settings.ships,
+        model=plan.task.ship,
+        threads=plan.threads,
+        **training_options(plan),
+    )
+    settings = plan.settings
+    if base is not None or settings.history > 1 or settings.hold > 1:
+        ships = ResidualVecEnv(
+            ships, base, authority=settings.authority, history=settings.history, hold=settings.hold
+        )
+    return scaled_rewards(ships, settings)
+
+
+def scaled_rewards(ships: VecEnv, settings: Settings) -> VecEnv:
+    """Ships whose rewards are scaled as the settings say; observations are scaled as they are."""
+    scaled = VecNormalize(ships, norm_obs=False, gamma=settings.gamma)
+    if settings.reward_scale != RUNNING:
+        scaled.training = False
+        scaled.ret_rms.var, scaled.epsilon = np.float64(settings.reward_scale) ** 2, 0.0
+    return scaled
+
+
+def make_agent(plan: Plan, base: Controller | None) -> Any:
+    """An agent that has learned nothing yet, with its ships.
+
+    Parameters
+    ----------
+    plan : Plan
+    base : Controller or None
+        What it adds to.
+
+    Returns
+    -------
+    BaseAlgorithm
+        Its seed is also that of the ships; random numbers begin anew.
+    """
+    kind = algorithm_class(plan.algorithm)
+    ships = make_ships(plan, base)
+    arguments = sb3_arguments(plan.settings, ships.action_space.shape)
+    agent = kind("MlpPolicy", ships, seed=plan.training_seed, **arguments)
+    if base is not None and isinstance(plan.settings, OffPolicySettings):
+        begin_as_base(agent)
+    return agent
+
+
+def begin_as_base(agent: Any) -> None:
+    """Let a policy that adds to a controller add nothing at first: its last layer is zero.
+
+    Source: Silver et al. 2018, arXiv:1812.06298. PPO's last layer is next to zero anyway.
+    """
+    for actor in (agent.actor, getattr(agent, "actor_target", agent.actor)):  # SAC and TQC have no target
+        last = [layer for layer in actor.mu.modules() if isinstance(layer, torch.nn.Linear)][-1]
+        torch.nn.init.zeros_(last.weight)
+        torch.nn.init.zeros_(last.bias)
+
+
+def sb3_arguments(settings: Settings, action_shape: tuple[int, ...] = (1,)) -> dict[str, Any]:
+    """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib for our settings.
+
+    Parameters
+    ----------
+    settings : Settings
+    action_shape : tuple of int
+        Of one ship's actions.
+    """
+    arguments = {name: getattr(settings, name) for name in (*SHARED, *_OWN[type(settings)])}
+    network: dict[str, Any] = {
+        "net_arch": list(settings.net_arch),
+        "activation_fn": ACTIVATIONS[settings.activation],
+        "optimizer_kwargs": {"fused": True},  # half of the time of small networks is Adam's otherwise
+    }
+    if isinstance(settings, OffPolicySettings):
+        network["net_arch"] = {"pi": list(settings.net_arch), "qf": list(settings.critic_arch)}
+    if isinstance(settings, PPOSettings):
+        network["log_std_init"] = settings.log_std_init
+    if isinstance(settings, TD3Settings):
+        deviation = np.full(action_shape, settings.action_noise)
+        arguments["action_noise"] = NormalActionNoise(np.zeros(action_shape), deviation)
+    if isinstance(settings, TQCSettings):
+        network |= {"n_critics": settings.n_critics, "n_quantiles": settings.n_quantiles}
+        arguments["top_quantiles_to_drop_per_net"] = settings.top_quantiles_to_drop
+    return {**arguments, "learning_rate": _rate(settings), "policy_kwargs": network, "device": "cpu"}
+
+
+def _rate(settings: Settings) -> float | Callable[[float], float]:
+    """Learning rate by the part of the training that is left."""
+    if settings.schedule == "constant":
+        return settings.learning_rate
+    return lambda left: settings.learning_rate * left
+
+
+def set_deviation(agent: Any, settings: Settings) -> None:
+    """Let PPO's exploration be what it shall be at this part of the training, unless it is learned."""
+    if not isinstance(settings, PPOSettings) or settings.log_std_end == LEARNED:
+        return
+    if hasattr(agent.policy, "log_std"):  # discrete orders have none
+        done = min(agent.num_timesteps / settings.total_steps, 1.0)
+        begin, end = settings.log_std_init, float(settings.log_std_end)
+        agent.policy.log_std.data.fill_(begin + done * (end - begin))
+
+
+def algorithm_class(name: str) -> Any:
+    """The class of an algorithm by its name.
+
+    Raises
+    ------
+    InputError
+        If its package is not installed.
+    """
+    if name != "tqc":
+        return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]
+    try:
+        from sb3_contrib import TQC
+    except ModuleNotFoundError:
+        raise InputError("sb3-contrib is not installed, tqc needs it: pip install 'shipgym[rl]'") from None
+    return TQC

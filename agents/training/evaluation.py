@@ -1,0 +1,56 @@
+"""What a policy costs on episodes that it has not learned from, in the batch kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.benchmarking.designs import design
+from agents.benchmarking.suite import BenchmarkTask
+from agents.controllers.controller import Policy
+from agents.rollouts.flying import episode_costs
+from shipgym.envs.engine import Engine
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Episodes of a task that nobody learns from, and what LQ costs on them.
+
+    Attributes
+    ----------
+    engine : Engine
+        With a lane for each.
+    seeds : int array of shape (n,)
+    lq_cost : float or None
+        Mean cost of LQ designed on the task's ship; None where there is none for her.
+    """
+
+    engine: Engine
+    seeds: NDArray[np.int64]
+    lq_cost: float | None
+
+    @classmethod
+    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:
+        """The episodes with seeds from `first` on."""
+        engine, seeds = task.engine(number, threads=threads), first + np.arange(number)
+        return cls(engine, seeds, _lq_cost(task, engine, seeds))
+
+    def cost(self, policy: Policy) -> float:
+        """Mean cost of a policy."""
+        return float(episode_costs(policy, self.engine, self.seeds).mean())
+
+
+def _lq_cost(task: BenchmarkTask, engine: Engine, seeds: NDArray[np.int64]) -> float | None:
+    """Of the course autopilot, which follows paths by the course that the environment shows."""
+    if task.task.action != "rudder":
+        return None
+    try:
+        controller = design("lq", task)
+    except InputError:
+        return None
+    return float(episode_costs(controller, engine, seeds).mean())

@@ -1,0 +1,302 @@
+"""What a run of training is: algorithm, task, settings and seed; how it is read from what a user gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from agents.benchmarking.suite import ENVIRONMENTS, BenchmarkTask, load_suite
+from agents.controllers.controller import model_hash
+from agents.training.settings import (
+    ALGORITHMS,
+    Settings,
+    changed,
+    load_settings,
+    make_settings,
+    read_settings_file,
+)
+from shipgym.checks import check_choice, check_keys, check_whole
+from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Weather
+from shipgym.sea.weather_column import as_weather, weather_column
+
+#: Seeds below those that are scored: of training a thousand for each `seed`, then those held out.
+SEEDS_EACH = 1000
+LARGEST_SEED = 799
+EVALUATION_SEED = 900_000
+N_EVALUATIONS = 100
+SPEED_RANGE = (0.8, 1.1)
+SEAS = ("calm", "slight", "moderate", "rough")
+NO_TASK = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run of training.
+
+    Attributes
+    ----------
+    algorithm : {"ppo", "sac", "td3", "tqc"}
+    task : BenchmarkTask
+        Environment, model and options; evaluation is on it as it is.
+    settings : Settings
+        Of the algorithm.
+    seed : int
+        0 to 799: of networks, exploration and the ships' episodes.
+    randomise : bool
+        Whether the ships that learn differ (`training_options`).
+    threads : int
+        Of torch and of the kernels.
+
+    Raises
+    ------
+    InputError
+        For settings of another algorithm, commands that are not continuous, or a value out of its range.
+    """
+
+    algorithm: str
+    task: BenchmarkTask
+    settings: Settings
+    seed: int = 0
+    randomise: bool = False
+    threads: int = 1
+
+    def __post_init__(self) -> None:
+        kind = ALGORITHMS[check_choice(self.algorithm, ALGORITHMS, "algorithm")]
+        if type(self.settings) is not kind:
+            raise InputError(
+                f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for "
+                f"{self.algorithm}"
+            )
+        if check_whole(self.seed, "seed", at_least=0) > LARGEST_SEED:
+            raise InputError(f"seed: {self.seed} found, expected 0 to {LARGEST_SEED}")
+        check_whole(self.settings.ships, "ships", at_least=1)
+        if self.settings.ships > SEEDS_EACH:
+            raise InputError(f"ships: {self.settings.ships} found, expected at most {SEEDS_EACH}")
+        check_whole(self.threads, "threads", at_least=1)
+        longest = self.task.task.episode_steps
+        if self.settings.hold > longest:
+            raise InputError(
+                f"hold: {self.settings.hold} found, expected at most an episode's {longest} steps"
+            )
+        self._check_action()
+        self.task.task.check_fits(self.task.ship)
+
+    def _check_action(self) -> None:
+        """Refuse commands that the algorithm, or the base, does not have."""
+        action, base = self.task.task.action, self.settings.base
+        if action == "rudder-discrete" and self.algorithm != "ppo":
+            raise InputError(f"action: '{action}' found, which {self.algorithm} does not learn; take ppo")
+        if action != "rudder" and base != "none":
+            raise InputError(
+                f"base: '{base}' found with action '{action}', expected 'none', or action 'rudder'"
+            )
+
+    @property
+    def training_seed(self) -> int:
+        """Of the first ship; the others follow."""
+        return SEEDS_EACH * self.seed
+
+    def configuration(self) -> dict[str, Any]:
+        """All that decides what is learned, ready for JSON; threads are told beside it."""
+        return {
+            "algorithm": self.algorithm,
+            "task": self.task.name,
+            "environment": self.task.environment,
+            "model": self.task.model,
+            "model_sha256": model_hash(self.task.ship),
+            "options": {name: _plain(value) for name, value in self.task.options.items()},
+            "randomise": self.randomise,
+            "seed": self.seed,
+            "settings": self.settings.to_dict(),
+        }
+
+    @classmethod
+    def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Plan:
+        """The run that `configuration` tells of."""
+        options = {name: _read(value, name) for name, value in content["options"].items()}
+        task = BenchmarkTask(content["task"], content["environment"], content["model"], "", options)
+        settings = make_settings(content["algorithm"], content["settings"])
+        return cls(content["algorithm"], task, settings, content["seed"], content["randomise"], threads)
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a user gives; None, or nothing, for what is left to the defaults, or to the run that is resumed.
+
+    Attributes
+    ----------
+    algorithm : str
+    environment : str or None
+        "course-keeping", "path-following", or an id.
+    model, sea : str or None
+        Name or file of a model, and a sea state.
+    task : str or None
+        Task of the suite, which says environment, model, sea and options.
+    options : mapping
+        Further keywords of the environment.
+    settings_file : Path or None
+        TOML.
+    settings : mapping
+        By name; they go before the file.
+    seed, randomise, threads : optional
+        As in `Plan`.
+    """
+
+    algorithm: str
+    environment: str | None = None
+    model: str | None = None
+    sea: str | None = None
+    task: str | None = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    settings_file: Path | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+    randomise: bool | None = None
+    threads: int | None = None
+
+
+def make_plan(given: Given, stored: Plan | None = None) -> Plan:
+    """The run that a user asks for.
+
+    Parameters
+    ----------
+    given : Given
+    stored : Plan, optional
+        The run that is resumed: what is not given is as it was.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
+        or a value out of its range.
+    """
+    check_choice(given.algorithm, ALGORITHMS, "algorithm")
+    task = _task(given, stored)
+    own = read_settings_file(given.settings_file, given.algorithm) if given.settings_file else {}
+    own |= given.settings
+    if stored is None or stored.algorithm != given.algorithm:
+        settings = load_settings(given.algorithm, task.environment, task.name, own, task.task.action)
+    else:
+        settings = changed(stored.settings, own)
+    before = (0, False, 1) if stored is None else (stored.seed, stored.randomise, stored.threads)
+    asked = (given.seed, given.randomise, given.threads)
+    seed, randomise, threads = (old if new is None else new for new, old in zip(asked, before, strict=True))
+    return Plan(given.algorithm, task, settings, int(seed), bool(randomise), int(threads))
+
+
+def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
+    """Environment, model and options."""
+    named = {"--env": given.environment, "--model": given.model, "--sea": given.sea}
+    beside = [name for name, value in named.items() if value is not None] + (
+        ["--option"] * bool(given.options)
+    )
+    if given.task is not None:
+        if beside:
+            raise InputError(f"--task: found beside {beside[0]}, which the task says; leave one of them out")
+        return load_suite().task(given.task)
+    if stored is not None and not beside:
+        return stored.task
+    before = BenchmarkTask(NO_TASK, "course-keeping", "mariner") if stored is None else stored.task
+    environment, variant = read_environment(given.environment or before.environment)
+    sea = {} if given.sea is None else {"sea": given.sea}
+    options = ({} if stored is None else dict(before.options)) | variant | sea | dict(given.options)
+    model = given.model or options.pop("model", before.model)
+    options.pop("model", None)
+    return BenchmarkTask(before.name, environment, model, "", options)
+
+
+def read_environment(name: str) -> tuple[str, dict[str, Any]]:
+    """An environment's short name and the options of its variant, from that name or from an id.
+
+    Raises
+    ------
+    InputError
+        For an unknown one, with the nearest known one.
+    """
+    ids = {
+        f"shipgym/{task}{variant}-v0": (short, dict(options))
+        for short, task in zip(ENVIRONMENTS, TASKS, strict=True)
+        for variant, options in VARIANTS.items()
+    }
+    known: dict[str, tuple[str, dict[str, Any]]] = {short: (short, {}) for short in ENVIRONMENTS}
+    known |= ids
+    return known[check_choice(name, known, "env")]
+
+
+def training_options(plan: Plan) -> dict[str, Any]:
+    """Keywords of the environment that the ships learn in.
+
+    With `randomise` each episode has a ship drawn from the model's covariance, where it has one, an
+    approach speed of 0.8 to 1.1 times the service speed, and any of the sea states in which the ship's
+    particulars allow weather to be worked out, the task's own among them and its current in all of them.
+    """
+    options = dict(plan.task.options)
+    if not plan.randomise:
+        return options
+    ship, task = plan.task.ship, plan.task.task
+    if ship.covariance is not None:
+        options.setdefault("model_uncertainty", "posterior")
+    options.setdefault("speed_range", SPEED_RANGE)
+    names = {sea.name for sea in task.seas}
+    current = task.weather.current
+    others = [replace(as_weather(name, "sea", None), current=current) for name in SEAS if name not in names]
+    options["sea"] = [*task.seas, *(sea for sea in others if _sails(plan, sea))]
+    return options
+
+
+def _sails(plan: Plan, sea: Weather) -> bool:
+    """Whether the weather's forces on the ship can be worked out."""
+    ship, task = plan.task.ship, plan.task.task
+    try:
+        weather_column(ship, sea, task.substep(ship), task.water_depth)
+    except InputError:
+        return False
+    return True
+
+
+def _plain(value: Any) -> Any:
+    """An option in JSON."""
+    if isinstance(value, Weather):
+        return value.to_dict()
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(one) for one in value]
+    return str(value) if isinstance(value, Path) else value
+
+
+def _read(value: Any, name: str) -> Any:
+    """An option from JSON."""
+    if isinstance(value, Mapping):
+        return Weather.from_dict(value, name)
+    return [_read(one, name) for one in value] if isinstance(value, list) else value
+
+
+def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], where: str = "") -> str | None:
+    """The first entry in which two configurations differ, with both values; None where they are alike."""
+    for name in [*expected, *(name for name in found if name not in expected)]:
+        one, other = found.get(name), expected.get(name)
+        if isinstance(one, Mapping) and isinstance(other, Mapping):
+            inner = first_difference(one, other, f"{where}{name}.")
+            if inner is not None:
+                return inner
+        elif one != other:
+            return f"{where}{name} is {other!r} there, {one!r} here"
+    return None
+
+
+def check_same(found: Mapping[str, Any], expected: Mapping[str, Any], where: str) -> None:
+    """Refuse to go on with another configuration than that of a run, naming the first difference."""
+    check_keys(found, tuple(expected), where)
+    difference = first_difference(found, expected)
+    if difference is not None:
+        raise InputError(
+            f"{where}: a run of another configuration: {difference}; resume it with its own, or name another "
+            "folder"
+        )

@@ -1,0 +1,133 @@
+"""The folder of a run of training.
+
+run.json                configuration, command, versions
+checkpoint.safetensors  the run at its last boundary kept
+progress.json           the learning curve
+agent.json, .safetensors    the best policy so far
+last.json, .safetensors     the newest one
+tensorboard/            TensorBoard's log
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from agents.output import whole_folder
+from agents.training.plan import Plan, check_same
+from shipgym.checks import check_keys, check_table, check_whole
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+
+FORMAT = 1
+RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"
+AGENT, LAST, TENSORBOARD = "agent.json", "last.json", "tensorboard"
+FIELDS = ("format", "configuration", "threads", "command", "versions")
+PACKAGES = ("shipgym", "numpy", "numba", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
+REMEDY = "begin the run anew in another folder"
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that decide what is learned."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def check_new(folder: Path) -> None:
+    """Refuse a folder in which there is something already.
+
+    Raises
+    ------
+    InputError
+        Which says how to go on with a run that is there.
+    """
+    if (folder / RUN).is_file():
+        raise InputError(
+            f"{folder}: a run is there already; go on with it by --resume, or name another folder"
+        )
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: exists and is no run of training; name another folder")
+
+
+def begin_folder(folder: Path, plan: Plan, command: str) -> None:
+    """Make the folder of a new run, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If there is something already, or it cannot be written.
+    """
+    check_new(folder)
+    content = {
+        "format": FORMAT, "configuration": plan.configuration(), "threads": plan.threads, "command": command,
+        "versions": versions(),
+    }  # fmt: skip
+    with whole_folder(folder, ()) as draft:
+        write_json(content, draft / RUN)
+
+
+def read_plan(folder: Path) -> Plan:
+    """The run that a folder is of.
+
+    Raises
+    ------
+    InputError
+        If there is none, its file is broken, or its model has changed since.
+    """
+    content = _content(folder)
+    where = f"{folder / RUN}"
+    configuration = check_table(content["configuration"], f"{where}: configuration")
+    try:
+        plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(f"{where}: configuration: {error} is missing or of another kind; {REMEDY}") from None
+    check_same(plan.configuration(), configuration, str(folder))
+    return plan
+
+
+def check_resumable(folder: Path, plan: Plan) -> None:
+    """Refuse to go on with a run of another configuration, naming the first difference.
+
+    Raises
+    ------
+    InputError
+        As `read_plan`, or for a difference.
+    """
+    configuration = _content(folder)["configuration"]
+    check_same(
+        plan.configuration(), check_table(configuration, f"{folder / RUN}: configuration"), str(folder)
+    )
+
+
+def other_versions(folder: Path) -> list[str]:
+    """What was installed in another version when the run began, a line each."""
+    found: Mapping[str, str] = check_table(_content(folder)["versions"], f"{folder / RUN}: versions")
+    return [
+        f"{name} {now} in place of {found[name]}"
+        for name, now in versions().items()
+        if name in found and found[name] != now
+    ]
+
+
+def _content(folder: Path) -> Mapping[str, Any]:
+    path = folder / RUN
+    if not path.is_file():
+        raise InputError(f"{folder}: no run of training is there; leave --resume out to begin one")
+    content = read_json(path, "run file", REMEDY)
+    check_keys(content, FIELDS, str(path))
+    for name in FIELDS:
+        if name not in content:
+            raise InputError(f"{path}: field '{name}' is missing; {REMEDY}")
+    if content["format"] != FORMAT:
+        raise InputError(f"{path}: format {content['format']!r} found, expected {FORMAT}; {REMEDY}")
+    return content

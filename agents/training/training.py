@@ -1,0 +1,367 @@
+"""Training: agents learn on many ships at once, are evaluated on episodes held out, and can be resumed.
+
+A run can be killed at any moment. It goes on at the last boundary between a rollout and the next that was
+kept, and ends with the same policy, bit for bit, as if nothing had happened (same machine, same versions).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from agents.agent_file import load_agent
+from agents.policies.policy import LearnedPolicy
+from agents.training import run_folder
+from agents.training.bases import design_base
+from agents.training.evaluation import HeldOut
+from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
+from agents.training.safe_file import read_values, write_values
+from shipgym.errors import InputError
+from shipgym.json_file import write_json
+
+try:
+    import torch
+    from stable_baselines3.common.callbacks import BaseCallback
+    from stable_baselines3.common.logger import Logger, TensorBoardOutputFormat
+
+    from agents.training import checkpoints
+    from agents.training.algorithms import make_agent, set_deviation
+except ModuleNotFoundError as error:
+    raise InputError(f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'") from None
+
+REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
+CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
+
+
+class Progress(NamedTuple):
+    """How far a training is.
+
+    Attributes
+    ----------
+    steps, total : int
+        Decisions learned from, and to learn from.
+    seconds : float
+        Spent so far, those before it was resumed among them.
+    cost, best_cost, lq_cost : float or None
+        Mean cost of the episodes held out, at the last evaluation, at the best one, and of LQ.
+    evaluated : bool
+        Whether this tells of a new evaluation.
+    """
+
+    steps: int
+    total: int
+    seconds: float
+    cost: float | None
+    best_cost: float | None
+    lq_cost: float | None
+    evaluated: bool = False
+
+
+@dataclass(frozen=True)
+class TrainingResult:
+    """What came out.
+
+    Attributes
+    ----------
+    plan : Plan
+        The run.
+    policy : LearnedPolicy
+        The best one.
+    curve : tuple of dict
+        Evaluations: steps, seconds, cost on the episodes held out, mean return of those learned from.
+    best_cost : float
+        Mean cost of the policy on the episodes held out, which it was chosen by.
+    best_steps, steps : int
+        When the policy was found, and when the training ended.
+    lq_cost : float or None
+        Of LQ on the same episodes.
+    seconds : float
+        Of training and evaluation, those before it was resumed among them.
+    finished : bool
+        False where the time was up before.
+    resumed_from : int or None
+        Steps of the checkpoint that it went on from.
+    """
+
+    plan: Plan
+    policy: LearnedPolicy
+    curve: tuple[Mapping[str, Any], ...]
+    best_cost: float
+    best_steps: int
+    steps: int
+    lq_cost: float | None
+    seconds: float
+    finished: bool
+    resumed_from: int | None
+
+    @property
+    def lq_reached(self) -> Mapping[str, Any] | None:
+        """The first evaluation that cost no more than LQ, to a thousandth; None if there was none."""
+        limit = -np.inf if self.lq_cost is None else REACHED * self.lq_cost
+        return next((row for row in self.curve if row["cost"] <= limit), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For programs."""
+        return {
+            "configuration": self.plan.configuration(), "steps": self.steps, "finished": self.finished,
+            "resumed_from": self.resumed_from, "seconds": self.seconds, "best_cost": self.best_cost,
+            "best_steps": self.best_steps, "lq_cost": self.lq_cost, "lq_reached": self.lq_reached,
+            "curve": list(self.curve),
+        }  # fmt: skip
+
+
+def train(
+    plan: Plan,
+    out: str | Path | None = None,
+    *,
+    resume: bool = False,
+    max_seconds: float | None = None,
+    tell: Callable[[Progress], None] | None = None,
+    command: str | None = None,
+) -> TrainingResult:
+    """Let an agent learn.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is learned; `make_plan` reads it.
+    out : str or Path, optional
+        Folder of the run (`run_folder`); by default nothing is written.
+    resume : bool
+        Go on with the run in the folder.
+    max_seconds : float, optional
+        Time after which the training stops at the next boundary; it can be resumed.
+    tell : callable, optional
+        Is told the progress at each boundary. What it raises ends the training.
+    command : str, optional
+        Command line that is written into the run's folder.
+
+    Returns
+    -------
+    TrainingResult
+
+    Raises
+    ------
+    InputError
+        If the folder holds something already, or, to resume, nothing or a run of another configuration; if
+        the ship and the settings do not go together; or if the networks diverge.
+    """
+    folder = None if out is None else Path(out)
+    if resume and folder is None:
+        raise InputError("resume: found without a folder, expected the one of the run")
+    with _torch_threads(plan.threads):
+        if folder is not None:
+            run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
+        training = _Training(plan, folder, tell, max_seconds)
+        if folder is not None and not resume:
+            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
+        if folder is not None and resume:
+            training.restore(folder / run_folder.CHECKPOINT)
+        return training.run()
+
+
+class _TimeIsUpError(Exception):
+    """Ends the training at a boundary."""
+
+
+class _Boundary(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+    """Calls at each boundary between an update and the next rollout."""
+
+    def __init__(self, call: Callable[[], None]) -> None:
+        super().__init__()
+        self.call = call
+
+    def _on_rollout_start(self) -> None:
+        self.call()
+
+    def _on_step(self) -> bool:
+        return True
+
+
+class _Training:
+    """A training under way."""
+
+    def __init__(
+        self,
+        plan: Plan,
+        folder: Path | None,
+        tell: Callable[[Progress], None] | None,
+        max_seconds: float | None,
+    ) -> None:
+        self.plan, self.folder, self.tell, self.max_seconds = plan, folder, tell, max_seconds
+        self.started = time.monotonic()
+        base = design_base(plan.settings.base, plan.task)
+        self.held_out = HeldOut.of(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
+        self.agent = make_agent(plan, base)
+        self.policy: LearnedPolicy | None = None
+        self.curve: list[dict[str, Any]] = []
+        self.best_cost: float | None = None
+        self.best_steps = 0
+        self.seconds_before = 0.0
+        self.kept_at = -CHECKPOINT_SECONDS
+        self.resumed_from: int | None = None
+
+    def run(self) -> TrainingResult:
+        """Learn to the end, or until the time is up."""
+        self.agent.set_logger(_logger(self.folder))
+        left = self.plan.settings.total_steps - self.agent.num_timesteps
+        try:
+            if left > 0:
+                self.agent.learn(left, _Boundary(self.at_boundary), reset_num_timesteps=False)
+        except _TimeIsUpError:  # kept, and no evaluation that a run without an end would not have
+            return self._result(finished=False)
+        except ValueError as error:  # torch refuses to draw from a distribution that is not one
+            if "invalid values" not in str(error):
+                raise
+            raise self._diverged() from error
+        if not self.curve or self.curve[-1]["steps"] < self.agent.num_timesteps:
+            self.evaluate()
+        self.keep()
+        return self._result(finished=True)
+
+    def _diverged(self) -> InputError:
+        steps = self.agent.num_timesteps
+        return InputError(
+            f"training diverged after {steps} steps: the network's weights are not finite; "
+            "lower learning_rate, or raise reward_scale"
+        )
+
+    def _result(self, finished: bool) -> TrainingResult:
+        self.agent.logger.close()
+        assert self.best_cost is not None
+        policy = self.policy
+        if policy is None:  # found before the run was resumed
+            assert self.folder is not None
+            loaded = load_agent(self.folder / run_folder.AGENT)
+            assert isinstance(loaded, LearnedPolicy)
+            policy = loaded
+        return TrainingResult(
+            self.plan, policy, tuple(self.curve), self.best_cost, self.best_steps, self.agent.num_timesteps,
+            self.held_out.lq_cost, self.seconds, finished, self.resumed_from,
+        )  # fmt: skip
+
+    @property
+    def seconds(self) -> float:
+        """Spent so far, those before it was resumed among them."""
+        return self.seconds_before + time.monotonic() - self.started
+
+    def at_boundary(self) -> None:
+        """Evaluate and keep the run when it is time to; stop when the time is up."""
+        steps, every = self.agent.num_timesteps, self.plan.settings.evaluate_every
+        evaluated = self.curve[-1]["steps"] if self.curve else -every
+        due = steps // every > evaluated // every
+        if due:
+            self.evaluate()
+        if self.tell is not None:
+            self.tell(self._progress(due))
+        if time.monotonic() - self.kept_at >= CHECKPOINT_SECONDS:
+            self.keep()
+        set_deviation(self.agent, self.plan.settings)
+        if self.max_seconds is not None and time.monotonic() - self.started >= self.max_seconds:
+            self.keep()
+            raise _TimeIsUpError
+
+    def _progress(self, evaluated: bool) -> Progress:
+        cost = self.curve[-1]["cost"] if self.curve else None
+        return Progress(
+            self.agent.num_timesteps, self.plan.settings.total_steps, self.seconds, cost, self.best_cost,
+            self.held_out.lq_cost, evaluated,
+        )  # fmt: skip
+
+    def evaluate(self) -> None:
+        """Fly the episodes held out; keep the policy if it is the best."""
+        steps = self.agent.num_timesteps
+        if not all(bool(weight.isfinite().all()) for weight in self.agent.policy.parameters()):
+            raise self._diverged()
+        policy = LearnedPolicy.from_sb3(self.agent)
+        cost = self.held_out.cost(policy)
+        returns = [episode["r"] for episode in self.agent.ep_info_buffer]
+        mean = sum(returns) / len(returns) if returns else None
+        row = {"steps": steps, "seconds": round(self.seconds, 3), "cost": cost, "mean_return": mean}
+        self.curve.append(row)
+        self.agent.logger.record("evaluation/cost", cost)
+        policy = replace(policy, training=self._record())
+        best = self.best_cost is None or cost < self.best_cost
+        if best:
+            self.policy, self.best_cost, self.best_steps = policy, cost, steps
+        if self.folder is not None:
+            for name in [run_folder.LAST] + [run_folder.AGENT] * best:
+                policy.save(self.folder / name)
+            self._write_progress()
+
+    def _record(self) -> dict[str, Any]:
+        """How a policy was made; without times, so that the same run writes the same file."""
+        plan = self.plan
+        return {
+            **plan.configuration(),
+            "training_seeds": [plan.training_seed, plan.training_seed + plan.settings.ships - 1],
+            "evaluation_seeds": [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1],
+            "steps": self.agent.num_timesteps,
+            "cost": self.curve[-1]["cost"],
+            "lq_cost": self.held_out.lq_cost,
+            "curve": [[row["steps"], row["cost"]] for row in self.curve],
+            "versions": run_folder.versions(),
+        }
+
+    def _write_progress(self) -> None:
+        assert self.folder is not None
+        content = {
+            "lq_cost": self.held_out.lq_cost, "best_cost": self.best_cost, "best_steps": self.best_steps,
+            "curve": self.curve,
+        }  # fmt: skip
+        write_json(content, self.folder / run_folder.PROGRESS)
+
+    def keep(self) -> None:
+        """Write the run as it is, whole or not at all."""
+        self.kept_at = time.monotonic()
+        if self.folder is None:
+            return
+        own = {
+            "curve": self.curve, "best_cost": self.best_cost, "best_steps": self.best_steps,
+            "seconds": self.seconds,
+        }  # fmt: skip
+        write_values({"run": own, "agent": checkpoints.take(self.agent)}, self.folder / run_folder.CHECKPOINT)
+
+    def restore(self, checkpoint: Path) -> None:
+        """Go on from a checkpoint; a run that was killed before its first one begins anew."""
+        self.resumed_from = 0
+        for draft in checkpoint.parent.glob(".*.draft"):  # of a file that was being written
+            draft.unlink(missing_ok=True)
+        if not checkpoint.exists():
+            return
+        content = read_values(checkpoint, "checkpoint of a training")
+        try:
+            own = content["run"]
+            checkpoints.put_back(self.agent, content["agent"])
+            self.curve, self.best_cost, self.best_steps = own["curve"], own["best_cost"], own["best_steps"]
+            self.seconds_before = own["seconds"]
+        except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
+            why = str(error).partition("\n")[0].rstrip(" :")  # torch lists every network's layer after it
+            raise InputError(f"{checkpoint}: does not fit this run ({why}); begin the run anew") from None
+        self.resumed_from = self.agent.num_timesteps
+
+
+@contextmanager
+def _torch_threads(number: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(number)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _logger(folder: Path | None) -> Logger:
+    """TensorBoard's log, where there is a folder and TensorBoard is installed."""
+    if folder is None:
+        return Logger(None, [])
+    try:
+        return Logger(None, [TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))])
+    except (ImportError, AssertionError):
+        return Logger(None, [])

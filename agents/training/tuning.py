@@ -1,0 +1,330 @@
+"""Tuning: settings of an algorithm sought by Optuna, many trainings at once, resumed after any end.
+
+Trials are proposed in batches of four by a tree-structured Parzen estimator (Bergstra et al. 2011) that knows
+the batches before, so that what is found does not depend on how many trials are trained at once or where. The
+first trial has the settings as they are. A trial stops early by the median rule (Golovin et al. 2017, Google
+Vizier, section 3.1): when its best cost so far is above the median of what finished trials had by then.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from agents.engines.jobs import run_jobs
+from agents.training.plan import Plan, check_same
+from agents.training.search_space import Choice, Reals, search_space, with_parameters
+from agents.training.settings import changed
+from agents.verification.monte_carlo import HERE, Engine
+from shipgym.checks import check_whole
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+from shipgym.whole_file import write_text
+
+if TYPE_CHECKING:
+    import optuna
+
+#: Trials proposed at once: so many workers are of use.
+BATCH = 4
+#: Finished trials, and share of a training, before any is stopped early.
+TRIALS_BEFORE_STOPPING, SHARE_BEFORE_STOPPING = 4, 0.25
+EVALUATIONS = 10  # of a trial
+
+CONFIGURATION, STUDY, KEPT, BEST = "study.json", "study.db", "trials", "best.toml"
+MISSING = "optuna is not installed, tuning needs it: pip install 'shipgym[tune]'"
+
+LAST = 2**62  # steps, after all evaluations
+
+#: Cost of each evaluation of a training, by its steps.
+Curve = Sequence[tuple[int, float]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One training with settings of its own.
+
+    Attributes
+    ----------
+    number : int
+        From 0 on, in the order in which they were proposed.
+    parameters : dict
+        What was varied; none for the first, which has the settings as they are.
+    settings : dict
+        All settings.
+    cost : float or None
+        Mean cost of an episode held out of its best policy; None if it was stopped early or diverged.
+    curve : tuple of (int, float)
+        Cost of each evaluation, by its steps.
+    ended : {"finished", "stopped early", "diverged"}
+    """
+
+    number: int
+    parameters: Mapping[str, Any]
+    settings: Mapping[str, Any]
+    cost: float | None
+    curve: tuple[tuple[int, float], ...]
+    ended: str
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """All trials of a study, and the best of them."""
+
+    trials: tuple[Trial, ...]
+    best: Trial
+
+
+def tune(
+    plan: Plan,
+    out: str | Path,
+    trials: int = 20,
+    *,
+    fixed: Sequence[str] = (),
+    where: Engine = HERE,
+    progress: Callable[[int, int, float | None], None] | None = None,
+    training: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
+) -> Tuning:
+    """Seek settings with which an agent learns a task best; a study that is there already goes on.
+
+    Parameters
+    ----------
+    plan : Plan
+        What is learned, with the settings to begin from; every trial has its seed.
+    out : str or Path
+        Folder of the study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is
+        there as soon as a trial has finished and is settings for training.
+    trials : int
+        In all, those done before among them.
+    fixed : sequence of str
+        Settings that are left as they are.
+    where : Engine
+        Where trials are trained; the results are the same.
+    progress : callable, optional
+        Told the trials done, their total and the best cost.
+    training : callable, optional
+        In the place of `train_trial`: a job in, cost, curve and how it ended out.
+
+    Returns
+    -------
+    Tuning
+
+    Raises
+    ------
+    InputError
+        If Optuna is missing, the folder holds a study of something else or anything else, or every trial
+        of the first batch diverges.
+    """
+    check_whole(trials, "trials", at_least=1)
+    if find_spec("optuna") is None:
+        raise InputError(MISSING)
+    folder = Path(out)
+    study = _opened(folder, plan, fixed)
+    found: list[Trial] = []
+    for first in range(0, trials, BATCH):
+        proposed = _proposed(plan, found, min(BATCH, trials - first), fixed)
+
+        def tell(done: int, _: int, before: int = first) -> None:
+            if progress is not None:
+                progress(
+                    before + done, trials, min((t.cost for t in found if t.cost is not None), default=None)
+                )
+
+        results = run_jobs(
+            training or train_trial,
+            [_job(plan, settings, found) for _, settings in proposed],
+            engine=where.engine, workers=where.workers, address=where.address, keep=folder / KEPT,
+            progress=tell,
+        )  # fmt: skip
+        for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
+            found.append(_trial(first + k, parameters, settings, result))
+        _record(study, found, plan, fixed)
+        if all(trial.ended == "diverged" for trial in found):
+            raise InputError(f"every trial diverged, the first: {results[0]['why']}")
+        _write_best(folder, plan, found)
+    return Tuning(tuple(found), _best(found))
+
+
+def evaluated_evenly(plan: Plan) -> Plan:
+    """The plan with ten evaluations on the way, which stopping early lives on."""
+    every = max(1, plan.settings.total_steps // EVALUATIONS)
+    return replace(plan, settings=changed(plan.settings, {"evaluate_every": every}))
+
+
+def train_trial(job: dict[str, Any]) -> dict[str, Any]:
+    """Train one trial; stop it when it is worse than finished ones were.
+
+    What a base does before anything is learned is no merit of the settings: step 0 does not count.
+    """
+    from agents.training.training import Progress, train
+
+    plan = Plan.from_configuration(job["configuration"], threads=1)
+    curve: list[tuple[int, float]] = []
+
+    def tell(now: Progress) -> None:
+        if now.evaluated and now.cost is not None and now.steps > 0:
+            curve.append((now.steps, now.cost))
+            if _best_until(curve, now.steps) > allowed(job["limits"], now.steps):
+                raise _StoppedEarlyError
+
+    try:
+        result = train(plan, tell=tell)
+    except _StoppedEarlyError:
+        return {"cost": None, "curve": curve, "ended": "stopped early"}
+    except InputError as error:
+        return {"cost": None, "curve": curve, "ended": "diverged", "why": str(error)}
+    told = [(row["steps"], row["cost"]) for row in result.curve if row["steps"] > 0]
+    return {"cost": min(cost for _, cost in told), "curve": told, "ended": "finished"}
+
+
+class _StoppedEarlyError(Exception):
+    """Ends the training of a trial."""
+
+
+def limits(trials: Sequence[Trial], total_steps: int) -> list[tuple[int, float]]:
+    """Steps, and the median over finished trials of the best cost that they had come to by then."""
+    finished = [trial.curve for trial in trials if trial.ended == "finished"]
+    if len(finished) < TRIALS_BEFORE_STOPPING:
+        return []
+    first = SHARE_BEFORE_STOPPING * total_steps
+    marks = sorted({steps for curve in finished for steps, _ in curve if steps >= first})
+    return [(mark, float(np.median([_best_until(curve, mark) for curve in finished]))) for mark in marks]
+
+
+def allowed(limits: Curve, steps: int) -> float:
+    """The largest best cost with which a training goes on after some steps."""
+    return min((cost for mark, cost in limits if mark <= steps), default=np.inf)
+
+
+def _best_until(curve: Curve, steps: int) -> float:
+    return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
+
+
+def _job(plan: Plan, settings: Mapping[str, Any], found: Sequence[Trial]) -> dict[str, Any]:
+    configuration = {**plan.configuration(), "settings": dict(settings)}
+    return {"configuration": configuration, "limits": limits(found, plan.settings.total_steps)}
+
+
+def _trial(
+    number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Mapping[str, Any]
+) -> Trial:
+    curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
+    return Trial(number, parameters, settings, result["cost"], curve, result["ended"])
+
+
+def _best(trials: Sequence[Trial]) -> Trial:
+    """The finished trial of the lowest cost; one that was stopped early only where none has finished."""
+    return min(trials, key=lambda trial: (trial.cost is None, _best_until(trial.curve, LAST)))
+
+
+def _proposed(
+    plan: Plan, found: Sequence[Trial], number: int, fixed: Sequence[str]
+) -> list[tuple[dict[str, Any], dict[str, Any]]]:
+    """Parameters and settings of the next trials; they follow from the trials before and the seed."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    space = _distributions(plan, fixed)
+    sampler = optuna.samplers.TPESampler(seed=plan.seed + len(found), n_startup_trials=BATCH)
+    study = optuna.create_study(sampler=sampler)
+    study.add_trials([_frozen(trial, space) for trial in found])
+    asked: list[dict[str, Any]] = [{}] if not found else []
+    asked += [dict(study.ask(space).params) for _ in range(number - len(asked))]
+    return [(parameters, with_parameters(plan.settings, parameters).to_dict()) for parameters in asked]
+
+
+def _distributions(plan: Plan, fixed: Sequence[str]) -> dict[str, Any]:
+    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
+
+    found: dict[str, Any] = {}
+    for name, dimension in search_space(plan.algorithm, fixed).items():
+        if isinstance(dimension, Choice):
+            found[name] = CategoricalDistribution(tuple(dimension.options))
+        elif isinstance(dimension, Reals):
+            found[name] = FloatDistribution(dimension.low, dimension.high, log=dimension.log)
+        else:
+            found[name] = IntDistribution(dimension.low, dimension.high)
+    return found
+
+
+def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
+    """A trial as Optuna knows it."""
+    import optuna
+
+    finished = trial.cost is not None
+    return optuna.trial.create_trial(
+        state=optuna.trial.TrialState.COMPLETE if finished else optuna.trial.TrialState.PRUNED,
+        value=trial.cost,
+        params=dict(trial.parameters),
+        distributions={name: space[name] for name in trial.parameters},
+        user_attrs={"number": trial.number, "ended": trial.ended, "settings": dict(trial.settings)},
+        intermediate_values=dict(trial.curve),
+    )
+
+
+def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
+    """The study in the folder; a new one where there is none."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    expected = {"configuration": plan.configuration(), "fixed": sorted(fixed)}
+    note = folder / CONFIGURATION
+    if note.is_file():
+        found = read_json(note, "study", "name another folder")
+        check_same(expected, found, str(note))
+    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise InputError(f"{folder}: exists and is no study of tuning; name another folder")
+    else:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{folder}: no folder can be made there ({error.strerror})") from None
+        write_json(expected, note)
+    try:
+        return optuna.create_study(
+            storage=f"sqlite:///{folder / STUDY}", study_name="shipgym", load_if_exists=True
+        )
+    except Exception as error:  # what SQLAlchemy raises for a broken file is of many kinds
+        raise InputError(
+            f"{folder / STUDY}: not a study of Optuna ({error}); remove it, it is written again from "
+            f"{folder / KEPT}"
+        ) from None
+
+
+def _record(study: optuna.Study, found: Sequence[Trial], plan: Plan, fixed: Sequence[str]) -> None:
+    """Add to the study what it does not have yet: it may have been written until anywhere."""
+    there = {trial.user_attrs.get("number") for trial in study.trials}
+    space = _distributions(plan, fixed)
+    study.add_trials([_frozen(trial, space) for trial in found if trial.number not in there])
+
+
+def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
+    """Settings of the best trial; how often it was evaluated was for tuning only."""
+    best = _best(found)
+    cost = "no trial has finished" if best.cost is None else f"mean cost held out {best.cost:.6g}"
+    head = (
+        f"# Trial {best.number} of {len(found)}: {cost}, seed {plan.seed}, {plan.algorithm} on "
+        f"{plan.task.name or plan.task.environment} with {plan.task.model}.\n"
+        f"# shipgym train {plan.algorithm} --settings {BEST} ...\n\n"
+    )
+    write_text(
+        head
+        + "".join(
+            f"{name} = {_toml(value)}\n" for name, value in best.settings.items() if name != "evaluate_every"
+        ),
+        folder / BEST,
+    )
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_toml(item) for item in value) + "]"
+    return repr(value)

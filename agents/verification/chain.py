@@ -1,0 +1,263 @@
+"""The whole chain: recorded trials in; a model, its certainty, verified autopilots and a report out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.identifying import identification_settings, identify_trials, trials_of
+from agents.output import check_folder, whole_folder
+from agents.verification.monte_carlo import HERE, Engine, monte_carlo
+from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from identification.validation.warnings import why_unstable
+from shipgym.checks import check_number, quoted
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.json_file import write_json
+from shipgym.plots import graph_objects
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import nomoto
+from shipgym.trials.ship_file import ShipFile
+
+if TYPE_CHECKING:
+    from agents.agent_file import Agent
+    from agents.controllers.controller import Controller
+
+Floats = NDArray[np.float64]
+
+FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
+LARGEST_SEED = 2**32
+
+#: Told the stage of the work, the units of it done and their total.
+Progress = Callable[[str, int, int], None]
+
+
+def build_autopilot(
+    ship_file: str | Path,
+    out: str | Path,
+    *,
+    draws: int = 200,
+    seed: int = 0,
+    options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
+    progress: Progress | None = None,
+    where: Engine = HERE,
+) -> AutopilotResult:
+    """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
+
+    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the
+    model is unstable only the first two. It is written whole or not at all.
+
+    Parameters
+    ----------
+    ship_file : str or Path
+        The ship file (TOML) with its trials.
+    out : str or Path
+        Folder of the results; an earlier report there is replaced, anything else is refused.
+    draws : int
+        Number of models drawn from the coefficient covariance, at least 2.
+    seed : int
+        Of the draws and of the episodes flown.
+    options : mapping, optional
+        Of `identify`, by name, trials by file; those not given are the ship file's.
+    agents : sequence of str or Path
+        Files of autopilots to fly beside PID and LQ, or names of pretrained ones (`load_agent`).
+    progress : callable, optional
+        Called as the work goes on.
+    where : Engine
+        Where the models drawn are worked on; the results are the same.
+
+    Returns
+    -------
+    AutopilotResult
+
+    Raises
+    ------
+    InputError
+        For anything wrong with the files or arguments; nothing is written then.
+    """
+    from agents.controllers.controller import Controller
+    from agents.verification.page import write_report
+
+    folder = Path(out)
+    where.check()
+    check_number(draws, "draws", at_least=2)
+    check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
+    check_folder(folder, FILES)
+    graph_objects()  # a missing extra shall be told now, not after the work
+    result = examine(
+        ship_file,
+        draws=int(draws),
+        seed=int(seed),
+        options=options,
+        agents=agents,
+        progress=progress,
+        where=where,
+    )
+    with whole_folder(folder, FILES) as draft:
+        _tell(progress, "writing the report", 0, 1)
+        write_json(result.metrics, draft / "metrics.json")
+        if result.verification is not None:
+            result.model.save(draft / "model.json")
+            for pilot in result.verification.pilots:
+                if isinstance(pilot.controller, Controller):  # the others are files already
+                    pilot.controller.save(draft / f"{pilot.key}.json")
+        write_report(result, draft / "report.html")
+        _tell(progress, "writing the report", 1, 1)
+    return result
+
+
+def examine(
+    ship_file: str | Path,
+    *,
+    draws: int = 200,
+    seed: int = 0,
+    options: Mapping[str, Any] | None = None,
+    agents: Sequence[str | Path] = (),
+    progress: Progress | None = None,
+    where: Engine = HERE,
+) -> AutopilotResult:
+    """The chain without its files: see `build_autopilot`."""
+    from agents.agent_file import load_agent
+
+    _tell(progress, "reading trials", 0, 1)
+    ship = ShipFile.load(ship_file)
+    guests = [load_agent(agent) for agent in agents]
+    trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
+    _tell(progress, "reading trials", 1, 1)
+    _tell(progress, "identifying", 0, 1)
+    identification = identify_trials(ship, trials, arguments)
+    _tell(progress, "identifying", 1, 1)
+    instability = why_unstable(identification)
+    verification = None
+    if instability is None:
+        for guest, agent in zip(guests, agents, strict=True):
+            _check_fits(guest, identification.model, f"agent '{agent}'")
+        try:
+            verification = verify(identification.model, draws, seed, progress, where, guests)
+        except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
+            instability = str(error)
+    return AutopilotResult(ship, identification.trials, identification, instability, verification)
+
+
+def verify(
+    model: ShipModel,
+    draws: int,
+    seed: int,
+    progress: Progress | None = None,
+    where: Engine = HERE,
+    guests: Sequence[Agent] = (),
+) -> Verification:
+    """Design PID and LQ on a model and fly them, and guests, over models drawn from its covariance.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a covariance.
+    draws, seed : int
+        See `build_autopilot`.
+    progress : callable, optional
+        Called as the work goes on.
+    where : Engine
+        Where the draws are worked on; the results are the same.
+    guests : sequence of Controller, LearnedPolicy or Shielded
+        Further autopilots.
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    UnstableModelError
+        If the model itself runs away.
+    InputError
+        If no autopilot can be designed on it.
+    """
+    from agents.rollouts.flight import fly, step_response
+
+    stage = "models drawn"
+    _tell(progress, stage, 0, draws)
+    controllers, refused = _designed(model)
+    found = monte_carlo(
+        controllers,
+        model,
+        draws,
+        seed,
+        where=where,
+        progress=lambda done: _tell(progress, stage, done, draws),
+    )
+    seeds = seed + np.arange(draws)
+    flights = [*found.flights, *(fly(guest, found.draws, seeds=seeds) for guest in guests)]
+    lost = found.manoeuvres.unstable
+    stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
+    pilots, flown = [], [*controllers, *guests]
+    keys = _told_apart([str(one.name) for one in flown])
+    for k, (controller, flight) in enumerate(zip(flown, flights, strict=True)):
+        _tell(progress, "step responses", k, len(flown))
+        step = step_response(controller, [model, *stable], STEP_DEG)
+        pilots.append(Pilot(keys[k], controller, flight, step))
+    _tell(progress, "step responses", len(flown), len(flown))
+    return Verification(
+        draws=draws,
+        seed=seed,
+        manoeuvres=found.manoeuvres,
+        course_unstable=found.course_unstable,
+        nomoto=nomoto(model),
+        pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
+        refused=refused,
+    )
+
+
+def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
+    """Refuse a guest that was not made for keeping this ship's course."""
+    from shipgym.envs.course_keeping_task import CourseKeepingTask
+
+    shown = CourseKeepingTask().observed(model)
+    names = [one.name for one in shown]
+    if more := [name for name in guest.observation_names if name not in names]:
+        raise InputError(
+            f"{where}: it observes {quoted(more)}, which course keeping does not show; expected an agent for "
+            "course keeping, such as mariner-calm-ppo; paths are flown by shipgym benchmark"
+        )
+    guest.check_fits(names, [one.scale for one in shown], where)
+
+
+def _told_apart(names: Sequence[str]) -> list[str]:
+    """Names, those that were there before with a number."""
+    return [
+        name if name not in names[:k] else f"{name}-{names[:k].count(name) + 1}"
+        for k, name in enumerate(names)
+    ]
+
+
+def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
+    """The autopilots, and why others could not be designed.
+
+    Raises
+    ------
+    InputError
+        If none could.
+    """
+    from agents.controllers.lq import LQ
+    from agents.controllers.pid import PID
+
+    controllers: list[Controller] = []
+    refused: dict[str, str] = {}
+    designs: tuple[Any, ...] = (PID, LQ)
+    for design in designs:
+        try:
+            controllers.append(design.from_model(model))
+        except InputError as error:  # this design does not suit the ship; another may
+            refused[design.kind] = str(error)
+    if not controllers:
+        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
+    return controllers, refused
+
+
+def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
+    if progress is not None:
+        progress(stage, done, total)

@@ -1,0 +1,184 @@
+"""The figures of the report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.verification.index_uncertainty import ManoeuvreSpread
+from identification.report.predictions import RUDDER, legend_above
+from shipgym.manoeuvres import Criterion
+from shipgym.plots import (
+    GRID,
+    LIMIT,
+    MEASURED,
+    MODEL,
+    MUTED,
+    axis,
+    compact,
+    graph_objects,
+    layout,
+    line,
+    subplots,
+    translucent,
+)
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+Floats = NDArray[np.float64]
+
+PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
+MARGIN = {"l": 62, "r": 18, "t": 60, "b": 44}
+BAND = (0.05, 0.95)
+
+CRITERIA = {
+    "advance": "Advance (35° turn)",
+    "tactical_diameter": "Tactical diameter (35° turn)",
+    "initial_turning": "Initial turning (10° rudder)",
+    "overshoot_1_10_10": "First overshoot (10/10)",
+    "overshoot_2_10_10": "Second overshoot (10/10)",
+    "overshoot_1_20_20": "First overshoot (20/20)",
+    "stopping": "Track reach, full astern stop",
+}
+
+
+def band(t: Floats, values: Floats, name: str, colour: str, showlegend: bool = False) -> list[Any]:
+    """The range of 5 to 95 per cent of `values`, shape (n_draws, n_samples), as a filled band."""
+    low, high = np.quantile(values, BAND, axis=0)
+    go = graph_objects()
+    return [
+        go.Scatter(
+            x=compact(np.concatenate([t, t[::-1]])), y=compact(np.concatenate([high, low[::-1]])),
+            name=name, legendgroup=name, showlegend=showlegend, mode="lines", line={"width": 0},
+            fill="toself", fillcolor=translucent(colour, 0.18), hoverinfo="skip",
+        )
+    ]  # fmt: skip
+
+
+def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
+    """Each criterion of every draw as a share of its limit, one row each, the limit at 100 per cent."""
+    go = graph_objects()
+    figure = go.Figure()
+    jitter = np.random.default_rng(0)
+    for row, spread in enumerate(criteria.values()):
+        values = np.empty(0) if spread.drawn is None else spread.drawn.values
+        share = 100.0 * values[np.isfinite(values)] / spread.limit
+        heights = row + jitter.uniform(-0.22, 0.22, len(share))
+        figure.add_trace(
+            go.Scatter(
+                x=compact(share), y=compact(heights), name="models drawn", legendgroup="draws",
+                showlegend=row == 0, mode="markers", hovertemplate="%{x:.1f} %<extra></extra>",
+                marker={"color": translucent(MODEL, 0.3), "size": 5},
+            )
+        )  # fmt: skip
+        if spread.value is not None:
+            nominal = [100.0 * spread.value / spread.limit] * 2
+            figure.add_trace(
+                line(
+                    nominal, [row - 0.32, row + 0.32], "identified model", MEASURED, 2.2, showlegend=row == 0
+                )
+            )
+    ends = [-0.5, len(criteria) - 0.5]
+    figure.add_trace(line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash"))
+    figure.update_layout(
+        layout(46 * len(criteria) + 100, hovermode="closest", margin={"l": 190, "r": 18, "t": 34, "b": 48})
+    )
+    figure.update_xaxes(axis("per cent of the limit", rangemode="tozero", ticksuffix=" %"))
+    labels = [CRITERIA[name] for name in criteria]
+    figure.update_yaxes(
+        axis("", tickvals=list(range(len(labels))), ticktext=labels, range=ends[::-1], showgrid=False)
+    )
+    return figure
+
+
+def manoeuvres_figure(spread: ManoeuvreSpread, length: float) -> Figure:
+    """20/20 zigzag and turning circle of the identified model, over those of the draws."""
+    figure = subplots(1, 2, titles=["20/20 zigzag", "Turning circle to starboard"], horizontal_spacing=0.1)
+    run = spread.zigzag
+    if len(spread.zigzag_headings):
+        figure.add_traces(
+            band(run.t, np.degrees(spread.zigzag_headings), "5 to 95 % of draws", MODEL, True), rows=1, cols=1
+        )
+    figure.add_trace(line(run.t, np.degrees(run["delta"]), "rudder", RUDDER, 1.2), row=1, col=1)
+    figure.add_trace(line(run.t, np.degrees(run["psi"]), "identified model", MODEL, 2.0), row=1, col=1)
+    if spread.circle_paths:
+        gap = np.full((1, 2), np.nan)
+        paths = np.concatenate([part for path in spread.circle_paths for part in (path / length, gap)])
+        figure.add_trace(
+            line(paths[:, 1], paths[:, 0], "single draws", translucent(MODEL, 0.22), 1.0), row=1, col=2
+        )
+    circle = spread.circle
+    figure.add_trace(
+        line(circle["y"] / length, circle["x"] / length, "identified model", MODEL, 2.0, showlegend=False),
+        row=1, col=2,
+    )  # fmt: skip
+    figure.update_xaxes(axis("time, s"), row=1, col=1)
+    figure.update_yaxes(axis("heading change and rudder, deg"), row=1, col=1)
+    figure.update_xaxes(axis("east, ship lengths"), row=1, col=2)
+    figure.update_yaxes(axis("north, ship lengths", scaleanchor="x2", scaleratio=1), row=1, col=2)
+    figure.update_layout(
+        layout(
+            430, margin={"l": 62, "r": 18, "t": 76, "b": 48}, legend=legend_above(430), hovermode="closest"
+        )
+    )
+    return figure
+
+
+def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step_deg: float) -> Figure:
+    """Change of course under each autopilot: heading above, rudder below.
+
+    Parameters
+    ----------
+    t : array of shape (n_samples,)
+        s.
+    responses : mapping of str to (heading, rudder)
+        By autopilot, each of shape (1 + n_draws, n_samples), rad, the identified model first.
+    step_deg : float
+        The change of course, degrees.
+    """
+    figure = subplots(2, 1, shared_xaxes=True, vertical_spacing=0.06, row_heights=[0.58, 0.42])
+    for row in (1, 2):
+        for (name, values), colour in zip(responses.items(), PILOT_COLOURS, strict=False):
+            shown = np.degrees(values[row - 1])
+            if len(shown) > 1:
+                figure.add_traces(band(t, shown[1:], name, colour), rows=row, cols=1)
+            figure.add_trace(line(t, shown[0], name, colour, 2.1, showlegend=row == 1), row=row, col=1)
+    figure.add_trace(
+        line([t[0], t[-1]], [step_deg] * 2, "set course", MUTED, 1.2, line_dash="dot"), row=1, col=1
+    )
+    figure.update_yaxes(axis("heading change, deg"), row=1, col=1)
+    figure.update_yaxes(axis("rudder, deg", zeroline=True, zerolinecolor=GRID), row=2, col=1)
+    figure.update_xaxes(axis("time, s"), row=2, col=1)
+    figure.update_layout(layout(500))
+    return figure
+
+
+def costs_figure(costs: Mapping[str, Floats]) -> Figure:
+    """Box plot of the cost of each autopilot over the models drawn.
+
+    Parameters
+    ----------
+    costs : mapping of str to array of shape (n_draws,)
+        By autopilot.
+    """
+    go = graph_objects()
+    figure = go.Figure()
+    for (name, values), colour in zip(costs.items(), PILOT_COLOURS, strict=False):
+        figure.add_trace(
+            go.Box(
+                x=compact(values), name=name, boxpoints="all", jitter=0.6, pointpos=0.0,
+                marker={"color": translucent(colour, 0.45), "size": 3.5},
+                line={"color": colour, "width": 1.6},
+                fillcolor=translucent(colour, 0.12), showlegend=False,
+            )
+        )  # fmt: skip
+    figure.update_layout(
+        layout(90 * len(costs) + 90, hovermode="closest", margin={"l": 62, "r": 18, "t": 12, "b": 48})
+    )
+    figure.update_xaxes(axis("steering cost of an episode"))
+    figure.update_yaxes(axis("", autorange="reversed"))
+    return figure

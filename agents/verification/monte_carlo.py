@@ -1,0 +1,214 @@
+"""Monte Carlo over the posterior: manoeuvres and flights of models drawn from the covariance of one ship.
+
+Draws are shared out in jobs of 25, always the same ones: the results do not depend on where they are done.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.engines.jobs import JobProgress, check_engine, run_jobs
+from agents.verification.index_uncertainty import (
+    ManoeuvreSpread,
+    SailedDraws,
+    nominal_runs,
+    sail_draws,
+    spread_of,
+)
+from shipgym.checks import check_whole
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import is_course_stable
+from shipgym.ships.model_file import model_fields, read_model
+
+if TYPE_CHECKING:
+    from agents.controllers.controller import Controller
+    from agents.rollouts.flight import Flights
+
+Floats = NDArray[np.float64]
+
+DRAWS_A_JOB = 25
+
+
+@dataclass(frozen=True)
+class Engine:
+    """Where jobs are done: see `agents.engines.jobs.run_jobs`, whose arguments these are."""
+
+    engine: str = "local"
+    workers: int | None = 1
+    address: str | None = None
+    keep: str | Path | None = None
+
+    def check(self) -> None:
+        """Refuse wrong arguments before the work begins.
+
+        Raises
+        ------
+        InputError
+            As `run_jobs`.
+        """
+        check_engine(self.engine, self.workers, self.address)
+
+    def run(
+        self, function: Callable[[dict[str, Any]], Any], jobs: Sequence[dict[str, Any]], progress: JobProgress
+    ) -> list[Any]:
+        """Do the jobs."""
+        return run_jobs(
+            function,
+            jobs,
+            engine=self.engine,
+            workers=self.workers,
+            address=self.address,
+            keep=self.keep,
+            progress=progress,
+        )
+
+
+#: One job after the other, in this process.
+HERE = Engine()
+
+
+@dataclass(frozen=True, eq=False)
+class MonteCarlo:
+    """What became of the models drawn.
+
+    Attributes
+    ----------
+    draws : tuple of ShipModel
+        The models drawn.
+    manoeuvres : ManoeuvreSpread
+        Standard manoeuvres and IMO criteria over the draws.
+    course_unstable : bool array of shape (n_draws,)
+        Draws that do not hold a straight course with the rudder held.
+    flights : tuple of Flights
+        Of each controller, one episode on each draw.
+    """
+
+    draws: tuple[ShipModel, ...]
+    manoeuvres: ManoeuvreSpread
+    course_unstable: NDArray[np.bool_]
+    flights: tuple[Flights, ...]
+
+
+def monte_carlo(
+    controllers: Sequence[Controller],
+    model: ShipModel,
+    draws: int = 200,
+    seed: int = 0,
+    *,
+    where: Engine = HERE,
+    progress: Callable[[int], None] | None = None,
+) -> MonteCarlo:
+    """Sail the standard manoeuvres and an episode of course keeping with models drawn from the posterior.
+
+    Parameters
+    ----------
+    controllers : sequence of Controller
+        Each is flown on every draw; draw i with seed + i, the same episodes for all.
+    model : ShipModel
+        With a covariance.
+    draws : int
+        Models drawn, at least 2.
+    seed : int
+        Of the draws and of the episodes.
+    where : Engine
+        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
+    progress : callable, optional
+        Told the number of draws done.
+
+    Returns
+    -------
+    MonteCarlo
+
+    Raises
+    ------
+    InputError
+        If the model has no covariance, or a controller is for another ship.
+    UnstableModelError
+        If the model itself runs away.
+    """
+    check_whole(draws, "draws", at_least=2)
+    check_whole(seed, "seed", at_least=0)
+    for controller in controllers:
+        controller.check_fits_model(model)
+    nominal = nominal_runs(model)
+    drawn = model.sample(draws, seed)
+    results = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _told(progress, draws))
+    sailed = [SailedDraws(**result["sailed"]) for result in results]
+    return MonteCarlo(
+        draws=tuple(drawn),
+        manoeuvres=spread_of(model, nominal, sailed),
+        course_unstable=np.concatenate([result["course_unstable"] for result in results]),
+        flights=tuple(_joined([result["flights"][k] for result in results]) for k in range(len(controllers))),
+    )
+
+
+def draw_jobs(
+    controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
+) -> list[dict[str, Any]]:
+    """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
+    from agents.controllers.controller_file import controller_content
+
+    common = {
+        "model": model_fields(replace(model, covariance=None)),
+        "controllers": [controller_content(controller) for controller in controllers],
+    }
+    return [
+        {
+            **common,
+            "coefficients": [list(draw.coefficients.values()) for draw in drawn[first : first + DRAWS_A_JOB]],
+            "names": [draw.name for draw in drawn[first : first + DRAWS_A_JOB]],
+            "first_seed": seed + first,
+        }
+        for first in range(0, len(drawn), DRAWS_A_JOB)
+    ]
+
+
+def do_draws(job: dict[str, Any]) -> dict[str, Any]:
+    """Manoeuvres, course stability and flights of some draws."""
+    from agents.controllers.controller_file import read_controller
+    from agents.rollouts.flight import fly
+
+    model = read_model(job["model"], "model")
+    draws = [
+        replace(model, name=name, coefficients=dict(zip(model.coefficients, values, strict=True)))
+        for name, values in zip(job["names"], job["coefficients"], strict=True)
+    ]
+    seeds = job["first_seed"] + np.arange(len(draws))
+    flown = [
+        fly(read_controller(content, "controller"), draws, seeds=seeds) for content in job["controllers"]
+    ]
+    sailed = sail_draws(model, draws)
+    return {
+        "sailed": {item.name: getattr(sailed, item.name) for item in fields(sailed)},
+        "course_unstable": np.array([not holds_course(draw) for draw in draws]),
+        "flights": [{item.name: getattr(one, item.name) for item in fields(one)} for one in flown],
+    }
+
+
+def holds_course(model: ShipModel) -> bool:
+    """Whether the ship holds a straight course with the rudder held; not if there is none at all."""
+    try:
+        return is_course_stable(model)
+    except InputError:
+        return False
+
+
+def _joined(parts: Sequence[dict[str, Any]]) -> Flights:
+    from agents.rollouts.flight import Flights
+
+    return Flights(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+def _told(progress: Callable[[int], None] | None, draws: int) -> JobProgress:
+    def tell(done: int, total: int) -> None:
+        if progress is not None:
+            progress(min(done * DRAWS_A_JOB, draws) if done < total else draws)
+
+    return tell

@@ -1,0 +1,177 @@
+"""What the whole chain found out: the model, its certainty, the autopilots and how they flew."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from agents.controllers.controller import Controller
+from agents.verification.index_uncertainty import ManoeuvreSpread
+from identification import IdentificationResult
+from shipgym.ships import ShipModel
+from shipgym.ships.linear import Nomoto
+from shipgym.trials.ship_file import ShipFile
+from shipgym.trials.trial import Trial
+
+if TYPE_CHECKING:
+    from agents.agent_file import Agent
+    from agents.rollouts.flight import Flights, StepResponses
+
+Floats = NDArray[np.float64]
+
+STEP_DEG = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """One autopilot and how it flew.
+
+    Attributes
+    ----------
+    key : str
+        Its name in metrics, no other's: that of the controller, with a number where there are several.
+    controller : Controller, LearnedPolicy or Shielded
+        With gains and margins if it is a Controller.
+    flights : Flights
+        One episode on each model drawn.
+    step : StepResponses
+        Of the identified model, first, and of the stable models drawn.
+    """
+
+    key: str
+    controller: Agent
+    flights: Flights
+    step: StepResponses
+
+    @property
+    def name(self) -> str:
+        """Short name, in capitals as the field writes it."""
+        return self.key.upper()
+
+    @property
+    def design(self) -> Controller | None:
+        """The controller, if it is one that was designed: with gains and margins."""
+        return self.controller if isinstance(self.controller, Controller) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """What was found out about a stable model and its autopilots.
+
+    Attributes
+    ----------
+    draws : int
+        Number of models drawn from the coefficient covariance.
+    seed : int
+        Of the draw and of the episodes.
+    manoeuvres : ManoeuvreSpread
+        Indices and IMO criteria of the model and its draws.
+    course_unstable : bool array of shape (n_draws,)
+        Draws that do not hold a straight course with the rudder held.
+    nomoto : Nomoto
+        Of the identified model.
+    pilots : tuple of Pilot
+        Ranked: the lowest mean cost first.
+    refused : dict of str to str
+        Autopilots that could not be designed on the model, and why.
+    """
+
+    draws: int
+    seed: int
+    manoeuvres: ManoeuvreSpread
+    course_unstable: NDArray[np.bool_]
+    nomoto: Nomoto
+    pilots: tuple[Pilot, ...]
+    refused: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class AutopilotResult:
+    """All that the report tells.
+
+    Attributes
+    ----------
+    ship : ShipFile
+        What was read.
+    trials : tuple of Trial
+        In the order of the file.
+    identification : IdentificationResult
+        The model and its predictions.
+    instability : str or None
+        Why the model must not be used; None where it is stable.
+    verification : Verification or None
+        None where the model is unstable.
+    """
+
+    ship: ShipFile
+    trials: tuple[Trial, ...]
+    identification: IdentificationResult
+    instability: str | None
+    verification: Verification | None
+
+    @property
+    def model(self) -> ShipModel:
+        """The identified model."""
+        return self.identification.model
+
+    @property
+    def stable(self) -> bool:
+        """Whether the model can be used."""
+        return self.verification is not None
+
+    @property
+    def metrics(self) -> dict[str, Any]:
+        """The contents of metrics.json."""
+        result = self.identification
+        metrics: dict[str, Any] = {
+            **result.metrics,
+            "stable": self.stable,
+            "instability": self.instability,
+            "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
+        }
+        if self.verification is not None:
+            metrics |= verification_metrics(self.verification)
+        return metrics
+
+
+def verification_metrics(found: Verification) -> dict[str, Any]:
+    """What metrics.json tells of a verification."""
+    return {
+        "draws": {
+            "count": found.draws,
+            "seed": found.seed,
+            "unstable": int(found.manoeuvres.unstable.sum()),
+            "course_unstable": int(found.course_unstable.sum()),
+        },
+        "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
+        "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
+        "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
+        "ranking": [pilot.key for pilot in found.pilots],
+        "refused": found.refused,
+    }
+
+
+def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
+    """Gains and margins of one autopilot, null if it is learned, and its flights over the models drawn."""
+    flights, design = pilot.flights, pilot.design
+    gains = None if design is None else {name: float(value) for name, value in design.gains.items()}
+    margins = None if design is None else {k: _finite(value) for k, value in asdict(design.margins).items()}
+    return {
+        "gains": gains,
+        "margins": margins,
+        "cost_mean": float(np.mean(flights.cost)),
+        "cost_quantile_95": float(np.quantile(flights.cost, 0.95)),
+        "heading_rmse_deg_mean": float(np.mean(flights.heading_rmse_deg)),
+        "heading_rmse_deg_quantile_95": float(np.quantile(flights.heading_rmse_deg, 0.95)),
+        "rudder_travel_deg_min_mean": float(np.mean(flights.rudder_travel_deg_min)),
+        "extrapolating_mean": float(np.mean(flights.extrapolating)),
+        "lost_control": int(np.sum(flights.terminated)),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """A number as JSON knows it: infinite margins become null."""
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Which terms a model needs, and which trial to run next."""

@@ -1,0 +1,371 @@
+"""What trials tell about each coefficient, and which manoeuvre to run next.
+
+The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up over trials. Its
+inverse is the least covariance of the coefficients; candidates are simulated on the current model and judged
+by what adding their information makes of it (Fedorov 1972, Theory of optimal experiments): c-optimal for one
+coefficient, D-optimal for the volume of the ellipsoid of all of them, E-optimal for its longest axis.
+Coefficients count relative to their size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from io import StringIO
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.regression.samples import Samples, build_samples
+from shipgym.checks import check_choice
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
+from shipgym.ships import ShipModel, Structure
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Manoeuvre = Callable[[ShipModel], Trial]
+
+CRITERIA = ("c", "D", "E")
+DURATION = 40.0  # of a candidate, in the time to sail one ship length
+STEPS = 60  # samples of a candidate in that time
+WINDOW = 0.2  # over which velocities are integrated, in that time
+FLOOR = 1e-14  # of the eigenvalues of an information, by the largest
+JITTER = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class TrialInformation:
+    """What one trial tells.
+
+    Attributes
+    ----------
+    name : str
+        Of the trial.
+    condition_number : dict of str to float
+        By equation, of the features scaled to a root mean square of 1.
+    inflation : dict of str to float
+        By coefficient of the accelerations' terms: how much the other terms increase its variance.
+    information : array of shape (n_coefficients, n_coefficients)
+        Fisher information of the model's coefficients.
+    """
+
+    name: str
+    condition_number: dict[str, float]
+    inflation: dict[str, float]
+    information: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """Which manoeuvres to run next.
+
+    Attributes
+    ----------
+    criterion : str
+        "c", "D" or "E".
+    coefficient : str
+        That which "c" shrinks: by default the least certain one.
+    trials : tuple of TrialInformation
+        Of the trials so far.
+    before : dict of str to float
+        Relative standard error of each coefficient from the trials so far.
+    steps : tuple of dict of str to float
+        Of each choice the gain of all candidates, the largest is best: by what factor the standard error
+        ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
+    chosen : tuple of str
+        The candidates to run, in this order.
+    after : dict of str to float
+        Relative standard errors with them.
+    """
+
+    criterion: str
+    coefficient: str
+    trials: tuple[TrialInformation, ...]
+    before: dict[str, float]
+    steps: tuple[dict[str, float], ...]
+    chosen: tuple[str, ...]
+    after: dict[str, float]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON; of each trial's information the diagonal."""
+        names = list(self.before)
+        return {
+            "criterion": self.criterion,
+            "coefficient": self.coefficient,
+            "trials": {
+                trial.name: {
+                    "condition_number": trial.condition_number,
+                    "variance_inflation": trial.inflation,
+                    "information": dict(zip(names, np.diag(trial.information).tolist(), strict=True)),
+                }
+                for trial in self.trials
+            },
+            "relative_errors": {"now": self.before, "expected": self.after},
+            "gains": list(self.steps),
+            "run_next": list(self.chosen),
+        }
+
+    def __str__(self) -> str:
+        from rich.console import Console
+        from rich.table import Table
+
+        told = Table(
+            "trial", "condition number", "largest inflation", f"information on {self.coefficient}",
+            title="Trials so far", title_justify="left",
+        )  # fmt: skip
+        at = list(self.before).index(self.coefficient)
+        total = sum(float(trial.information[at, at]) for trial in self.trials)
+        for trial in self.trials:
+            worst = max(trial.inflation, key=lambda name: trial.inflation[name])
+            numbers = ", ".join(f"{q} {value:.0f}" for q, value in trial.condition_number.items())
+            share = float(trial.information[at, at]) / total if total > 0.0 else 0.0
+            told.add_row(
+                trial.name,
+                numbers,
+                f"{trial.inflation[worst]:.0f} ({worst})",
+                f"{100.0 * share:.0f} % of all",
+            )
+        title = f"Run next ({self.criterion}-optimal; least certain: {self.coefficient})"
+        candidates = Table("candidate", title=title, title_justify="left")
+        for k in range(len(self.steps)):
+            candidates.add_column(f"gain, choice {k + 1}", justify="right")
+        for name in sorted(self.steps[0], key=lambda name: self.steps[0][name], reverse=True):
+            gains = (
+                f"{s[name]:.2f}{' *' if name == c else ''}"
+                for s, c in zip(self.steps, self.chosen, strict=True)
+            )
+            candidates.add_row(name, *gains)
+        errors = Table("coefficient", "relative error now", "expected", title_justify="left")
+        for name in sorted(self.before, key=lambda name: self.before[name], reverse=True):
+            errors.add_row(name, f"{self.before[name]:.2g}", f"{self.after[name]:.2g}")
+        console = Console(file=StringIO(), width=100, color_system=None)
+        console.print(told, candidates, errors)
+        file = console.file
+        assert isinstance(file, StringIO)
+        return file.getvalue()
+
+
+def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, float]) -> Floats:
+    """Information on the model's coefficients, for exact features and white errors.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    samples : Samples
+        Regression of its structure.
+    noise : mapping of str to float
+        Variance of the targets' errors, by equation.
+
+    Returns
+    -------
+    array of shape (n_coefficients, n_coefficients)
+        It adds up over samples and trials.
+    """
+    table = _table(model)
+    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
+    moments = np.zeros(matrix.shape)
+    start = 0
+    for q in table.equations:
+        X = samples.features[q]
+        rows = slice(start, start + X.shape[1])
+        moments[rows, rows] = X.T @ X / noise[q]
+        start += X.shape[1]
+    information: Floats = matrix.T @ moments @ matrix
+    return information
+
+
+def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
+    """Manoeuvres that trials usually consist of, each of 40 ship lengths at service speed.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Gives length, speed and the rudder's limit.
+
+    Returns
+    -------
+    dict of str to callable
+        Zigzags and turning circles of several angles and a pseudo-random binary rudder.
+    """
+    travel = model.particulars["length"] / model.particulars["speed"]
+    times = {"duration": DURATION * travel, "dt": travel / STEPS}
+    limit = model.steering.rudder_limit_deg
+    found: dict[str, Manoeuvre] = {}
+    for angle in (5.0, 10.0, 20.0, min(35.0, limit)):
+        if angle > limit:
+            continue
+        found[f"zigzag {angle:g}/{angle:g}"] = partial(
+            zigzag, rudder_deg=angle, heading_deg=angle, must_reverse=False, **times
+        )
+        found[f"turning circle {angle:g}"] = partial(turning_circle, rudder_deg=angle, **times)
+        found[f"binary rudder {angle:g}"] = partial(prbs_rudder, amplitude_deg=angle, **times)
+    return found
+
+
+def advise(
+    model: ShipModel,
+    trials: Sequence[Trial],
+    candidates: Mapping[str, Manoeuvre] | None = None,
+    criterion: str = "c",
+    coefficient: str | None = None,
+    number: int = 1,
+) -> Advice:
+    """Which manoeuvres to run next, chosen one after the other.
+
+    Parameters
+    ----------
+    model : ShipModel
+        As identified from the trials so far; with a table of terms.
+    trials : sequence of Trial
+        Those trials; their residuals tell the noise.
+    candidates : mapping of str to callable, optional
+        Simulate a manoeuvre with a model; by default `standard_candidates`. One with which the model runs
+        away is left out.
+    criterion : {"c", "D", "E"}
+        What to shrink: the standard error of one coefficient, the volume or the longest axis of the
+        ellipsoid.
+    coefficient : str, optional
+        Of "c"; by default that of the largest relative standard error.
+    number : int
+        How many to choose; the same one may be chosen again.
+
+    Returns
+    -------
+    Advice
+        Printable.
+
+    Raises
+    ------
+    InputError
+        For an unknown criterion or coefficient, and where no candidate can be simulated.
+    """
+    check_choice(criterion, CRITERIA, "criterion")
+    if coefficient is not None:
+        check_choice(coefficient, model.coefficients, "coefficient")
+    if number < 1:
+        raise InputError(f"number: {number} found, expected at least 1")
+    if not trials:
+        raise InputError("trials: none found, expected those that the model was identified from")
+    regressions = [_regression(model, trial) for trial in trials]
+    noise = _noise(model, regressions)
+    told = tuple(_told(model, t.name, s, noise) for t, s in zip(trials, regressions, strict=True))
+    offers = _offers(model, standard_candidates(model) if candidates is None else candidates, noise)
+    names = tuple(model.coefficients)
+    total = np.sum([trial.information for trial in told], axis=0)
+    size = _size(model, total)
+    before = dict(zip(names, _errors(total, size).tolist(), strict=True))
+    worst = max(before, key=lambda name: before[name]) if coefficient is None else coefficient
+    at, steps, chosen = names.index(worst), [], []
+    for _ in range(number):
+        now = _spread(total, size, criterion, at)
+        gains = {name: now / _spread(total + extra, size, criterion, at) for name, extra in offers.items()}
+        best = max(gains, key=lambda name: gains[name])
+        total = total + offers[best]
+        steps.append(gains)
+        chosen.append(best)
+    after = dict(zip(names, _errors(total, size).tolist(), strict=True))
+    return Advice(criterion, worst, told, before, tuple(steps), tuple(chosen), after)
+
+
+def _table(model: ShipModel) -> Structure:
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+    return model.table
+
+
+def _regression(model: ShipModel, trial: Trial) -> Samples:
+    """Regression over windows of the same time, whatever the sampling."""
+    travel = model.particulars["length"] / model.particulars["speed"]
+    window = max(round(WINDOW * travel / float(np.median(np.diff(trial.t)))), 1)
+    window = min(window, max(len(trial) // 10, 1))
+    return build_samples(
+        [trial], _table(model), model.particulars, "integral", window, shaft_speed=model.service_shaft_speed
+    )
+
+
+def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]:
+    """Variance of what the model leaves of the targets, by equation."""
+    table = _table(model)
+    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
+    values = matrix @ np.array(list(model.coefficients.values()))
+    noise, start = {}, 0
+    for q in table.equations:
+        own = values[start : start + len(table.terms(q))]
+        start += len(own)
+        targets = np.concatenate([s.targets[q] for s in regressions])
+        errors = targets - np.concatenate([s.features[q] for s in regressions]) @ own
+        # data without noise leave rounding errors only
+        noise[q] = max(float(np.mean(errors**2)), JITTER * float(np.mean(targets**2)), np.finfo(float).tiny)
+    return noise
+
+
+def _told(model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]) -> TrialInformation:
+    condition: dict[str, float] = {}
+    inflation: dict[str, float] = {}
+    for q in model.table.equations:
+        X = samples.features[q]
+        size = np.sqrt(np.mean(X**2, axis=0))
+        scaled = X / np.where(size > 0.0, size, 1.0)
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        condition[q] = float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0]))
+        moment = scaled.T @ scaled / len(scaled)
+        factors = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
+        inflation |= dict(zip(model.table.names(q), factors.tolist(), strict=True))
+    return TrialInformation(name, condition, inflation, fisher_information(model, samples, noise))
+
+
+def _offers(
+    model: ShipModel, candidates: Mapping[str, Manoeuvre], noise: Mapping[str, float]
+) -> dict[str, Floats]:
+    """Information that each candidate would add."""
+    offers = {}
+    for name, manoeuvre in candidates.items():
+        try:
+            trial = _recorded(model, manoeuvre(model))
+        except UnstableModelError:
+            continue
+        offers[name] = fisher_information(model, _regression(model, trial), noise)
+    if not offers:
+        raise InputError(
+            f"candidates: {len(candidates)} found, none that model {model.name!r} survives, expected one "
+            "that can be simulated; give gentler manoeuvres"
+        )
+    return offers
+
+
+def _recorded(model: ShipModel, run: Trial) -> Trial:
+    """A simulated trial with its shaft speed, where that is only commanded."""
+    if "n" in run or "n_command" not in run:
+        return run
+    return Trial(run.t, {**run.channels, "n": run["n_command"]}, name=run.name, kind=run.kind)
+
+
+def _size(model: ShipModel, information: Floats) -> Floats:
+    """What each coefficient's error is compared with: its size, or, where it is 0, its error."""
+    size = np.abs(np.array(list(model.coefficients.values())))
+    return np.where(size > 0.0, size, _errors(information, np.ones(len(size))))
+
+
+def _covariance(information: Floats, size: Floats) -> Floats:
+    """Covariance of the relative errors; what is not excited gets a large one instead of an infinite."""
+    values, vectors = np.linalg.eigh(information * np.outer(size, size))
+    values = np.maximum(values, FLOOR * max(values[-1], np.finfo(float).tiny))
+    covariance: Floats = (vectors / values) @ vectors.T
+    return covariance
+
+
+def _errors(information: Floats, size: Floats) -> Floats:
+    return np.sqrt(np.diag(_covariance(information, size)))
+
+
+def _spread(information: Floats, size: Floats, criterion: str, at: int) -> float:
+    """What the criterion shrinks, in the units of a relative standard error."""
+    covariance = _covariance(information, size)
+    if criterion == "c":
+        return float(np.sqrt(covariance[at, at]))
+    axes = np.sqrt(np.maximum(np.linalg.eigvalsh(covariance), np.finfo(float).tiny))
+    return float(np.exp(np.mean(np.log(axes)))) if criterion == "D" else float(axes[-1])

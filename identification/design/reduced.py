@@ -1,0 +1,114 @@
+"""Identify with the terms that are needed: reduce the full structure, then identify what is left."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Any
+
+from identification.design.reduction import Reduction, reduce, reduced_structure, sensitivity
+from identification.pipeline import identify
+from identification.result import IdentificationResult
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.manoeuvres import zigzag
+from shipgym.ships import GreyBox, ShipModel, Structure, register_structure
+from shipgym.trials.trial import Trial
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedIdentification:
+    """A structure reduced on its trials, and both models.
+
+    Attributes
+    ----------
+    full : IdentificationResult
+        With all terms.
+    reductions : dict of str to Reduction
+        By equation, the path and the terms chosen.
+    structure : Structure
+        Of the terms chosen, registered by its name.
+    reduced : IdentificationResult
+        With it.
+    """
+
+    full: IdentificationResult
+    reductions: dict[str, Reduction]
+    structure: Structure
+    reduced: IdentificationResult
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return {
+            "structure": self.structure.name,
+            "equations": {
+                q: {"chosen": found.chosen, "path": [_plain(step) for step in found.path]}
+                for q, found in self.reductions.items()
+            },
+            "terms": {"full": len(self.full.coefficients), "reduced": len(self.reduced.coefficients)},
+            "trials": {"full": self.full.metrics["trials"], "reduced": self.reduced.metrics["trials"]},
+            "sensitivity": zigzag_sensitivity(self.reduced.model),
+        }
+
+
+def identify_reduced(
+    trials: Sequence[Trial], direction: str = "backward", tolerance: float = 1e-3, **arguments: Any
+) -> ReducedIdentification:
+    """Identify a structure, reduce it on the same samples, and identify the smaller one.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        As for `identify`. Those held out have no part in the reduction either.
+    direction : {"backward", "forward"}
+        Elimination or selection (`reduction`).
+    tolerance : float
+        By how much the R2 of stretches held out may fall.
+    **arguments
+        Of `identify`.
+
+    Returns
+    -------
+    ReducedIdentification
+
+    Raises
+    ------
+    InputError
+        For a grey box, whose table is what its reference ship leaves, and fewer than five samples a term.
+    """
+    full = identify(trials, **arguments)
+    table = full.model.table
+    if isinstance(table, GreyBox):
+        raise InputError(
+            f"structure: {table.name!r} found, whose table stands beside a reference ship, expected one of "
+            "its own to reduce, such as 'abkowitz'"
+        )
+    reductions = reduce(full.samples, table, direction, tolerance)
+    small = _registered(table, reductions)
+    reduced = identify(trials, **{**arguments, "structure": small.name})
+    return ReducedIdentification(full, reductions, small, reduced)
+
+
+def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
+    """`sensitivity` of the 20/20 zigzag; None where the changed ship runs away; empty where the ship does."""
+    try:
+        effects = sensitivity(model, partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False))
+    except UnstableModelError:
+        return {}
+    return {name: value if value < float("inf") else None for name, value in effects.items()}
+
+
+def _registered(table: Structure, reductions: dict[str, Reduction]) -> Structure:
+    """The reduced structure, under a name that tells the terms apart from other reductions."""
+    small = reduced_structure(table, reductions, table.name)
+    terms = repr([(q, [term.name for term in small.terms(q)]) for q in small.equations])
+    name = f"{table.name}-{hashlib.sha256(terms.encode()).hexdigest()[:6]}"
+    return register_structure(name, small.equations, small.source, small.normalisation, small.quantity)
+
+
+def _plain(step: Any) -> dict[str, Any]:
+    found = asdict(step)
+    errors = found["relative_errors"]
+    found["relative_errors"] = {name: e if e < float("inf") else None for name, e in errors.items()}
+    return found

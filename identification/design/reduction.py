@@ -1,0 +1,373 @@
+"""Which terms a model needs: backward elimination, forward selection, and sensitivity of a manoeuvre.
+
+Backward (Xu 2020, section 5; leave-one-out): among the terms that are uncertain or belong to a collinear
+group drop the one of largest relative standard error, unless what is held out is then explained worse.
+Forward (Chen, Billings & Luo 1989, Int. J. Control 50(5)): by orthogonal least squares add the term that
+explains most of what is left. Held out are five stretches of the samples, each predicted from the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from io import StringIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.estimators.lssvm import TruncatedLSSVM
+from identification.regression.samples import Samples
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.ships import ShipModel, Structure
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+FOLDS = 5
+COLLINEAR = 0.98  # correlation of a pair, and multiple correlation of a group
+JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
+SENSED = ("u", "v", "r", "psi")
+
+
+@dataclass(frozen=True)
+class ReductionStep:
+    """A model on the path.
+
+    Attributes
+    ----------
+    terms : tuple of str
+        Its terms.
+    changed : str
+        The term dropped or added to get here; empty for the first model of an elimination.
+    coefficients, relative_errors : dict of str to float
+        Of each term: coefficient, and standard error by its size.
+    r_squared, held_out : float
+        Share of the targets that is explained: of all samples, and of stretches predicted from the others.
+    error_reduction : float
+        Share that the change explains of all (negative for a term that was dropped).
+    """
+
+    terms: tuple[str, ...]
+    changed: str
+    coefficients: dict[str, float]
+    relative_errors: dict[str, float]
+    r_squared: float
+    held_out: float
+    error_reduction: float
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """The whole path of a reduction and the model that it chose.
+
+    Attributes
+    ----------
+    path : tuple of ReductionStep
+        In the order in which terms were dropped or added.
+    chosen : int
+        Which of them.
+    """
+
+    path: tuple[ReductionStep, ...]
+    chosen: int
+
+    @property
+    def terms(self) -> tuple[str, ...]:
+        """Terms of the chosen model."""
+        return self.path[self.chosen].terms
+
+    @property
+    def coefficients(self) -> dict[str, float]:
+        """Coefficients of the chosen model."""
+        return self.path[self.chosen].coefficients
+
+    def __str__(self) -> str:
+        from rich.console import Console
+        from rich.table import Table
+
+        console = Console(file=StringIO(), width=100, color_system=None)
+        table = Table("terms", "changed", "worst relative error", "R2", "held-out R2", "")
+        for k, step in enumerate(self.path):
+            worst = max(step.relative_errors, key=lambda name: step.relative_errors[name])
+            table.add_row(
+                str(len(step.terms)), step.changed, f"{step.relative_errors[worst]:.3g} ({worst})",
+                f"{step.r_squared:.6f}", f"{step.held_out:.6f}", "chosen" if k == self.chosen else "",
+            )  # fmt: skip
+        console.print(table)
+        file = console.file
+        assert isinstance(file, StringIO)
+        return file.getvalue()
+
+
+def backward_elimination(
+    X: ArrayLike,
+    y: ArrayLike,
+    names: Sequence[str],
+    tolerance: float = 1e-3,
+    threshold: float = 0.1,
+    prefer: Sequence[str] = (),
+) -> Reduction:
+    """Drop terms one by one while nothing that is held out is explained worse.
+
+    Parameters
+    ----------
+    X : array-like of shape (n_samples, n_terms)
+        Features, in time order.
+    y : array-like of shape (n_samples,)
+        Targets.
+    names : sequence of str
+        Of the terms.
+    tolerance : float
+        By how much the held-out R2 may fall below the best seen.
+    threshold : float
+        Relative standard error above which a term is a candidate; terms of a collinear group always are.
+    prefer : sequence of str
+        Terms that are dropped only where no other candidate can be: where two say the same, it decides.
+
+    Returns
+    -------
+    Reduction
+        The path ends with the chosen model.
+
+    Raises
+    ------
+    InputError
+        For shapes that do not fit and fewer samples than terms.
+    """
+    features, targets, labels = _checked(X, y, names)
+    _check_tolerances(tolerance, threshold)
+    kept = list(range(len(labels)))
+    path = [_step(features, targets, labels, kept, "", 0.0)]
+    best = path[0].held_out
+    while len(kept) > 1:
+        errors = path[-1].relative_errors
+        uncertain = {i for i in kept if errors[labels[i]] > threshold} | _collinear(features, kept)
+        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -errors[labels[i]])):
+            fewer = [i for i in kept if i != term]
+            step = _step(features, targets, labels, fewer, labels[term], path[-1].r_squared)
+            if step.held_out >= best - tolerance:
+                path.append(step)
+                kept, best = fewer, max(best, step.held_out)
+                break
+        else:
+            break
+    return Reduction(tuple(path), len(path) - 1)
+
+
+def forward_selection(
+    X: ArrayLike, y: ArrayLike, names: Sequence[str], tolerance: float = 1e-3, most: int | None = None
+) -> Reduction:
+    """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
+
+    Parameters
+    ----------
+    X, y, names
+        As in `backward_elimination`.
+    tolerance : float
+        By how much the held-out R2 of the chosen model may lie below the best of the path.
+    most : int, optional
+        Terms at which to stop.
+
+    Returns
+    -------
+    Reduction
+        The path goes on beyond the chosen model.
+    """
+    features, targets, labels = _checked(X, y, names)
+    _check_tolerances(tolerance, 1.0)
+    rest = features / np.sqrt(np.mean(features**2, axis=0))
+    left, power = targets.copy(), float(targets @ targets)
+    chosen: list[int] = []
+    path: list[ReductionStep] = []
+    while len(chosen) < min(most or len(labels), len(labels)):
+        size = np.einsum("ij,ij->j", rest, rest)
+        size[chosen] = 0.0
+        usable = size > len(targets) * JITTER  # what the terms before do not say already
+        if not usable.any():
+            break
+        ratio = np.where(usable, (rest.T @ left) ** 2 / np.where(usable, size, 1.0), -1.0) / power
+        term = int(np.argmax(ratio))
+        direction = rest[:, term] / np.sqrt(size[term])
+        left = left - direction * (direction @ left)
+        rest = rest - np.outer(direction, direction @ rest)
+        chosen.append(term)
+        before = path[-1].r_squared if path else 0.0
+        path.append(_step(features, targets, labels, chosen, labels[term], before))
+    best = max(step.held_out for step in path)
+    first = next(k for k, step in enumerate(path) if step.held_out >= best - tolerance)
+    return Reduction(tuple(path), first)
+
+
+def reduce(
+    samples: Samples, structure: Structure, direction: str = "backward", tolerance: float = 1e-3
+) -> dict[str, Reduction]:
+    """Reduce each equation of a structure.
+
+    Parameters
+    ----------
+    samples : Samples
+        The regression, built for the structure.
+    structure : Structure
+        Names the terms.
+    direction : {"backward", "forward"}
+        Elimination or selection.
+    tolerance : float
+        Of the held-out R2.
+
+    Returns
+    -------
+    dict of str to Reduction
+        By equation, with the coefficients of the features in SI units.
+    """
+    check_choice(direction, ("backward", "forward"), "direction")
+    run = backward_elimination if direction == "backward" else forward_selection
+    return {
+        q: run(samples.features[q], samples.targets[q], structure.names(q), tolerance=tolerance)
+        for q in structure.equations
+    }
+
+
+def reduced_structure(structure: Structure, reductions: dict[str, Reduction], name: str) -> Structure:
+    """The structure with the terms that were chosen.
+
+    Parameters
+    ----------
+    structure : Structure
+        That was reduced.
+    reductions : dict of str to Reduction
+        From `reduce`.
+    name : str
+        Of the new structure; register it to identify it (`shipgym.register_structure`).
+
+    Returns
+    -------
+    Structure
+        Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
+    """
+    kept = {
+        q: {t.name for t, label in zip(structure.terms(q), structure.names(q), strict=True)
+            if label in reductions[q].terms}
+        for q in structure.equations
+    }  # fmt: skip
+    if structure.quantity == "force" and {"v", "r"} <= kept.keys():
+        kept["v"] = kept["r"] = kept["v"] | kept["r"]
+    equations = {q: tuple(t for t in structure.terms(q) if t.name in kept[q]) for q in structure.equations}
+    return replace(structure, name=name, source=f"{structure.source}; reduced", equations=equations)
+
+
+def sensitivity(
+    model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
+) -> dict[str, float]:
+    """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    manoeuvre : callable
+        Simulates it with a model, such as ``zigzag``.
+    change : float
+        Relative step to either side.
+
+    Returns
+    -------
+    dict of str to float
+        By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
+        per cent per per cent. Infinite where the changed ship runs away.
+
+    Raises
+    ------
+    InputError
+        For a reference ship, whose coefficients are compiled in.
+    """
+    check_number(change, "change", above=0.0, below=1.0)
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+    base = manoeuvre(model)
+    spans = {c: float(np.ptp(base[c])) for c in SENSED}
+    found = {}
+    for name, value in model.coefficients.items():
+        try:
+            up, down = (
+                manoeuvre(replace(model, coefficients={**model.coefficients, name: value * factor}))
+                for factor in (1.0 + change, 1.0 - change)
+            )
+        except UnstableModelError:
+            found[name] = np.inf
+            continue
+        rows = min(len(up), len(down))
+        squares = [
+            np.mean((up[c][:rows] - down[c][:rows]) ** 2) / spans[c] ** 2 for c in SENSED if spans[c] > 0.0
+        ]
+        found[name] = float(np.sqrt(np.mean(squares)) / (2.0 * change))
+    return dict(sorted(found.items(), key=lambda item: item[1], reverse=True))
+
+
+def _step(
+    features: Floats, targets: Floats, labels: Sequence[str], kept: Sequence[int], changed: str, before: float
+) -> ReductionStep:
+    X = features[:, kept]
+    machine = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
+    names = tuple(labels[i] for i in kept)
+    deviation = np.sqrt(np.diag(machine.covariance_))
+    size = np.abs(machine.coef_)
+    relative = np.divide(deviation, size, out=np.full(len(names), np.inf), where=size > 0.0)
+    residual = targets - X @ machine.coef_
+    power = float(targets @ targets)
+    r_squared = 1.0 - float(residual @ residual) / power
+    return ReductionStep(
+        names,
+        changed,
+        dict(zip(names, machine.coef_.tolist(), strict=True)),
+        dict(zip(names, relative.tolist(), strict=True)),
+        r_squared,
+        1.0 - _held_out_error(X, targets) / power,
+        r_squared - before if changed else r_squared,
+    )
+
+
+def _held_out_error(X: Floats, y: Floats) -> float:
+    """Sum of squared errors of stretches of the samples, each predicted from the others."""
+    total = 0.0
+    for rows in np.array_split(np.arange(len(y)), FOLDS):
+        others = np.ones(len(y), dtype=bool)
+        others[rows] = False
+        fitted = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X[others], y[others])
+        total += float(np.sum((y[rows] - X[rows] @ fitted.coef_) ** 2))
+    return total
+
+
+def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:
+    """Terms that others nearly make up, by pair or by variance inflation."""
+    scaled = features[:, kept] / np.sqrt(np.mean(features[:, kept] ** 2, axis=0))
+    correlation = scaled.T @ scaled / len(scaled)
+    inflation = np.diag(np.linalg.inv(correlation + JITTER * np.eye(len(kept))))
+    pairs = np.abs(correlation - np.diag(np.diag(correlation))) > COLLINEAR
+    member = pairs.any(axis=0) | (inflation > 1.0 / (1.0 - COLLINEAR**2))
+    return {i for i, yes in zip(kept, member.tolist(), strict=True) if yes}
+
+
+def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Floats, Floats, list[str]]:
+    features, targets, labels = np.asarray(X, dtype=float), np.asarray(y, dtype=float), list(names)
+    if features.ndim != 2 or targets.shape != features.shape[:1] or len(labels) != features.shape[1]:
+        raise InputError(
+            f"X, y, names: shapes {features.shape}, {targets.shape} and {len(labels)} names found, expected "
+            "(n_samples, n_terms), (n_samples,) and one name a term"
+        )
+    if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
+        raise InputError("X, y: a value that is not finite found, expected numbers; repair the samples first")
+    if len(targets) < FOLDS * max(len(labels), 2):
+        raise InputError(
+            f"X: {len(targets)} samples found for {len(labels)} terms, expected at least {FOLDS} times as "
+            "many"
+        )
+    silent = [name for name, column in zip(labels, features.T, strict=True) if not column.any()]
+    if silent or not targets.any():
+        raise InputError(f"X, y: {silent[0] if silent else 'y'} is 0 throughout, expected it to be excited")
+    return features, targets, labels
+
+
+def _check_tolerances(tolerance: float, threshold: float) -> None:
+    check_number(tolerance, "tolerance", at_least=0.0)
+    check_number(threshold, "threshold", at_least=0.0)

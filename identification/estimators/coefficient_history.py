@@ -1,0 +1,108 @@
+"""The course of a model's coefficients over a trial, as a recursive method sees them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+
+from identification.estimators.methods import get_method
+from identification.estimators.recursive import Recursion
+from identification.regression.samples import Samples, build_samples
+from shipgym.errors import InputError
+from shipgym.ships import Structure, get_structure
+from shipgym.ships.particulars import Particulars
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Coefficients over time.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Of the coefficients.
+    t : array of shape (n_rows,)
+        End of each row's window, s, in the time of its trial.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    values : array of shape (n_rows, n_coefficients)
+        Estimate after each row, in the normalisation of the structure.
+    """
+
+    names: tuple[str, ...]
+    t: Floats
+    trial: NDArray[np.int64]
+    values: Floats
+
+    def __getitem__(self, name: str) -> Floats:
+        """The course of one coefficient, shape (n_rows,)."""
+        if name not in self.names:
+            raise InputError(f"course: no coefficient {name!r}, expected one of {', '.join(self.names)}")
+        return self.values[:, self.names.index(name)]
+
+    @property
+    def last(self) -> dict[str, float]:
+        """The last estimate by name."""
+        return dict(zip(self.names, self.values[-1].tolist(), strict=True))
+
+
+def follow(
+    source: Samples | Trial | Sequence[Trial],
+    structure: str | Structure,
+    particulars: Particulars,
+    method: str | Recursion = "rls",
+    *,
+    shaft_speed: float = 0.0,
+    **sampling: Any,
+) -> Course:
+    """Run a recursive method over trials and keep every estimate.
+
+    Parameters
+    ----------
+    source : Samples, Trial or sequence of Trial
+        The regression, or what it is built from.
+    structure : str or Structure
+        Terms of the model.
+    particulars : Particulars
+        Length and service speed, and for structures of forces mass and added mass or what they are
+        estimated from.
+    method : {"rls", "sg", "nisg", "mils", "tmils"} or Recursion
+        The method; an estimator brings its own settings.
+    shaft_speed : float
+        At service speed, 1/s, for structures that refer to it.
+    **sampling
+        `samples`, `window`, `gear`, `smooth` of `build_samples`.
+
+    Returns
+    -------
+    Course
+
+    Raises
+    ------
+    InputError
+        For a method that is not recursive.
+    """
+    table = get_structure(structure) if isinstance(structure, str) else structure
+    machine = get_method(method).machine() if isinstance(method, str) else method
+    if not isinstance(machine, Recursion):
+        raise InputError(
+            f"method: {method!r} found, which fits all samples at once; expected a recursive one"
+        )
+    ship = particulars.completed() if table.quantity == "force" else particulars
+    if isinstance(source, Samples):
+        regression = source
+    else:
+        trials = [source] if isinstance(source, Trial) else list(source)
+        regression = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
+    courses = [clone(machine).follow(regression.features[q], regression.targets[q]) for q in table.equations]
+    matrix = table.acceleration_matrix(ship, shaft_speed)
+    values = np.linalg.solve(matrix, np.hstack(courses).T).T
+    return Course(table.coefficient_names, regression.start + regression.duration, regression.trial, values)

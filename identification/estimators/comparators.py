@@ -1,0 +1,109 @@
+"""Scikit-learn's estimators as machines of `identify`, to compare with."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from identification.estimators.lssvm import check_weight, validated
+from identification.estimators.robust import MAD
+from identification.regression.decomposition import centre_and_scale
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+ITERATIONS = 20_000
+
+
+class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """Support vector regression with a linear kernel and the epsilon-insensitive loss.
+
+    Scikit-learn's `LinearSVR`. Features and targets are scaled to a root mean square of 1 before.
+
+    Parameters
+    ----------
+    C : float
+        Weight of the errors, finite.
+    epsilon : float
+        Errors below it cost nothing; relative to the size of the targets.
+    fit_intercept : bool
+        Whether there is a constant term.
+    seed : int
+        Of the order in which samples are visited.
+
+    Attributes
+    ----------
+    coef_, intercept_, n_features_in_
+        As of `LSSVM`.
+    weights_ : array of shape (n_samples,)
+        Influence of each sample as Huber's estimator gives it, whose loss is near: that of the samples
+        of which the error exceeds its robust scale falls with their error.
+    inverse_moment_, covariance_ : array of shape (n_features, n_features)
+        Of least squares with these weights; an approximation.
+    converged_ : bool
+        Whether the solver reached its tolerance.
+    """
+
+    def __init__(
+        self, C: float = 100.0, epsilon: float = 1e-3, fit_intercept: bool = True, seed: int = 0
+    ) -> None:
+        self.C = C
+        self.epsilon = epsilon
+        self.fit_intercept = fit_intercept
+        self.seed = seed
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
+        from sklearn.exceptions import ConvergenceWarning
+        from sklearn.svm import LinearSVR
+
+        if not np.isfinite(check_weight(self.C)):
+            raise InputError(f"C: {self.C} found, expected a finite number")
+        if not 0.0 <= self.epsilon < np.inf:
+            raise InputError(f"epsilon: {self.epsilon} found, expected a finite number of at least 0")
+        X, y = validated(self, X, y)
+        centre, scale = centre_and_scale(X, True, self.fit_intercept)
+        mean = float(y.mean()) if self.fit_intercept else 0.0
+        size = float(np.sqrt(np.mean((y - mean) ** 2))) or 1.0
+        machine = LinearSVR(
+            C=self.C,
+            epsilon=self.epsilon,
+            fit_intercept=self.fit_intercept,
+            intercept_scaling=10.0,
+            max_iter=ITERATIONS,
+            random_state=self.seed,
+        )
+        scaled = (X - centre) / scale
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ConvergenceWarning)
+            machine.fit(scaled, (y - mean) / size)
+        self.converged_ = not caught
+        self.coef_ = machine.coef_ * size / scale
+        self.intercept_ = mean + size * float(np.sum(machine.intercept_)) - float(centre @ self.coef_)
+        self._spread(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
+        return self
+
+    def _spread(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
+        """Weights, moment and covariance of Huber's estimator at the errors found."""
+        scale_of_error = MAD * float(np.median(np.abs(error)))
+        large = np.abs(error) > scale_of_error
+        self.weights_ = np.where(large, scale_of_error / np.where(large, np.abs(error), 1.0), 1.0)
+        moment = (scaled.T * self.weights_) @ scaled
+        inverse = np.linalg.pinv(moment, hermitian=True) / scale / scale[:, None]
+        self.inverse_moment_ = inverse
+        freedom = max(len(error) - scaled.shape[1], 1)
+        variance = size**2 * float(np.sum((self.weights_ * error) ** 2)) / freedom
+        unscaled = scaled * scale
+        self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples of shape (n_samples, n_features)."""
+        check_is_fitted(self)
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats = features @ self.coef_ + self.intercept_
+        return prediction

@@ -1,0 +1,378 @@
+"""Least-squares support vector machines for regression, the linear kernel in primal form.
+
+With a linear kernel the machine is ridge regression with a free intercept. One singular value
+decomposition of the centred and scaled features, X = U S V', gives the coefficients for every C:
+V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system, which
+`dense_dual` keeps as printed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from numbers import Real
+from typing import Any, Self, TypeGuard
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import cho_factor, cho_solve
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.metrics.pairwise import pairwise_kernels
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
+from identification.estimators.robust import reweighted
+from identification.regression.decomposition import Decomposition, centre_and_scale, decompose
+from shipgym.checks import check_choice, check_whole
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+KERNELS = ("linear", "rbf", "poly")
+SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
+NEARLY_ONE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
+
+
+class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """Least-squares support vector regression (Suykens & Vandewalle 1999; Cao 2015).
+
+    Minimises w'w / 2 + C / 2 sum e^2 subject to y = w'x + b + e.
+
+    Parameters
+    ----------
+    C : float
+        Weight of the errors; infinity gives least squares (linear kernel only).
+    kernel : {"linear", "rbf", "poly"}
+        Linear in primal form; the others solve the dual system by Cholesky decomposition.
+    scale : bool or array-like of shape (n_features,)
+        Divide each feature by its standard deviation (its root mean square without intercept), or by the
+        given values, before the penalty acts on the coefficients. `coef_` is for the features as given.
+    fit_intercept : bool
+        Whether b is free or zero.
+    gamma : float or None
+        Of the rbf and poly kernels; 1 / n_features where None.
+    degree : int
+        Of the poly kernel.
+    coef0 : float
+        Of the poly kernel.
+    robust : bool
+        Whether outliers lose their influence: samples are weighted by their residuals and fitted again until
+        the weights settle (weighted LS-SVM, Suykens et al. 2002).
+
+    Attributes
+    ----------
+    coef_ : array of shape (n_features,)
+        Coefficients of the features as given (linear kernel).
+    intercept_ : float
+        b.
+    singular_values_ : array of shape (n_directions,)
+        Of the centred and scaled features (linear kernel).
+    covariance_ : array of shape (n_features, n_features)
+        Of `coef_`, for exact features and independent errors (linear kernel).
+    inverse_moment_ : array of shape (n_features, n_features)
+        Regularised inverse of X'X (X centred): `coef_` is `inverse_moment_ @ X.T @ y` (linear kernel).
+    noise_variance_ : float
+        From the residuals and the effective degrees of freedom (linear kernel).
+    dual_coef_ : array of shape (n_samples,)
+        Lagrange multipliers (rbf and poly kernels).
+    support_ : array of shape (n_samples, n_features)
+        Centred and scaled samples that the multipliers belong to (rbf and poly kernels).
+    weights_ : array of shape (n_samples,)
+        Of the samples; 1 but for outliers.
+    n_features_in_ : int
+        Number of features.
+    """
+
+    def __init__(
+        self,
+        C: float = 1e6,
+        kernel: str = "linear",
+        scale: bool | ArrayLike = True,
+        fit_intercept: bool = True,
+        gamma: float | None = None,
+        degree: int = 3,
+        coef0: float = 1.0,
+        robust: bool = False,
+    ) -> None:
+        self.C = C
+        self.kernel = kernel
+        self.scale = scale
+        self.fit_intercept = fit_intercept
+        self.gamma = gamma
+        self.degree = degree
+        self.coef0 = coef0
+        self.robust = robust
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+        y : array-like of shape (n_samples,)
+            Targets.
+
+        Returns
+        -------
+        self
+        """
+        check_choice(self.kernel, KERNELS, "kernel")
+        check_weight(self.C)
+        X, y = validated(self, X, y)
+        fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
+        self.weights_ = fit_weighted(lambda weights: fit_once(X, y, weights), y, self.robust)
+        return self
+
+    def _fit_primal(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        return take(self, problem, problem.filters(self.C, len(problem.singular_values)), X, y, weights)
+
+    def _fit_dual(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        if not np.isfinite(self.C):
+            raise InputError(f"C: {self.C} found, expected a finite number with kernel {self.kernel!r}")
+        self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
+        self.support_ = (X - self.centre_) / self.scale_
+        ridge = np.full(len(y), 1.0 / self.C) if weights is None else 1.0 / (self.C * weights)
+        kernel = self._kernel(self.support_)
+        factor = cho_factor(kernel + np.diag(ridge))
+        if self.fit_intercept:  # two solves eliminate b from the bordered system
+            eta, nu = cho_solve(factor, np.column_stack([np.ones(len(y)), y])).T
+            self.intercept_ = float(nu.sum() / eta.sum())
+            self.dual_coef_ = nu - self.intercept_ * eta
+        else:
+            self.intercept_ = 0.0
+            self.dual_coef_ = cho_solve(factor, y)
+        residual: Floats = y - kernel @ self.dual_coef_ - self.intercept_
+        return residual
+
+    def _kernel(self, X: Floats) -> Floats:
+        options: dict[str, Any] = {"gamma": self.gamma}
+        if self.kernel == "poly":
+            options |= {"degree": self.degree, "coef0": self.coef0}
+        kernel: Floats = pairwise_kernels(X, self.support_, metric=self.kernel, **options)
+        return kernel
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+
+        Returns
+        -------
+        array of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats
+        if self.kernel == "linear":
+            prediction = features @ self.coef_
+        else:
+            prediction = self._kernel((features - self.centre_) / self.scale_) @ self.dual_coef_
+        prediction += self.intercept_
+        return prediction
+
+
+class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """Truncated least-squares support vector machine, linear kernel (Xu 2020, section 3.2).
+
+    Keeps the `rank_` largest singular values of the centred and scaled features. That equals truncating
+    the dual system of the paper, at a cost of O(n m^2).
+
+    Parameters
+    ----------
+    C : float
+        Weight of the errors; infinity truncates without penalty.
+    rank : int or None
+        Number of directions to keep; None leaves it to `selection`.
+    selection : {"l-curve", "gcv", "explained-variance", "full"}
+        Corner of the L-curve, generalised cross-validation, as many directions as hold the share
+        `explained_variance` of the features, or every direction that rounding leaves.
+    scale : bool or array-like of shape (n_features,)
+        As in `LSSVM`.
+    fit_intercept : bool
+        As in `LSSVM`.
+    explained_variance : float
+        Share of the variance of the scaled features that is to be kept, above 0 and at most 1.
+    robust : bool
+        As in `LSSVM`.
+
+    Attributes
+    ----------
+    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_, weights_,
+    n_features_in_
+        As in `LSSVM`.
+    rank_ : int
+        Number of directions kept.
+    l_curve_ : LCurve
+        Norms of residual and solution for each rank.
+    directions_ : array of shape (n_directions, n_features)
+        Right singular vectors, of the scaled features, in the order of `singular_values_`.
+    collinear_groups_ : tuple of tuple of int
+        For each dropped direction the features it is made of.
+    """
+
+    def __init__(
+        self,
+        C: float = np.inf,
+        rank: int | None = None,
+        selection: str = "l-curve",
+        scale: bool | ArrayLike = True,
+        fit_intercept: bool = True,
+        explained_variance: float = 0.9999,
+        robust: bool = False,
+    ) -> None:
+        self.C = C
+        self.rank = rank
+        self.selection = selection
+        self.scale = scale
+        self.fit_intercept = fit_intercept
+        self.explained_variance = explained_variance
+        self.robust = robust
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+        y : array-like of shape (n_samples,)
+            Targets.
+
+        Returns
+        -------
+        self
+        """
+        check_choice(self.selection, SELECTIONS, "selection")
+        check_weight(self.C)
+        if self.rank is not None:
+            check_whole(self.rank, "rank", at_least=1, hint="or None")
+        if not 0.0 < self.explained_variance <= 1.0:
+            raise InputError(
+                f"explained_variance: {self.explained_variance} found, expected a share above 0 and at most 1"
+            )
+        X, y = validated(self, X, y)
+        self.weights_ = fit_weighted(lambda weights: self._fit(X, y, weights), y, self.robust)
+        return self
+
+    def _fit(self, X: Floats, y: Floats, weights: Floats | None) -> Floats:
+        problem = decompose(X, y, self.scale, self.fit_intercept, weights)
+        distinct = problem.numerical_rank
+        filters = problem.filters(self.C, distinct)
+        self.l_curve_ = l_curve(
+            problem.singular_values[:distinct],
+            problem.projections[:distinct],
+            filters[:distinct],
+            problem.outside + float(np.sum(problem.projections[distinct:] ** 2)),
+        )
+        self.rank_ = self._choose(problem, distinct)
+        filters[self.rank_ :] = 0.0
+        self.directions_ = problem.directions
+        self.collinear_groups_ = tuple(_members(row) for row in problem.directions[self.rank_ :])
+        return take(self, problem, filters, X, y, weights)
+
+    @property
+    def collinear_names_(self) -> tuple[tuple[str, ...], ...]:
+        """`collinear_groups_` by name: that of the table's columns, else x0, x1, ..."""
+        check_is_fitted(self)
+        names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(self.n_features_in_)])
+        return tuple(tuple(str(names[i]) for i in group) for group in self.collinear_groups_)
+
+    def _choose(self, problem: Decomposition, distinct: int) -> int:
+        if self.rank is not None:
+            return min(self.rank, distinct)
+        if self.selection == "full":
+            return distinct
+        if self.selection == "l-curve":
+            return corner_rank(self.l_curve_, problem.n_free)
+        if self.selection == "gcv":
+            return gcv_rank(self.l_curve_, problem.n_free)
+        return variance_rank(problem.singular_values[:distinct], self.explained_variance)
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+
+        Returns
+        -------
+        array of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats = features @ self.coef_ + self.intercept_
+        return prediction
+
+
+def take(
+    estimator: Any, problem: Decomposition, filters: Floats, X: Floats, y: Floats, weights: Floats | None
+) -> Floats:
+    """Set the attributes of a linear machine from its filtered decomposition; returns the residuals."""
+    scaled = problem.directions.T @ (filters * problem.projections)
+    shrink = problem.singular_values * filters
+    root = (problem.directions.T * filters) / problem.scale[:, None]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(filters > 0.0, filters / problem.singular_values, 0.0)
+    unscaled = problem.directions / problem.scale
+    estimator.coef_ = scaled / problem.scale
+    estimator.intercept_ = problem.mean - float(problem.centre @ estimator.coef_)
+    estimator.singular_values_ = problem.singular_values
+    estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
+    residual: Floats = y - X @ estimator.coef_ - estimator.intercept_
+    freedom = problem.n_free - float(np.sum(shrink))
+    effective = residual if weights is None else residual * weights
+    estimator.noise_variance_ = float(effective @ effective) / freedom if freedom > 0.5 else np.nan
+    # Huber's sandwich: the residuals that count are the weighted ones, the moment is that of all samples
+    spread = 1.0 if weights is None else len(y) / float(weights.sum())
+    estimator.covariance_ = estimator.noise_variance_ * spread * (root @ root.T)
+    return residual
+
+
+def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
+    """Fit once, or until the weights of the samples settle; returns the weights."""
+    if robust:
+        return reweighted(fit, float(np.max(np.abs(y))))
+    fit(None)
+    return np.ones(len(y))
+
+
+def _members(direction: Floats) -> tuple[int, ...]:
+    share = np.abs(direction) / np.max(np.abs(direction))
+    return tuple(int(i) for i in np.flatnonzero(share >= NEARLY_ONE))
+
+
+def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+    """Features and targets as arrays of numbers, as scikit-learn checks them.
+
+    Its checks of what is sound already take as long as the decomposition: sound arrays do without.
+    """
+    if _sound(X, 2) and _sound(y, 1) and len(X) == len(y) >= 2 and X.shape[1] > 0:
+        estimator.n_features_in_ = X.shape[1]
+        vars(estimator).pop("feature_names_in_", None)
+        return X, y
+    checked: tuple[Floats, Floats] = validate_data(
+        estimator, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
+    )
+    return checked[0], np.asarray(checked[1], dtype=np.float64)
+
+
+def _sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
+    """Whether these are an array of finite numbers of double precision, and nothing else."""
+    if type(values) is not np.ndarray or values.dtype != np.float64 or values.ndim != n_dimensions:
+        return False
+    return bool(np.isfinite(values).all())
+
+
+def check_weight(value: Any, argument: str = "C") -> float:
+    """Return a weight of errors: a number above 0, infinity included."""
+    if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
+        raise InputError(
+            f"{argument}: {value!r} found, expected a number above 0 (infinity gives least squares)"
+        )
+    return float(value)

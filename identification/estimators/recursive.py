@@ -1,0 +1,432 @@
+"""Recursive identification: coefficients that follow the samples, one by one.
+
+Recursive least squares with forgetting (Zhu 2018, section 7.3), the stochastic gradient and its nonlinear
+innovation, and multi-innovation least squares with and without a matrix inverse (Song 2020, chapters 3
+and 4).
+Any of them may start from LS-SVR's estimate on the first samples.
+
+Song prints the nonlinear innovation of the least-squares forms as a factor tanh(omega e) of the innovation,
+which makes the correction even in e: an error of either sign would push the same way. Here e becomes
+tanh(omega e) / omega everywhere, odd and of slope 1 at 0, with e in units of the targets' root mean square.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from identification.estimators.lssvm import LSSVM
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """What the recursive methods share; samples are taken in time order, without intercept.
+
+    Attributes
+    ----------
+    coef_ : array of shape (n_features,) or (n_signals, n_features)
+        Estimate after the last sample.
+    covariance_ : array of shape (n_features, n_features)
+        Of the least-squares estimate that the recursion tends to, for exact features and independent errors
+        (after `fit`).
+    inverse_moment_ : array of shape (n_features, n_features)
+        Inverse of X'WX plus the start's, with W the weights (after `fit`).
+    weights_ : array of shape (n_samples,)
+        How much each sample still counts (after `fit`).
+    scale_ : array of shape (n_features,)
+        What the regressors are divided by inside.
+    """
+
+    forgetting: float
+    scale: bool | ArrayLike
+    C: float
+    start_samples: int
+    start_interval: int
+    start_C: float  # noqa: N815
+
+    def __sklearn_tags__(self) -> Any:
+        """A recursion has no intercept, which some of scikit-learn's test data would need."""
+        tags = super().__sklearn_tags__()
+        tags.regressor_tags.poor_score = True
+        return tags
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Run over samples in time order, from the beginning.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+        y : array-like of shape (n_samples,)
+            Targets.
+
+        Returns
+        -------
+        self
+        """
+        self.follow(X, y)
+        return self
+
+    def follow(self, X: ArrayLike, y: ArrayLike) -> Floats:
+        """Fit, and return the estimate after each sample.
+
+        Parameters
+        ----------
+        X, y
+            As in `fit`.
+
+        Returns
+        -------
+        array of shape (n_samples, n_features)
+            While LS-SVR gathers its samples, what it will find from them.
+        """
+        self._check()
+        features, targets = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        targets = np.asarray(targets, dtype=np.float64)
+        self._begin(features, targets[:, None])
+        gathered = min(self.start_samples * self.start_interval, len(targets))
+        picked = slice(0, gathered, self.start_interval)
+        if gathered:
+            self._start_from(features[picked], targets[picked])
+        course = np.concatenate(
+            [
+                np.tile(self.coef_, (gathered, 1)),
+                self._run(features[gathered:, None], targets[gathered:, None])[:, 0],
+            ]
+        )
+        multiplicity = np.zeros(len(targets))
+        multiplicity[picked] = 1.0
+        multiplicity[gathered:] = 1.0
+        self._summarise(features, targets, multiplicity)
+        return course
+
+    def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
+        """Take in the next sample or samples.
+
+        Scales are fixed by the first call: give several samples first, or `scale`.
+
+        Parameters
+        ----------
+        phi : array-like of shape (n_features,), (n_samples, n_features) or (n_samples, n_signals, n_features)
+            Regressors; where signals share them, their axis may be absent.
+        y : float or array-like of shape (n_samples,) or (n_samples, n_signals)
+            What they explain.
+
+        Returns
+        -------
+        self
+
+        Raises
+        ------
+        InputError
+            For shapes that do not fit and numbers that are not finite.
+        """
+        self._check()
+        features, targets = _shaped(phi, y)
+        if not hasattr(self, "_theta"):
+            self._begin(features, targets)
+        if features.shape[1:] != self._theta.shape:
+            raise InputError(
+                f"phi: {features.shape[1]} signals of {features.shape[2]} regressors found, expected "
+                f"{self._theta.shape[0]} of {self._theta.shape[1]} as before"
+            )
+        self._run(features, targets)
+        return self
+
+    @property
+    def theta(self) -> Floats:
+        """Estimate after the last sample, shape (n_features,) or (n_signals, n_features)."""
+        check_is_fitted(self, "coef_")
+        estimate: Floats = self.coef_
+        return estimate
+
+    @property
+    def covariance(self) -> Floats | None:
+        """Of `theta` per variance of the errors, shape ([n_signals,] n_features, n_features); None for SG."""
+        check_is_fitted(self, "coef_")
+        if not hasattr(self, "_P"):
+            return None
+        unscaled: Floats = self._P / np.multiply.outer(self.scale_, self.scale_)
+        return unscaled[0] if len(unscaled) == 1 else unscaled
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+
+        Returns
+        -------
+        array of shape (n_samples,)
+        """
+        check_is_fitted(self, "coef_")
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats = features @ self.coef_
+        return prediction
+
+    def _check(self) -> None:
+        check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
+        check_number(self.C, "C", above=0.0)
+        check_number(self.start_C, "start_C", above=0.0)
+        _whole(self.start_samples, "start_samples", 0)
+        _whole(self.start_interval, "start_interval", 1)
+
+    def _begin(self, features: Floats, targets: Floats) -> None:
+        """Zero coefficients with the covariance C, in scales that the samples give."""
+        axes = tuple(range(features.ndim - 1))
+        if isinstance(self.scale, bool | np.bool_):
+            size = np.sqrt(np.mean(features**2, axis=axes)) if self.scale else np.ones(features.shape[-1])
+        else:
+            size = np.asarray(self.scale, dtype=float)
+            if size.shape != features.shape[-1:] or not np.all(np.isfinite(size) & (size > 0)):
+                raise InputError(
+                    f"scale: shape {size.shape} found, expected {features.shape[-1]} finite numbers above 0, "
+                    "True or False"
+                )
+        self.scale_ = np.where(size > 0.0, size, 1.0)
+        unit = np.sqrt(np.mean(targets**2, axis=0))
+        self._unit = np.where(unit > 0.0, unit, 1.0)
+        signals, m = targets.shape[1], features.shape[-1]
+        self._theta = np.zeros((signals, m))
+        self._past = (np.empty((0, signals, m)), np.empty((0, signals)))
+        self.coef_ = np.zeros(m) if signals == 1 else np.zeros((signals, m))
+        self._begin_memory(features)
+
+    def _start_from(self, features: Floats, targets: Floats) -> None:
+        """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
+        machine = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
+        self._theta[0] = machine.coef_ * self.scale_ / self._unit[0]
+        self.coef_ = machine.coef_
+        if hasattr(self, "_P"):
+            self._P[0] = machine.inverse_moment_ * np.outer(self.scale_, self.scale_)
+        else:
+            self._r += np.sum((features / self.scale_) ** 2)
+
+    def _run(self, features: Floats, targets: Floats) -> Floats:
+        """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
+        scaled: Floats = np.ascontiguousarray(features / self.scale_)
+        course: Floats = np.empty(features.shape)
+        self._advance(scaled, np.ascontiguousarray(targets / self._unit), course)
+        course *= self._unit[:, None] / self.scale_
+        if len(course):
+            self.coef_ = course[-1, 0].copy() if course.shape[1] == 1 else course[-1].copy()
+        return course
+
+    def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
+        """Weights and covariance of what the recursion tends to."""
+        self.weights_ = multiplicity * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
+        scaled = features / self.scale_
+        moment = (scaled.T * self.weights_) @ scaled + np.eye(scaled.shape[1]) / self.C
+        inverse = np.linalg.inv(moment)
+        unscale = np.outer(self.scale_, self.scale_)
+        self.inverse_moment_ = inverse / unscale
+        error = targets - features @ self.coef_
+        freedom = max(
+            self.weights_.sum() - float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C))), 1.0
+        )
+        self.noise_variance_ = float(self.weights_ @ error**2) / freedom
+        spread = (scaled.T * self.weights_**2) @ scaled
+        self.covariance_ = self.noise_variance_ * (inverse @ spread @ inverse) / unscale
+
+    @abstractmethod
+    def _begin_memory(self, features: Floats) -> None: ...
+
+    @abstractmethod
+    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None: ...
+
+
+class MultiInnovationLeastSquares(Recursion):
+    """Multi-innovation least squares: each step corrects by the last few innovations together.
+
+    Parameters
+    ----------
+    innovations : int
+        How many samples each step uses.
+    omega : float
+        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
+    inverse_free : bool
+        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
+        the matrix of innovations solved (MILS).
+    forgetting : float
+        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient becomes less
+        certain than it was at the start, so that nothing winds up while the ship sails straight.
+    C : float
+        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
+    scale : bool or array-like of shape (n_features,)
+        Divide the regressors by their root mean square, or by given values.
+    start_samples : int
+        Samples from which LS-SVR makes the start; 0 starts from zero.
+    start_interval : int
+        Take every so manieth sample for it.
+    start_C : float
+        Of that LS-SVR.
+    """
+
+    def __init__(
+        self,
+        innovations: int = 5,
+        omega: float = 0.0,
+        inverse_free: bool = True,
+        forgetting: float = 1.0,
+        C: float = 1e6,
+        scale: bool | ArrayLike = True,
+        start_samples: int = 0,
+        start_interval: int = 1,
+        start_C: float = 1e6,
+    ) -> None:
+        self.innovations = innovations
+        self.omega = omega
+        self.inverse_free = inverse_free
+        self.forgetting = forgetting
+        self.C = C
+        self.scale = scale
+        self.start_samples = start_samples
+        self.start_interval = start_interval
+        self.start_C = start_C
+
+    def _check(self) -> None:
+        super()._check()
+        _whole(self.innovations, "innovations", 1)
+        check_number(self.omega, "omega", at_least=0.0)
+
+    def _begin_memory(self, features: Floats) -> None:
+        signals, m = self._theta.shape
+        self._P = np.tile(self.C * np.eye(m), (signals, 1, 1))
+        self._ceiling = np.full((signals, m), float(self.C))
+
+    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+        from identification.estimators.recursive_kernels import matrix_updates, scalar_updates
+
+        first = len(self._past[1])
+        phi, y = np.concatenate([self._past[0], phi]), np.concatenate([self._past[1], y])
+        kernel = scalar_updates if self.inverse_free else matrix_updates
+        kernel(
+            phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
+            float(self.omega), course,
+        )  # fmt: skip
+        kept = min(self.innovations - 1, len(y))
+        self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
+
+    def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
+        gathered = len(targets) - np.arange(len(targets))
+        used = np.minimum(self.innovations, gathered)  # a sample is seen again while it is among the last
+        super()._summarise(features, targets, multiplicity * used)
+
+
+class RecursiveLeastSquares(MultiInnovationLeastSquares):
+    """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
+
+    Parameters
+    ----------
+    forgetting, C, scale, start_samples, start_interval, start_C
+        As in `MultiInnovationLeastSquares`.
+    """
+
+    innovations = 1
+    omega = 0.0
+    inverse_free = True
+
+    def __init__(
+        self,
+        forgetting: float = 1.0,
+        C: float = 1e6,
+        scale: bool | ArrayLike = True,
+        start_samples: int = 0,
+        start_interval: int = 1,
+        start_C: float = 1e6,
+    ) -> None:
+        self.forgetting = forgetting
+        self.C = C
+        self.scale = scale
+        self.start_samples = start_samples
+        self.start_interval = start_interval
+        self.start_C = start_C
+
+
+class StochasticGradient(Recursion):
+    """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
+
+    Cheap and slow: without forgetting its steps shrink as the samples grow, and with correlated regressors it
+    has not arrived by the end of a trial. Prefer the least-squares forms for anything but comparison.
+
+    Parameters
+    ----------
+    omega : float
+        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
+    forgetting : float
+        Factor by which the sum of squares that divides the steps forgets; 1 as printed.
+    C : float
+        Of the ridge in `inverse_moment_`.
+    scale, start_samples, start_interval, start_C
+        As in `MultiInnovationLeastSquares`.
+    """
+
+    def __init__(
+        self,
+        omega: float = 0.0,
+        forgetting: float = 1.0,
+        C: float = 1e6,
+        scale: bool | ArrayLike = True,
+        start_samples: int = 0,
+        start_interval: int = 1,
+        start_C: float = 1e6,
+    ) -> None:
+        self.omega = omega
+        self.forgetting = forgetting
+        self.C = C
+        self.scale = scale
+        self.start_samples = start_samples
+        self.start_interval = start_interval
+        self.start_C = start_C
+
+    def _check(self) -> None:
+        super()._check()
+        check_number(self.omega, "omega", at_least=0.0)
+
+    def _begin_memory(self, features: Floats) -> None:
+        self._r = np.zeros(len(self._theta))
+
+    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+        from identification.estimators.recursive_kernels import gradient_updates
+
+        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), course)
+
+
+def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
+    """Samples of shape (n_samples, n_signals, n_features) and (n_samples, n_signals)."""
+    targets = np.asarray(y, dtype=float)
+    targets = targets.reshape(1, 1) if targets.ndim == 0 else targets
+    features = np.asarray(phi, dtype=float)
+    if features.ndim == 1:
+        features = features[None]
+        targets = targets.reshape(1, -1)
+    targets = targets[:, None] if targets.ndim == 1 else targets
+    if features.ndim == 2:
+        features = features[:, None]
+    if features.ndim != 3 or targets.ndim != 2 or len(features) != len(targets):
+        raise InputError(
+            f"phi, y: shapes {np.shape(phi)} and {np.shape(y)} found, expected (n_samples, n_features) and "
+            "(n_samples,), or (n_samples, n_signals, n_features) and (n_samples, n_signals)"
+        )
+    if features.shape[1] not in (1, targets.shape[1]):
+        raise InputError(f"phi: {features.shape[1]} signals found, expected {targets.shape[1]} as in y")
+    if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
+        raise InputError(
+            "phi, y: a value that is not finite found, expected numbers; repair the samples first"
+        )
+    return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets
+
+
+def _whole(value: Any, where: str, least: int) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InputError(f"{where}: {value!r} found, expected a whole number of at least {least}")

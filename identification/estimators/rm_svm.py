@@ -1,0 +1,376 @@
+"""RM-SVM: a linear support vector regression of what a reference ship leaves of the accelerations.
+
+Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
+minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitive band and solver are those of
+the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression machines).
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.exceptions import ConvergenceWarning
+from sklearn.linear_model import Ridge
+from sklearn.svm import SVR, LinearSVR
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from identification.estimators.estimator import Machine
+from identification.regression.samples import Samples
+from identification.search.pattern_search import pattern_search
+from identification.search.search import BAND, SearchResult
+from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
+from identification.validation.prediction import predict
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.ships import GreyBox, ShipModel
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Machines = dict[str, Machine]
+
+OBJECTIVES = ("rmse", "correlation")
+REGRESSIONS = ("svr", "ls-svm")
+BARE = 0.0  # weight of the errors at which nothing is added to the reference ship
+WEIGHTS = (BARE, *np.geomspace(0.01, 100.0, 9).tolist())
+NEARLY = 1.1  # times the least error is as good
+FIRST_BAND = 0.1
+MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
+MOST_SWEEPS = 20_000  # of coordinate descent through the samples
+PIECES = 3  # into which a single trial is cut to choose the weight of the errors
+
+
+class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """The linear correction of one equation: epsilon-SVR with standardised features and targets.
+
+    Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised features and e in
+    standard deviations of the target.
+
+    Parameters
+    ----------
+    C : float or None
+        Weight of the errors, by the mean over samples; 0 adds nothing to the reference ship. None: 1, or by
+        `identify` the strongest regularisation nearly as good as the best on trials held out.
+    epsilon : float or None
+        The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or by `identify` from a
+        pattern search.
+    objective : {"rmse", "correlation"}
+        What that search compares of simulated and measured heading; "correlation" as in the paper, which
+        is blind to scale and offset.
+    regression : {"svr", "ls-svm"}
+        Epsilon-SVR, or the LS-SVM that the paper's Lagrangian is of, which has no band.
+    free_constant : bool
+        Whether `identify` leaves the constant unpenalised, as the paper does. By default it is penalised like
+        the other terms, so that the weight leads from the bare reference ship to the free fit in small steps.
+    folds : {"trials", "largest-rudder"}
+        What `identify` chooses the weight by: each trial held out in turn (of a single one, pieces), or the
+        trials of the largest rudder together, for models that are to turn harder than any trial.
+    constant : int or None
+        Column that is a free constant, or its integral, by which rows are divided; `identify` finds it.
+
+    Attributes
+    ----------
+    coef_ : array of shape (n_features,)
+        Of the features as given.
+    inverse_moment_, covariance_ : array of shape (n_features, n_features)
+        Of the ridge regression of the same strength: an SVR has none of its own.
+    n_features_in_ : int
+        Number of features.
+    """
+
+    def __init__(
+        self,
+        C: float | None = None,
+        epsilon: float | None = None,
+        objective: str = "rmse",
+        regression: str = "svr",
+        free_constant: bool = False,
+        constant: int | None = None,
+        folds: str = TRIALS,
+    ) -> None:
+        self.C = C
+        self.epsilon = epsilon
+        self.objective = objective
+        self.regression = regression
+        self.free_constant = free_constant
+        self.constant = constant
+        self.folds = folds
+
+    def check(self) -> None:
+        """Refuse settings that cannot be.
+
+        Raises
+        ------
+        InputError
+        """
+        check_choice(self.objective, OBJECTIVES, "objective")
+        check_choice(self.regression, REGRESSIONS, "regression")
+        check_choice(self.folds, FOLDS, "folds")
+        if self.C is not None:
+            check_number(self.C, "C", at_least=0.0)
+        if self.epsilon is not None:
+            check_number(self.epsilon, "epsilon", at_least=0.0, hint="in standard deviations of the target")
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit to samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+        y : array-like of shape (n_samples,)
+            Targets.
+
+        Returns
+        -------
+        self
+        """
+        self.check()
+        checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        features: Floats = checked[0]
+        target = np.asarray(checked[1], dtype=np.float64)
+        weight = 1.0 if self.C is None else float(self.C)
+        if weight == BARE:
+            self.coef_ = np.zeros(features.shape[1])
+            self.inverse_moment_ = np.zeros((features.shape[1],) * 2)
+        else:
+            self._fit(features, target, weight)
+        residual = target - features @ self.coef_
+        self.covariance_ = float(np.mean(residual**2)) * self.inverse_moment_
+        return self
+
+    def _fit(self, X: Floats, y: Floats, weight: float) -> None:
+        band = FIRST_BAND if self.epsilon is None else float(self.epsilon)
+        duration = np.ones(len(y)) if self.constant is None else X[:, self.constant]
+        rows, target = X / duration[:, None], y / duration
+        free = np.arange(X.shape[1]) != self.constant  # all of them without a constant
+        centre, level = np.zeros(X.shape[1]), 0.0
+        if self.constant is not None:
+            centre, level = np.where(free, rows.mean(axis=0), 0.0), float(target.mean())
+        scale = np.sqrt(np.mean((rows - centre) ** 2, axis=0))
+        scale = np.where((scale > 0.0) & free, scale, 1.0)
+        spread = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
+        Z, e = ((rows - centre) / scale)[:, free], (target - level) / spread
+        slope, offset = self._solve(Z, e, weight, band)
+        self.coef_ = np.zeros(X.shape[1])
+        self.coef_[free] = slope * spread / scale[free]
+        if self.constant is not None:
+            self.coef_[self.constant] = level + spread * offset - centre @ self.coef_
+        penalty = np.diag(np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0))
+        self.inverse_moment_ = np.linalg.pinv(X.T @ X + penalty, hermitian=True)
+
+    def _solve(self, Z: Floats, e: Floats, weight: float, band: float) -> tuple[Floats, float]:
+        """Slopes and offset for standardised features and targets."""
+        if not Z.shape[1]:
+            return np.zeros(0), 0.0
+        has_offset = self.constant is not None
+        if self.regression == "ls-svm":
+            ridge = Ridge(alpha=len(e) / weight, fit_intercept=has_offset).fit(Z, e)
+            return np.asarray(ridge.coef_, dtype=float), float(ridge.intercept_)
+        if not has_offset:
+            return _through_zero(Z, e, weight / len(e), band), 0.0
+        machine = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
+        return np.asarray(machine.coef_, dtype=float).ravel(), float(machine.intercept_[0])
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+
+        Returns
+        -------
+        array of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats = features @ self.coef_
+        return prediction
+
+
+def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
+    """Slopes of an epsilon-SVR without offset.
+
+    By coordinate descent, whose time goes with the number of samples; where it does not converge, by
+    sequential minimal optimisation of the samples and their mirror image, which makes the offset zero.
+    """
+    quick = LinearSVR(
+        C=C, epsilon=band, fit_intercept=False, dual=True, tol=1e-6, max_iter=MOST_SWEEPS, random_state=0
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ConvergenceWarning)
+        try:
+            return np.asarray(quick.fit(Z, e).coef_, dtype=float)
+        except ConvergenceWarning:
+            both = SVR(kernel="linear", C=0.5 * C, epsilon=band).fit(np.vstack([Z, -Z]), np.append(e, -e))
+            return np.asarray(both.coef_, dtype=float).ravel()
+
+
+def fit_rm_svm(
+    make: Callable[[], RMSVM], samples: Samples, blank: ShipModel, trials: Sequence[Trial]
+) -> Machines:
+    """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
+
+    Parameters
+    ----------
+    make : callable
+        Makes an unfitted machine with the settings asked for.
+    samples : Samples
+        The regression (`grey_box.structure_samples`).
+    blank : ShipModel
+        The bare reference ship as a model of the target.
+    trials : sequence of Trial
+        Those behind the samples.
+
+    Returns
+    -------
+    dict of str to RMSVM
+        With what was chosen in `chosen_`.
+
+    Raises
+    ------
+    InputError
+        For a model without a reference ship.
+    """
+    asked = make()
+    asked.check()
+    if not isinstance(blank.table, GreyBox):
+        raise InputError(
+            f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
+            "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
+            "file; or choose another method, such as 'tls-svm'"
+        )
+    tuner = _Tuner(asked, samples, blank, trials)
+    weight = tuner.weight() if asked.C is None else float(asked.C)
+    bands, search = tuner.bands(weight)
+    machines: Machines = {}
+    for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
+        machine = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
+        machine.chosen_ = {"C": weight, "epsilon": band}
+        if search is not None:
+            machine.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
+        machines[q] = machine
+    return machines
+
+
+class _Tuner:
+    """Fits with different settings, and simulations with what they give."""
+
+    def __init__(self, asked: RMSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]) -> None:
+        self.asked, self.blank, self.trials = asked, blank, trials
+        self.samples = samples
+        self.thin = max(1, -(-len(samples) // MOST_ROWS))
+        self._known: dict[tuple[Any, ...], RMSVM] = {}
+
+    def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
+        """The machine of one equation for some of the rows."""
+        key = (equation, weight, band, rows.tobytes())
+        if key not in self._known:
+            names = [term.name for term in self.blank.table.terms(equation)]
+            constant = names.index("0") if self.asked.free_constant and "0" in names else None
+            settings = {"C": weight, "epsilon": band, "constant": constant}
+            settings = self.asked.get_params() | settings
+            used = np.flatnonzero(rows)[:: self.thin]
+            X, y = self.samples.features[equation][used], self.samples.targets[equation][used]
+            self._known[key] = RMSVM(**settings).fit(X, y)
+        return self._known[key]
+
+    def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
+        """The grey box with the corrections fitted to some of the rows."""
+        table = self.blank.table
+        fits = [
+            self.fitted(q, weight, band, rows).coef_
+            for q, band in zip(self.samples.features, bands, strict=True)
+        ]
+        matrix = table.acceleration_matrix(self.blank.particulars, self.blank.service_shaft_speed)
+        values = np.linalg.solve(matrix, np.concatenate(fits))
+        return replace(
+            self.blank, coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True))
+        )
+
+    def weight(self) -> float:
+        """The least weight of the errors nearly as good as the best on what is held out.
+
+        Simulated headings are compared, not accelerations: collinear terms hardly change these. Where it
+        makes no difference the reference ship is to be believed, because the hard turn is in no zigzag.
+        """
+        bands = [FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon] * len(
+            self.samples.features
+        )
+        folds = list(self._folds())
+        errors = np.array([
+            np.mean([heading_error(self.model(weight, bands, rows), held, "rmse") for rows, held in folds])
+            for weight in WEIGHTS
+        ])  # fmt: skip
+        if not np.isfinite(errors.min()):
+            return BARE
+        return float(WEIGHTS[int(np.flatnonzero(errors <= NEARLY * errors.min())[0])])
+
+    def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
+        """Rows to fit, and the trial or the piece of the only trial that is held out."""
+        if self.asked.folds == LARGEST_RUDDER:
+            largest = of_largest_rudder(self.trials, "folds")
+            rows = ~largest[self.samples.trial]
+            yield from ((rows, trial) for trial, held in zip(self.trials, largest, strict=True) if held)
+            return
+        if len(self.trials) > 1:
+            for index, trial in enumerate(self.trials):
+                yield self.samples.trial != index, trial
+            return
+        (trial,) = self.trials
+        edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
+        start, end = self.samples.start, self.samples.start + self.samples.duration
+        for first, last in pairwise(edges):
+            held = slice(first, last)
+            channels = {name: values[held] for name, values in trial.channels.items()}
+            piece = Trial(trial.t[held], channels, name=trial.name)
+            yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
+
+    def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
+        """The insensitive bands, by a pattern search on the simulated heading of the trials."""
+        count = len(self.samples.features)
+        if self.asked.epsilon is not None or weight == BARE or self.asked.regression == "ls-svm":
+            return np.full(count, FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon), None
+        everything = np.ones(len(self.samples), dtype=bool)
+
+        def error(bands: Floats) -> float:
+            model = self.model(weight, bands.tolist(), everything)
+            return float(np.mean([heading_error(model, t, self.asked.objective) for t in self.trials]))
+
+        search = pattern_search(error, np.full(count, FIRST_BAND), np.zeros(count), np.ones(count))
+        return search.x, search
+
+
+def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
+    """How far the heading of an open-loop simulation is from the measured one.
+
+    Parameters
+    ----------
+    model : ShipModel
+    trial : Trial
+        With the heading.
+    objective : {"rmse", "correlation"}
+        Root mean square, rad, or 1 less Pearson's correlation.
+
+    Returns
+    -------
+    float
+        Infinite where the model runs away.
+    """
+    prediction = predict(model, trial)
+    if prediction is None:
+        return np.inf
+    ours, theirs = prediction["psi"], trial["psi"]
+    if objective == "rmse":
+        return float(np.sqrt(np.mean((ours - theirs) ** 2)))
+    if np.ptp(ours) == 0.0 or np.ptp(theirs) == 0.0:
+        return 1.0
+    return 1.0 - float(np.corrcoef(ours, theirs)[0, 1])

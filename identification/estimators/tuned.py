@@ -1,0 +1,172 @@
+"""LS-SVM that chooses its own weight of the errors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from identification.estimators.lssvm import LSSVM, check_weight, validated
+from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
+from identification.search.optimisers import get_optimiser
+from identification.search.search import Optimiser
+from shipgym.checks import check_choice, check_whole
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+OBJECTIVES = ("k-fold", "training", "free-running")
+LINEAR = (
+    "coef_",
+    "intercept_",
+    "singular_values_",
+    "covariance_",
+    "inverse_moment_",
+    "noise_variance_",
+    "weights_",
+)
+
+
+class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+    """LS-SVM with a linear kernel and C found by a search over its logarithm (Zhu 2018, section 5.3).
+
+    Parameters
+    ----------
+    optimiser : {"abc", "pso", "grid", "de"}, mapping or Optimiser
+        Artificial bee colony, particle swarm, grid or differential evolution; with its settings as
+        `{"name": "abc", "rounds": 60}`.
+    objective : {"k-fold", "training", "free-running"}
+        Error of blocks of time held out; error on the samples fitted, as the thesis has it, whose
+        optimum is the upper bound; error of simulated trials (through `identify` only).
+    bounds : tuple of float
+        Least and largest C.
+    folds : int or "trials"
+        Blocks of time of the k-fold objective, or a block for each trial.
+    seed : int
+        Of the search.
+    scale, fit_intercept, robust
+        As of `LSSVM`. With `robust` the blocks are weighted as in the fit with the largest C.
+
+    Attributes
+    ----------
+    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_, weights_,
+    n_features_in_
+        As of `LSSVM`.
+    C_ : float
+        The weight of the errors that was found.
+    search_ : SearchResult
+        How; its variable is log10 C.
+    chosen_ : dict
+        For the provenance.
+    """
+
+    def __init__(
+        self,
+        optimiser: str | Mapping[str, Any] | Optimiser = "abc",
+        objective: str = "k-fold",
+        bounds: tuple[float, float] = (1e-2, 1e12),
+        folds: int | str = 5,
+        seed: int = 0,
+        scale: bool | ArrayLike = True,
+        fit_intercept: bool = True,
+        robust: bool = False,
+    ) -> None:
+        self.optimiser = optimiser
+        self.objective = objective
+        self.bounds = bounds
+        self.folds = folds
+        self.seed = seed
+        self.scale = scale
+        self.fit_intercept = fit_intercept
+        self.robust = robust
+
+    def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
+        """Search for C and fit to samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features, in the order of time.
+        y : array-like of shape (n_samples,)
+            Targets.
+        groups : array-like of shape (n_samples,), optional
+            Trial of each sample, for folds="trials".
+
+        Returns
+        -------
+        self
+        """
+        check_choice(self.objective, OBJECTIVES, "objective")
+        check_whole(self.seed, "seed", at_least=0)
+        if self.objective == "free-running":
+            raise InputError(
+                "objective: 'free-running' found, expected 'k-fold' or 'training': samples alone cannot be "
+                "simulated; use identify(..., objective='free-running')"
+            )
+        optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
+        X, y = validated(self, X, y)
+        objective = self._objective(X, y, groups, self._machine(10.0 ** bounds[1]))
+        search = optimiser.minimise(objective, [bounds], self.seed)
+        return self.settle(X, y, 10.0 ** float(search.x[0]), search)
+
+    def log_bounds(self) -> tuple[float, float]:
+        """Bounds of log10 C, checked."""
+        try:
+            low, high = self.bounds
+        except (TypeError, ValueError):
+            raise InputError(
+                f"bounds: {self.bounds!r} found, expected the least and the largest C, such as (0.01, 1e12)"
+            ) from None
+        low, high = check_weight(low, "bounds"), check_weight(high, "bounds")
+        if not low < high < np.inf:
+            raise InputError(
+                f"bounds: {(low, high)} found, expected a least C and a finite one that is larger"
+            )
+        return float(np.log10(low)), float(np.log10(high))
+
+    def settle(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
+        """Take C as a search found it, and fit."""
+        X, y = validated(self, X, y)
+        machine = self._machine(C).fit(X, y)
+        for name in LINEAR:
+            setattr(self, name, getattr(machine, name))
+        self.C_, self.search_ = C, search
+        self.chosen_ = {
+            "C": C,
+            "objective": self.objective,
+            "value": search.value,
+            "evaluations": search.evaluations,
+        }
+        return self
+
+    def _machine(self, C: float) -> LSSVM:
+        return LSSVM(C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust)
+
+    def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM) -> ErrorOfC:
+        weights = loosest.fit(X, y).weights_ if self.robust else None
+        if self.objective == "training":
+            return training_error(X, y, self.scale, self.fit_intercept, weights)
+        folds = min(self.folds, len(y)) if isinstance(self.folds, int) else self.folds
+        blocks = time_blocks(len(y), folds, groups)
+        return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets of samples.
+
+        Parameters
+        ----------
+        X : array-like of shape (n_samples, n_features)
+            Features.
+
+        Returns
+        -------
+        array of shape (n_samples,)
+        """
+        check_is_fitted(self)
+        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
+        prediction: Floats = features @ self.coef_ + self.intercept_
+        return prediction

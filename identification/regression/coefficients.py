@@ -1,0 +1,32 @@
+"""From the coefficients of the accelerations to a model's hydrodynamic derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.ships import ShipModel
+
+Floats = NDArray[np.float64]
+
+
+def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) -> ShipModel:
+    """The model with the hydrodynamic derivatives that follow from coefficients of accelerations.
+
+    Parameters
+    ----------
+    blank : ShipModel
+        The model but for its coefficients.
+    accelerations : mapping of str to array of shape (n_terms,)
+        Coefficients of the terms of each equation, SI units.
+
+    Returns
+    -------
+    ShipModel
+    """
+    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
+    values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.regressed]))
+    return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))

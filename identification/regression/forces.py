@@ -1,0 +1,308 @@
+"""From captive tests to the coefficients of a table for forces: X, Y and N in one regression.
+
+A coefficient that stands in several equations (`shipgym.ships.shared_structure`) has one column; the rows
+of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares 2020, equations 18 to 22, who fit the
+equations one after the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from identification.estimators.estimator import Machine
+from identification.estimators.threads import on_one_thread
+from shipgym.checks import check_choice
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel, get_structure
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+FORCES = ("X", "Y", "N")
+NEEDED = ("u", "v", "r", *FORCES)
+JUMP = 20.0  # of the usual change of a velocity from sample to sample: another angle of a static test
+FEWEST = 4  # samples between jumps
+METHODS = ("ls", "tls-svm")
+
+
+@dataclass(frozen=True, eq=False)
+class ForceRegression:
+    """Forces of captive tests as a linear function of the coefficients, prime system.
+
+    Attributes
+    ----------
+    features : array of shape (n_rows, n_coefficients)
+        The share of each coefficient; rows of all X, then all Y, then all N.
+    targets : array of shape (n_rows,)
+        Hydrodynamic force or moment.
+    names : tuple of str
+        Of the coefficients, in the order of the columns.
+    equation : array of shape (n_rows,)
+        0, 1, 2 for X, Y, N.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    """
+
+    features: Floats
+    targets: Floats
+    names: tuple[str, ...]
+    equation: NDArray[np.int64]
+    trial: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.targets)
+
+    def scales(self) -> Floats:
+        """Root mean square of each row's force over all tests, shape (n_rows,)."""
+        sizes = np.array([np.sqrt(np.mean(self.targets[self.equation == i] ** 2)) for i in range(3)])
+        return np.where(sizes > 0.0, sizes, 1.0)[self.equation]
+
+    def r_squared(self, coefficients: Floats) -> dict[str, float]:
+        """Share of the variance of X, Y and N that is explained (equation 22)."""
+        errors = self.targets - self.features @ coefficients
+        found = {}
+        for i, force in enumerate(FORCES):
+            rows = self.equation == i
+            about = self.targets[rows] - self.targets[rows].mean()
+            found[force] = 1.0 - float(errors[rows] @ errors[rows]) / max(float(about @ about), 1e-300)
+        return found
+
+
+def force_regression(
+    trials: Sequence[Trial], structure: SharedStructure, particulars: Particulars, model_inertia: bool = True
+) -> ForceRegression:
+    """Stack the forces of captive tests over X, Y and N.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the channels u, v, r, X, Y, N, from `shipgym.manoeuvres.towing_tank` or a real one.
+        Accelerations are those of splines through the velocities, which a carriage prescribes, between
+        jumps of a static test.
+    structure : SharedStructure
+        Such as `pmm38`.
+    particulars : Particulars
+        Length, water density; mass, centre of gravity and yaw gyradius where `model_inertia`.
+    model_inertia : bool
+        Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`); it is taken out.
+
+    Returns
+    -------
+    ForceRegression
+
+    Raises
+    ------
+    InputError
+        For no trial, a missing channel, or a ship at rest.
+    """
+    if not trials:
+        raise InputError("trials: none found, expected captive tests with the channels u, v, r, X, Y, N")
+    ship = particulars.completed()
+    parts = []
+    for index, trial in enumerate(trials):
+        missing = [name for name in NEEDED if name not in trial]
+        if missing:
+            raise InputError(
+                f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure {structure.name!r} "
+                f"needs {', '.join(NEEDED)}; give captive tests"
+            )
+        pieces = [_one_piece(trial, rows, structure, ship, model_inertia) for rows in _between_jumps(trial)]
+        parts += [(index, *piece) for piece in pieces]
+    if not parts:
+        raise InputError(
+            f"trial {trials[0].name!r}: nowhere {FEWEST} samples between jumps of the velocity, expected more"
+        )
+    counts = [(i, len(targets[0])) for i, _, targets in parts]
+    return ForceRegression(
+        np.concatenate([features[axis] for axis in range(3) for _, features, _ in parts]),
+        np.concatenate([targets[axis] for axis in range(3) for _, _, targets in parts]),
+        structure.coefficient_names,
+        np.repeat(np.arange(3), sum(n for _, n in counts)),
+        np.tile(np.concatenate([np.full(n, i) for i, n in counts]), 3),
+    )
+
+
+def _between_jumps(trial: Trial) -> list[slice]:
+    """Stretches in which the velocities change smoothly."""
+    jumps = np.zeros(len(trial) - 1, dtype=bool)
+    for name in "uvr":
+        change = np.abs(np.diff(trial[name]))
+        floor = 1e-9 * float(np.abs(trial[name]).max())
+        jumps |= change > np.maximum(JUMP * np.median(change), floor) + floor
+    edges = [0, *(np.flatnonzero(jumps) + 1).tolist(), len(trial)]
+    return [slice(i, j) for i, j in pairwise(edges) if j - i >= FEWEST]
+
+
+def _one_piece(
+    trial: Trial, rows: slice, structure: SharedStructure, ship: Particulars, model_inertia: bool
+) -> tuple[list[Floats], list[Floats]]:
+    """Features and targets of X, Y, N over one stretch, prime system."""
+    t, length = trial.t[rows], ship.length
+    u, v, r = (trial[name][rows] for name in "uvr")
+    speed = np.hypot(u, v)
+    if not np.all(speed > 0.0):
+        raise InputError(
+            f"trial {trial.name!r}: a ship at rest found, expected way on her: U divides the forces"
+        )
+    rates = [CubicSpline(t, values)(t, 1) * length / speed**2 for values in (u, v, r)]
+    prime = {"u": u / speed, "v": v / speed, "r": r * length / speed}
+    prime |= dict(zip(ACCELERATIONS, (rates[0], rates[1], rates[2] * length), strict=True))
+    prime |= {f"|{name}|": np.abs(prime[name]) for name in "uvr"}
+    unit = 0.5 * ship.require("water_density") * length**2 * speed**2
+    targets = [trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES]
+    if model_inertia:
+        own = _ship_s_own(prime, ship)
+        targets = [target + ours for target, ours in zip(targets, own, strict=True)]
+    column = {name: i for i, name in enumerate(structure.coefficient_names)}
+    features = []
+    for axis in AXES:
+        matrix = np.zeros((len(t), len(column)))
+        for share in structure.shares[axis]:
+            product = np.ones(len(t))
+            for symbol, power in share.term.powers:
+                product = product * prime[symbol] ** float(power)
+            matrix[:, column[share.coefficient]] += share.sign * product
+        features.append(matrix)
+    return features, targets
+
+
+def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
+    """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3), prime."""
+    m, static, yaw = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
+    u, v, r, udot, vdot, rdot = (prime[name] for name in (*AXES, *ACCELERATIONS))
+    aside = vdot + u * r
+    return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
+
+
+def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, Floats]:
+    """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
+
+    Parameters
+    ----------
+    regression : ForceRegression
+        Of captive tests.
+    machine : Machine
+        Without intercept; it is fitted.
+
+    Returns
+    -------
+    coefficients : array of shape (n_coefficients,)
+    covariance : array of shape (n_coefficients, n_coefficients)
+        For white errors, whose size is that of each force's own residuals.
+    """
+    scales = regression.scales()
+    features, targets = regression.features / scales[:, None], regression.targets / scales
+    machine.fit(features, targets)
+    half = features @ machine.inverse_moment_
+    variances = force_variances(
+        regression.equation, targets - machine.predict(features), np.sum(half * features, axis=1)
+    )
+    covariance = (half.T * variances[regression.equation]) @ half
+    return machine.coef_, 0.5 * (covariance + covariance.T)
+
+
+def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
+    """Variances of the errors of X, Y and N, each by its residuals.
+
+    Parameters
+    ----------
+    equation : array of shape (n_rows,)
+        0, 1, 2 for X, Y, N.
+    residuals : array of shape (n_rows, ...)
+        Of the fit.
+    leverages : array of shape (n_rows,)
+        Diagonal of the matrix that maps targets to fitted values.
+
+    Returns
+    -------
+    array of shape (3, ...)
+    """
+    found = []
+    for i in range(len(FORCES)):
+        rows = equation == i
+        freedom = max(float(np.sum(1.0 - leverages[rows])), 1.0)
+        found.append(np.sum(residuals[rows] ** 2, axis=0) / freedom)
+    return np.array(found)
+
+
+@on_one_thread
+def identify_forces(
+    trials: Sequence[Trial],
+    structure: str = "pmm18",
+    particulars: Particulars | None = None,
+    *,
+    method: str = "tls-svm",
+    rank: int | None = None,
+    model_inertia: bool = True,
+    steering: SteeringGear | None = None,
+    name: str | None = None,
+) -> ShipModel:
+    """Identify a table for forces, added masses included, from captive tests.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With u, v, r, X, Y, N.
+    structure : str
+        `pmm38`, `pmm18` or another table of shares.
+    particulars : Particulars
+        Length, mass, centre of gravity, yaw gyradius, water density; the service speed.
+    method : {"tls-svm", "ls"}
+        Truncated LS-SVM, or least squares. X, Y and N count alike, each by its root mean square.
+    rank : int, optional
+        Directions that `tls-svm` keeps; by default by its L-curve.
+    model_inertia : bool
+        See `force_regression`.
+    steering : SteeringGear, optional
+        Of the model.
+    name : str, optional
+        Of the model; by default the ship's.
+
+    Returns
+    -------
+    ShipModel
+        With covariance of the coefficients, errors taken as white; its provenance holds R^2 of X, Y, N.
+
+    Raises
+    ------
+    InputError
+        For a structure of free-running trials, and what `force_regression` refuses.
+    """
+    from identification.estimators.methods import get_method
+
+    table = get_structure(structure)
+    check_choice(method, METHODS, "method")
+    if not isinstance(table, SharedStructure):
+        raise InputError(
+            f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
+            "captive tests, such as 'pmm18'; use identify"
+        )
+    if particulars is None:
+        raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
+    regression = force_regression(trials, table, particulars, model_inertia)
+    machine = get_method(method).machine(**({} if rank is None else {"rank": rank}))
+    coefficients, covariance = fit_forces(regression, machine)
+    return ShipModel(
+        name=particulars.name if name is None else name,
+        structure=structure,
+        particulars=particulars.completed(),
+        steering=steering or SteeringGear(),
+        coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
+        covariance=covariance,
+        provenance={
+            "structure": structure,
+            "method": method,
+            "rank": int(getattr(machine, "rank_", len(coefficients))),
+            "r_squared": regression.r_squared(coefficients),
+            "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
+        },
+    )

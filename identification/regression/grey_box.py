@@ -1,0 +1,127 @@
+"""The regression of a grey box: what the converted reference ship leaves of the target's accelerations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.regression.samples import Samples, build_samples
+from identification.simulation_error.similarity import AUTO, select_reference
+from identification.validation.prediction import predict, trial_metrics
+from shipgym.errors import InputError
+from shipgym.ships import GreyBox, ShipModel, Structure, grey_box
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class _Widened(GreyBox):
+    """A grey box whose features have one more column: the reference ship's converted acceleration."""
+
+    def features(
+        self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        known = self.converted_accelerations(channels, particulars, shaft_speed)[equation]
+        return np.column_stack([super().features(equation, channels, particulars, shaft_speed), known])
+
+
+def chosen_box(
+    reference: str | ShipModel | None, particulars: Particulars, trials: Sequence[Trial]
+) -> tuple[GreyBox, dict[str, float]]:
+    """The grey box of a named reference ship, or of the one most like the target.
+
+    Parameters
+    ----------
+    reference : str or ShipModel, optional
+        A model, its name or file; "auto" chooses by `select_reference`.
+    particulars : Particulars
+        Of the target.
+    trials : sequence of Trial
+        Of the target; whether its shaft speed and roll are known.
+
+    Returns
+    -------
+    box : GreyBox
+    correlations : dict of str to float
+        Of the candidates, empty where the ship was named.
+
+    Raises
+    ------
+    InputError
+        For no reference, or one that does not exist.
+    """
+    if reference is None:
+        raise InputError(
+            "reference_model: None found, expected the name of a reference ship, a model file, or 'auto': a "
+            "grey box is a reference ship plus a table of terms"
+        )
+    recorded = set.intersection(*(set(trial.channels) for trial in trials)) if trials else set()
+    found: dict[str, float] = {}
+    if reference == AUTO:
+        reference, found = select_reference(_with_block_coefficient(particulars), recorded)
+    box = grey_box(reference)
+    return replace(box, shaft=box.shaft and "n" in recorded), found
+
+
+def structure_samples(
+    trials: Sequence[Trial],
+    structure: Structure,
+    particulars: Particulars,
+    samples: str = "spline",
+    window: int | None = None,
+    gear: SteeringGear | None = None,
+    smooth: bool | str = True,
+    shaft_speed: float = 0.0,
+) -> Samples:
+    """The regression of any structure; arguments as in `build_samples`.
+
+    For a grey box the target is what the reference ship's acceleration, converted to the target and
+    integrated over the same window, leaves of the change of velocity.
+    """
+    rest = (particulars, samples, window, gear, smooth, shaft_speed)
+    if not isinstance(structure, GreyBox):
+        return build_samples(trials, structure, *rest)
+    widened = _Widened(**{field.name: getattr(structure, field.name) for field in fields(structure)})
+    built = build_samples(trials, widened, *rest)
+    return replace(
+        built,
+        features={q: features[:, :-1] for q, features in built.features.items()},
+        targets={q: built.targets[q] - features[:, -1] for q, features in built.features.items()},
+    )
+
+
+def _with_block_coefficient(particulars: Particulars) -> Particulars:
+    """Particulars with what can be estimated; as they are where too little is known for that."""
+    try:
+        return particulars.completed()
+    except InputError:
+        return particulars
+
+
+def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
+    """How well the reference ship alone, without the terms, predicts trials.
+
+    Parameters
+    ----------
+    model : ShipModel
+        A grey box.
+    trials : sequence of Trial
+
+    Returns
+    -------
+    dict
+        Name of the reference ship, and `prediction.trial_metrics` by trial.
+    """
+    assert isinstance(model.table, GreyBox)
+    bare = replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None)
+    return {
+        "name": model.table.ship.name,
+        "trials": {trial.name: trial_metrics(bare, trial, predict(bare, trial)) for trial in trials},
+    }

@@ -1,0 +1,76 @@
+"""From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.regression.preprocess.filters import median, savitzky_golay
+from identification.regression.preprocess.kinematics import smooth_kinematics
+from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
+from identification.regression.preprocess.repair import outliers, repaired
+from identification.regression.preprocess.spline import smooth
+from shipgym.checks import check_choice
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+#: Filters of single channels by name.
+FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
+    "spline": smooth,
+    "savgol": savitzky_golay,
+    "median": median,
+}
+
+#: What `identify` may do with noisy channels.
+PREPROCESSING = (*FILTERS, "rts", "none")
+
+
+def smoothed_channels(trial: Trial, names: Sequence[str], preprocessing: str) -> dict[str, Floats]:
+    """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record.
+    names : sequence of str
+        Channels wanted.
+    preprocessing : {"spline", "savgol", "median", "rts", "none"}
+        Smoothing spline, Savitzky-Golay filter, running median, Kalman smoother of the kinematics (the shaft
+        speed by a spline), or nothing.
+
+    Returns
+    -------
+    dict of str to array of shape (n_samples,)
+
+    Raises
+    ------
+    InputError
+        For another name.
+    """
+    check_choice(preprocessing, PREPROCESSING, "preprocessing")
+    if preprocessing == "none":
+        return {name: trial[name] for name in names}
+    source = smooth_kinematics(trial) if preprocessing == "rts" else trial
+    one = FILTERS.get(preprocessing, smooth)
+    done = ("delta", *(("x", "y", "psi", "u", "v", "r") if preprocessing == "rts" else ()))
+    return {name: source[name] if name in done else one(source.t, source[name]) for name in names}
+
+
+__all__ = [
+    "FILTERS",
+    "NOISY",
+    "PREPROCESSING",
+    "is_noisy",
+    "median",
+    "noise_level",
+    "noise_ratio",
+    "outliers",
+    "repaired",
+    "savitzky_golay",
+    "smooth",
+    "smooth_kinematics",
+    "smoothed_channels",
+]

@@ -1,0 +1,120 @@
+"""Outliers and dropouts of a record: found, filled from their neighbours, and told."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import PchipInterpolator
+from scipy.ndimage import median_filter
+
+from identification.regression.preprocess.noise import noise_level
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+WIDTH = 7  # samples of the running median
+OUTLYING = 6.0  # times the noise
+LONGEST_HOLE = 10.0  # usual time steps; longer ones stay gaps
+MOST_OUTLIERS = 0.1  # of a channel
+MEASURED = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
+
+
+def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Flags:
+    """Samples away from the running median by several times the noise (Hampel 1974, JASA 69).
+
+    What the signal itself moves from sample to sample is allowed for by the running median's own steps, so
+    that corners of a clean signal are no outliers.
+
+    Parameters
+    ----------
+    t, values : array-like of shape (n_samples,)
+        s and the unit of the channel.
+    threshold : float
+        In standard deviations of the noise.
+
+    Returns
+    -------
+    array of bool of shape (n_samples,)
+    """
+    t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
+    if len(values) < WIDTH:
+        return np.zeros(len(values), dtype=bool)
+    middle = median_filter(values, WIDTH, mode="nearest")
+    steps = np.abs(np.diff(middle, append=middle[-1]))
+    moves = median_filter(np.maximum(steps, np.roll(steps, 1)), WIDTH, mode="nearest")
+    allowed = threshold * noise_level(t, values) + 0.5 * WIDTH * moves + 1e-9 * np.ptp(middle)
+    found: Flags = np.abs(values - middle) > allowed
+    return found
+
+
+def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
+    """Replace outliers and fill short dropouts of a trial from their neighbours.
+
+    A dropout is a step in time of more than 1.5 usual ones; those of up to 10 are filled, at the usual step;
+    longer ones stay, and no method smooths or integrates across them. Shape-preserving cubics (PCHIP) fill.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record.
+    threshold : float
+        Beyond so many standard deviations of the noise from the running median a sample is an outlier.
+
+    Returns
+    -------
+    Trial
+        The trial itself where nothing is wrong; else with `repaired`, the number of values that were filled
+        by channel, and `raw`, the trial as it was.
+
+    Raises
+    ------
+    InputError
+        Where more than a tenth of a channel would be outliers: that is no record with outliers.
+    """
+    check_number(threshold, "threshold", above=0.0, hint="in standard deviations of the noise")
+    times = _filled_times(trial.t)
+    kept = np.isin(times, trial.t)
+    channels, counts = {}, {}
+    for name, values in trial.channels.items():
+        wrong = outliers(trial.t, values, threshold) if name in MEASURED else np.zeros(len(trial), dtype=bool)
+        if wrong.mean() > MOST_OUTLIERS:
+            raise InputError(
+                f"trial {trial.name!r}: {wrong.sum()} of {len(trial)} samples of {name} would be outliers, "
+                f"expected at most a tenth; check the channel, or give a threshold above {threshold:g}"
+            )
+        filled = int(wrong.sum() + (~kept).sum())
+        channels[name] = _refilled(trial.t[~wrong], values[~wrong], times, values, kept & ~_at(wrong, kept))
+        if filled:
+            counts[name] = filled
+    return trial.with_channels(channels, t=times, repaired=counts) if counts else trial
+
+
+def _at(wrong: Flags, kept: Flags) -> Flags:
+    """Flags of the record's samples on the filled times."""
+    found = np.zeros(len(kept), dtype=bool)
+    found[kept] = wrong
+    return found
+
+
+def _refilled(known: Floats, good: Floats, times: Floats, values: Floats, sound: Flags) -> Floats:
+    """Values at the filled times; sound ones to the bit as they were."""
+    if sound.all():
+        return values
+    found: Floats = np.asarray(PchipInterpolator(known, good, extrapolate=False)(times), dtype=float)
+    found = np.where(times < known[0], good[0], np.where(times > known[-1], good[-1], found))
+    found[sound] = good
+    return found
+
+
+def _filled_times(t: Floats) -> Floats:
+    """The times with those that are missing in short dropouts."""
+    steps = np.diff(t)
+    usual = float(np.median(steps))
+    extra = [
+        np.linspace(t[k], t[k + 1], round(steps[k] / usual) + 1)[1:-1]
+        for k in np.flatnonzero((steps > 1.5 * usual) & (steps <= (LONGEST_HOLE + 0.5) * usual))
+    ]
+    return np.union1d(t, np.concatenate(extra)) if extra else np.array(t)

@@ -1,0 +1,207 @@
+"""What is to be identified: the trials used, the structure, the ship, and the regression they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from identification.regression.gear import estimated_gear
+from identification.regression.grey_box import chosen_box, structure_samples
+from identification.regression.preprocess import repaired
+from identification.regression.samples import Samples
+from identification.validation.diagnostics import check_samples, check_trials
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, get_structure
+from shipgym.ships.grey_box import GREY_BOX
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.plausibility import check_scale
+from shipgym.trials.trial import Trial
+
+ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What a method is given to fit.
+
+    Attributes
+    ----------
+    trials : tuple of Trial
+        All, those held out marked `validate`.
+    used : tuple of Trial
+        Those to fit, repaired where asked.
+    blank : ShipModel
+        The model but for its coefficients.
+    samples : Samples
+        The regression.
+    similarity : dict of str to float
+        Of the candidates for the reference ship of a grey box, where it was chosen among several.
+    """
+
+    trials: tuple[Trial, ...]
+    used: tuple[Trial, ...]
+    blank: ShipModel
+    samples: Samples
+    similarity: dict[str, float]
+
+
+def pose(
+    trials: Sequence[Trial],
+    structure: str = "abkowitz",
+    samples: str = "spline",
+    particulars: Particulars | Mapping[str, Any] | None = None,
+    steering: SteeringGear | None = None,
+    *,
+    service_shaft_speed: float | None = None,
+    name: str | None = None,
+    window: int | None = None,
+    smooth: bool = True,
+    preprocessing: str | None = None,
+    repair: bool = False,
+    hold_out: Sequence[str] = (),
+    reference_model: str | ShipModel | None = None,
+) -> Problem:
+    """Check what was given and make the regression; arguments as in `identify`.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    InputError
+        For trials that excite nothing, lack channels or samples or are of another ship, and for particulars
+        that do not suffice.
+    """
+    everything = _held_out(trials, hold_out)
+    if not isinstance(steering, SteeringGear | None):
+        raise InputError(
+            f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
+        )
+    used = [repaired(trial) if repair else trial for trial in _used(everything)]
+    table, similarity = _table(structure, reference_model, particulars, used)
+    check_trials(used, table)
+    ship = _ship(particulars, used, table)
+    for trial in used:
+        check_scale(trial, ship, f"trial {trial.name!r}")
+    shaft = _shaft_speed(service_shaft_speed, used, table)
+    regression = structure_samples(
+        used, table, ship, samples, window, steering, preprocessing or smooth, shaft
+    )
+    check_samples(regression, used, table)
+    gear = _gear(used, table) if steering is None else steering
+    blank = _blank(ship["name"] if name is None else name, table, ship, gear, shaft, used)
+    return Problem(tuple(everything), tuple(used), blank, regression, similarity)
+
+
+def _blank(
+    name: str, table: Structure, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
+) -> ShipModel:
+    """The model but for its coefficients, with the envelope of the trials behind it."""
+    return ShipModel(
+        name=name,
+        structure=table.name,
+        particulars=ship,
+        steering=gear,
+        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        service_shaft_speed=shaft,
+        own_table=table if isinstance(table, GreyBox) else None,
+        envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
+    )
+
+
+def _check_list(trials: Any) -> None:
+    """Refuse what is not a list of trials."""
+    wrong = [trials] if isinstance(trials, Trial | str) else [t for t in trials if not isinstance(t, Trial)]
+    if wrong:
+        raise InputError(
+            f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
+        )
+
+
+def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only."""
+    _check_list(trials)
+    known = [trial.name for trial in trials]
+    wanted = [names] if isinstance(names, str) else list(names)
+    for name in wanted:
+        check_choice(name, known, "hold_out")
+    return [trial.with_(use="validate") if trial.name in wanted else trial for trial in trials]
+
+
+def _table(
+    structure: str,
+    reference: str | ShipModel | None,
+    particulars: Particulars | Mapping[str, Any] | None,
+    used: Sequence[Trial],
+) -> tuple[Structure, dict[str, float]]:
+    """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
+    if structure != GREY_BOX:
+        if reference is not None:
+            raise InputError(
+                f"reference_model: {reference!r} found with structure {structure!r}, expected structure "
+                "'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give prior)"
+            )
+        return get_structure(structure), {}
+    check_trials(used, get_structure("linear-steering"))
+    return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
+
+
+def _used(trials: Sequence[Trial]) -> list[Trial]:
+    """Trials to fit, after checking that names tell all trials apart."""
+    names = [trial.name for trial in trials]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"trials: {len(names)} trials found, two of them named {twice[0]!r}, expected different names; "
+            "rename one with trial.with_(name=...)"
+        )
+    return [trial for trial in trials if trial.use == "fit"]
+
+
+def _ship(
+    particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial], table: Structure
+) -> Particulars:
+    """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
+    if particulars is None:
+        raise InputError(
+            "particulars: None found, expected those of the ship, at least its length and its mass and "
+            "added mass or what they are estimated from: beam, draught, block_coefficient; for example "
+            'identify(trials, particulars={"length": 7.0, "beam": 1.27, "draught": 0.455, '
+            '"block_coefficient": 0.81}), or ship.particulars of a ship file'
+        )
+    ship = particulars if isinstance(particulars, Particulars) else Particulars.from_mapping(particulars)
+    if ship.speed is None:
+        speed = float(np.median([np.hypot(trial["u"][0], trial["v"][0]) for trial in trials]))
+        if speed <= 0.0:
+            raise InputError(
+                f"trial {trials[0].name!r}: starts at rest, expected way on the ship; give the service "
+                "speed in the particulars (speed, m/s)"
+            )
+        ship = replace(ship, speed=speed, estimated=ship.estimated | {"speed"})
+    return ship.completed() if table.quantity == "force" else ship
+
+
+def _shaft_speed(given: float | None, trials: Sequence[Trial], table: Structure) -> float:
+    """Shaft speed at service speed, 1/s; 0 for a structure that knows no shaft."""
+    if "n" not in table.command_names:
+        return 0.0
+    if given is not None:
+        return check_number(given, "service_shaft_speed", above=0.0, hint="in 1/s")
+    shaft = float(np.median([trial["n"][0] for trial in trials]))
+    if shaft <= 0.0:
+        raise InputError(
+            f"trial {trials[0].name!r}: starts with a shaft speed of {shaft:g} 1/s, expected that of service "
+            "speed; give service_shaft_speed"
+        )
+    return shaft
+
+
+def _gear(trials: Sequence[Trial], table: Structure) -> SteeringGear:
+    """The gear as the rudders of the trials show it; a usual one where no rudder has to move."""
+    return estimated_gear(trials) if table.has_rudder else SteeringGear()

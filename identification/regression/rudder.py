@@ -1,0 +1,260 @@
+"""The rudder between its samples, rebuilt from the equation of the steering gear.
+
+A rudder ramps, and where its gear has a lag it then creeps up to its order; between samples a
+polynomial misses both. The orders, the times at which they changed and, where not known, the rate and
+the lag of the gear are found from the samples of the rudder angle alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import minimize_scalar
+
+from shipgym.ships.steering import SteeringGear
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
+RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
+EXPLAINED = 0.85  # share of the intervals that the gear has to explain
+FEWEST_SAMPLES = 8  # per change of order: with fewer the gear explains noise
+BISECTIONS = 60
+
+
+@dataclass(frozen=True)
+class Rudder:
+    """Rudder angle as a function of time, through all samples.
+
+    Attributes
+    ----------
+    t, delta : array of shape (n_samples,)
+        The samples, s and rad.
+    rate, time_constant : float
+        Of the gear that explains them, rad/s and s; 0 where none does.
+    follows_gear : bool
+        Whether a steering gear explains the samples; if not, the rudder is taken straight between them.
+    before, after : array of shape (n_samples - 1,)
+        Order in the first and second part of each interval, rad; infinite where only its side is known.
+    switch : array of shape (n_samples - 1,)
+        Time from the interval's start at which the order changes, s.
+    corners : array of shape (n_corners,)
+        Times at which rate or acceleration of the rudder jump, s.
+    smoothness : array of shape (n_corners,)
+        Derivatives of the rudder that are continuous there: 0 where the rate jumps, 1 otherwise.
+    """
+
+    t: Floats
+    delta: Floats
+    rate: float
+    time_constant: float
+    follows_gear: bool
+    before: Floats
+    after: Floats
+    switch: Floats
+    corners: Floats
+    smoothness: NDArray[np.int64]
+
+    def __call__(self, times: ArrayLike) -> Floats:
+        """Rudder angle, rad, at times within the samples."""
+        times = np.asarray(times, dtype=float)
+        if not self.follows_gear:
+            between: Floats = np.interp(times, self.t, self.delta)
+            return between
+        k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
+        elapsed = times - self.t[k]
+        gear = (self.rate, self.time_constant)
+        first = np.minimum(elapsed, self.switch[k])
+        middle = _flow(self.delta[k], self.before[k], first, *gear)
+        return _flow(middle, self.after[k], elapsed - first, *gear)
+
+
+def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) -> Rudder:
+    """Rebuild the rudder between samples.
+
+    Parameters
+    ----------
+    t, delta : array-like of shape (n_samples,)
+        s and rad.
+    gear : SteeringGear, optional
+        Tried first; a gear estimated from the samples takes its place where it explains them better.
+
+    Returns
+    -------
+    Rudder
+    """
+    t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
+    candidates = [estimate_gear(t, delta)]
+    if gear is not None:
+        candidates.insert(0, (gear.rate, gear.time_constant))
+    shares = [_explained(t, delta, *candidate) for candidate in candidates]
+    rate, lag = candidates[int(np.argmax(shares))]
+    if max(shares) >= EXPLAINED:
+        rudder = _with_gear(t, delta, rate, lag)
+        ends = _flow(rudder.delta[:-1], rudder.before, rudder.switch, rate, lag)
+        ends = _flow(ends, rudder.after, np.diff(t) - rudder.switch, rate, lag)
+        reproduced = np.all(np.abs(ends - delta[1:]) <= TOLERANCE * np.ptp(delta))
+        if reproduced and FEWEST_SAMPLES * np.sum(rudder.smoothness == 0) <= len(t):
+            return rudder
+    return straight(t, delta)
+
+
+def straight(t: Floats, delta: Floats) -> Rudder:
+    """The rudder taken straight between its samples, for records with noise."""
+    none = np.zeros(0)
+    return Rudder(t, delta, 0.0, 0.0, False, none, none, none, none, none.astype(np.int64))
+
+
+def estimate_gear(t: Floats, delta: Floats) -> tuple[float, float]:
+    """Rate and time constant of a gear from exact samples of its rudder.
+
+    The rate is the largest that occurs; the time constant the one for which the order is steadiest.
+
+    Parameters
+    ----------
+    t, delta : array of shape (n_samples,)
+        s and rad.
+
+    Returns
+    -------
+    rate : float
+        rad/s.
+    time_constant : float
+        s; 0 for a gear of constant rate.
+    """
+    steps = np.diff(t)
+    rates = np.abs(np.diff(delta)) / steps
+    fastest = float(rates.max())
+    if fastest == 0.0:
+        return 0.0, 0.0
+    rate = float(np.median(rates[rates >= (1.0 - RAMP) * fastest]))
+    tolerance = TOLERANCE * np.ptp(delta)
+
+    def unsteadiness(lag: float) -> float:
+        orders = _orders(t, delta, rate, lag)
+        both = np.isfinite(orders[1:]) & np.isfinite(orders[:-1])
+        jumps = np.abs(np.where(both, orders[1:], 0.0) - np.where(both, orders[:-1], 0.0))
+        return float(np.minimum(jumps, 10 * tolerance).sum())
+
+    lags = np.geomspace(0.1, 20.0, 48) * float(np.median(steps))
+    scores = np.array([unsteadiness(lag) for lag in lags])
+    best = int(np.argmin(scores))
+    low, high = float(lags[max(best - 1, 0)]), float(lags[min(best + 1, len(lags) - 1)])
+    refined = minimize_scalar(
+        unsteadiness, bounds=(low, high), method="bounded", options={"xatol": 1e-10 * high}
+    )
+    return rate, 0.0 if unsteadiness(0.0) <= 1.01 * refined.fun else float(refined.x)
+
+
+def _flow(start: Any, order: Any, elapsed: Any, rate: float, lag: float) -> Floats:
+    """Rudder of a gear a time after `start` under one order (infinite: still ramping)."""
+    distance = np.abs(order - start)
+    side = np.sign(order - start)
+    tail = np.minimum(distance, rate * lag)  # what is left when the lag takes over from the ramp
+    ramping = np.minimum(elapsed, (distance - tail) / rate)
+    decay = np.exp(-(elapsed - ramping) / lag) if lag > 0.0 else 1.0
+    moved = rate * ramping + np.where(ramping < elapsed, tail * (1.0 - decay), 0.0)
+    flow: Floats = start + side * moved
+    return flow
+
+
+def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
+    """The single order that explains each interval; infinite where the rudder ramps all the way."""
+    steps, move = np.diff(t), np.diff(delta)
+    size, side = np.abs(move), np.sign(move)
+    if lag == 0.0:
+        distance = size
+    else:
+        distance = size / -np.expm1(-steps / lag)
+        low, high = np.zeros_like(steps), steps.copy()
+        for _ in range(BISECTIONS if np.any(distance > rate * lag) else 0):
+            ramping = 0.5 * (low + high)
+            short = rate * (ramping - lag * np.expm1(-(steps - ramping) / lag)) < size
+            low, high = np.where(short, ramping, low), np.where(short, high, ramping)
+        distance = np.where(distance > rate * lag, rate * (0.5 * (low + high) + lag), distance)
+    ramps = size >= (1.0 - RAMP) * rate * steps
+    return np.where(ramps, np.copysign(np.inf, move), delta[:-1] + side * distance)
+
+
+def _continues(orders: Floats, delta: Floats, tolerance: float) -> Flags:
+    """Whether each interval but the first can be under the order of the one before it."""
+    before, now, at = orders[:-1], orders[1:], delta[1:-1]
+    ramped, ramps = np.isinf(before), np.isinf(now)
+    same = np.abs(np.where(ramps, 0.0, now) - np.where(ramped, 0.0, before)) <= tolerance
+    ahead = np.where(ramps, np.sign(now), np.sign(np.where(ramps, 0.0, now) - at)) * np.sign(before)
+    flags: Flags = np.where(ramped, np.where(ramps, now == before, ahead >= 0), ~ramps & same)
+    return flags
+
+
+def _explained(t: Floats, delta: Floats, rate: float, lag: float) -> float:
+    """Share of the intervals that go on under the order before them."""
+    if rate == 0.0 or len(t) < 4:
+        return 0.0
+    return float(np.mean(_continues(_orders(t, delta, rate, lag), delta, TOLERANCE * np.ptp(delta))))
+
+
+def _with_gear(t: Floats, delta: Floats, rate: float, lag: float) -> Rudder:
+    steps = np.diff(t)
+    orders = _orders(t, delta, rate, lag)
+    follows = np.concatenate([[True], _continues(orders, delta, TOLERANCE * np.ptp(delta)), [True]])
+    before, after, switch = orders.copy(), orders.copy(), steps.copy()
+    corners: list[tuple[float, int]] = []
+    for k in np.flatnonzero(~follows[:-1]).tolist():
+        if follows[k + 1] and not np.isinf(orders[k]):
+            corners.append((float(t[k]), 0))  # the order changed on the sample
+            continue
+        if not follows[k - 1] and k > 1:
+            continue  # the end of a change inside the interval before
+        nxt = orders[min(k + 1, len(orders) - 1)]
+        time = _switch_time(delta[k], delta[k + 1], orders[k - 1], nxt, steps[k], rate, lag)
+        if time is None:
+            corners.append((float(t[k]), 0))
+            continue
+        before[k], after[k], switch[k] = orders[k - 1], nxt, time
+        corners.append((float(t[k] + time), 0))
+    corners += _ramp_ends(t, delta, before, after, switch, rate, lag)
+    corners = [corner for corner in sorted(corners) if t[0] < corner[0] < t[-1]]
+    times = np.array([time for time, _ in corners])
+    smoothness = np.array([order for _, order in corners], dtype=np.int64)
+    return Rudder(t, delta, rate, lag, True, before, after, switch, times, smoothness)
+
+
+def _switch_time(
+    start: float, end: float, first: float, second: float, step: float, rate: float, lag: float
+) -> float | None:
+    """Time at which one order has to be replaced by another to go from start to end; None if never."""
+
+    def miss(time: float) -> float:
+        return float(_flow(_flow(start, first, time, rate, lag), second, step - time, rate, lag)) - end
+
+    low, high = 0.0, step
+    at_low, at_high = miss(low), miss(high)
+    if at_low * at_high > 0.0:
+        return None
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        if miss(middle) * at_low > 0.0:
+            low = middle
+        else:
+            high = middle
+    return 0.5 * (low + high)
+
+
+def _ramp_ends(
+    t: Floats, delta: Floats, before: Floats, after: Floats, switch: Floats, rate: float, lag: float
+) -> list[tuple[float, int]]:
+    """Times at which a ramp ends inside an interval, with the smoothness there."""
+    middle = _flow(delta[:-1], before, switch, rate, lag)
+    ends: list[tuple[float, int]] = []
+    for start, order, begin, length in (
+        (delta[:-1], before, t[:-1], switch),
+        (middle, after, t[:-1] + switch, np.diff(t) - switch),
+    ):
+        ramp = (np.abs(order - start) - rate * lag) / rate
+        inside = (ramp > 1e-9) & (ramp < length)
+        ends += [(float(time), int(lag > 0.0)) for time in (begin + ramp)[inside]]
+    return ends

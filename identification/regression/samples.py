@@ -1,0 +1,344 @@
+"""From sampled trials to a regression: the Euler, integral and spline sample structures.
+
+For accelerations that are linear in unknown parameters, xdot = P(x, rudder) theta, each row says
+x(t_k+w) - x(t_k) = (integral of P over the window) theta. Euler takes P at the start of each step (ESSI of
+Cao 2015), the integral structure the trapezoid rule (ISSI of Cao 2015), the spline structure Gauss
+quadrature on splines through the samples, broken where the rudder has corners.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+from scipy.ndimage import median_filter
+
+from identification.regression import preprocess
+from identification.regression.memory import eliminated, twice_integrated
+from identification.regression.rudder import Rudder, rebuild, straight
+from shipgym.checks import check_choice, check_whole
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import Structure
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Channels = Mapping[str, Floats]
+
+SAMPLE_STRUCTURES = ("euler", "integral", "spline")
+DEGREE = 3
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
+LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
+SHORTEST_GAP = 0.15  # unless it is shorter than this part of the time to sail one ship length
+NEIGHBOURS = 11  # steps that tell which is usual
+FEWEST_SAMPLES = 10  # between gaps; fewer are left out
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """A regression for each equation of motion, all with the same rows.
+
+    Attributes
+    ----------
+    features : dict of str to array of shape (n_rows, n_terms)
+        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
+    targets : dict of str to array of shape (n_rows,)
+        Change of the velocity over the window.
+    start : array of shape (n_rows,)
+        Time at which the window begins, s.
+    duration : array of shape (n_rows,)
+        Length of the window, s.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    window : int
+        Steps per window of the longest-windowed trial.
+    """
+
+    features: dict[str, Floats]
+    targets: dict[str, Floats]
+    start: Floats
+    duration: Floats
+    trial: NDArray[np.int64]
+    window: int
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+def build_samples(
+    trials: Sequence[Trial],
+    structure: Structure,
+    particulars: Particulars,
+    samples: str = "spline",
+    window: int | None = None,
+    gear: SteeringGear | None = None,
+    smooth: bool | str = True,
+    shaft_speed: float = 0.0,
+) -> Samples:
+    """Stack the regressions of all trials.
+
+    A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
+    a gap.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the channels the structure requires; their time steps may differ.
+    structure : Structure
+        Gives the terms.
+    particulars : Particulars
+        Length and service speed.
+    samples : {"euler", "integral", "spline"}
+        Sample structure.
+    window : int, optional
+        Sampling steps per row; windows overlap by half. By default 1 for data without noise, and as many
+        as the noise asks for otherwise, up to a third of the time to sail one ship length.
+    gear : SteeringGear, optional
+        Helps to rebuild the rudder between samples (spline only).
+    smooth : bool or str
+        Whether channels with noise are smoothed before the terms are formed; by smoothing splines, or as
+        named (`preprocess.PREPROCESSING`).
+    shaft_speed : float
+        At service speed, 1/s, for terms that refer to it.
+
+    Returns
+    -------
+    Samples
+
+    Raises
+    ------
+    InputError
+        For a window or sample structure that does not exist, and for a trial of which gaps leave nothing.
+    """
+    if samples not in SAMPLE_STRUCTURES:
+        raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
+    if window is not None:
+        check_whole(window, "window", at_least=1, hint="in sampling steps")
+    preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
+    check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
+    parts = []
+    for index, trial in enumerate(trials):
+        if window is not None and window >= len(trial):
+            raise InputError(
+                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
+                f"{window} steps; give a smaller window"
+            )
+
+        def terms(equation: str, channels: Channels) -> Floats:
+            return structure.features(equation, channels, particulars, shaft_speed)
+
+        pieces = between_gaps(trial, particulars, FEWEST_SAMPLES if window is None else window + 1)
+        steps = default_window(max(pieces, key=len), particulars) if window is None else window
+        parts += [
+            _one_trial(piece, index, structure, terms, samples, steps, gear, preprocessing)
+            for piece in pieces
+            if len(piece) > steps
+        ]
+    return Samples(
+        {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
+        {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.duration for part in parts]),
+        np.concatenate([part.trial for part in parts]),
+        max(part.window for part in parts),
+    )
+
+
+def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
+    """Cut a trial where samples are missing.
+
+    A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
+    0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
+    the regression is longer than a quarter of it.
+
+    Parameters
+    ----------
+    trial : Trial
+        The record.
+    particulars : Particulars
+        Length and service speed.
+    fewest : int
+        Shorter pieces, and those of fewer than 10 samples, are left out.
+
+    Returns
+    -------
+    list of Trial
+        The trial itself if it has no gap.
+
+    Raises
+    ------
+    InputError
+        Where no piece is left.
+    """
+    steps = np.diff(trial.t)
+    usual = np.maximum(np.median(steps), median_filter(steps, NEIGHBOURS, mode="mirror"))
+    shortest = SHORTEST_GAP * particulars["length"] / particulars["speed"]
+    gaps = np.flatnonzero(steps > (1.0 + 1e-6) * np.maximum(LARGEST_STEPS * usual, shortest)) + 1
+    if not gaps.size:
+        return [trial]
+    fewest = max(fewest, FEWEST_SAMPLES)
+    edges = [0, *gaps.tolist(), len(trial)]
+    rows = [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]
+    if not rows:
+        longest = int(np.argmax(steps))
+        raise InputError(
+            f"trial {trial.name!r}: {gaps.size} gaps in time found (the longest from {trial.t[longest]:g} to "
+            f"{trial.t[longest + 1]:g} s) and nowhere {fewest} samples between them, expected longer "
+            'stretches without a gap; export it with every sample, or leave it out (use = "skip")'
+        )
+    return [
+        Trial(trial.t[piece], {c: v[piece] for c, v in trial.channels.items()}, name=trial.name)
+        for piece in rows
+    ]
+
+
+def default_window(trial: Trial, particulars: Particulars) -> int:
+    """Sampling steps over which a trial's velocities change by much more than their noise.
+
+    Parameters
+    ----------
+    trial : Trial
+        With u, v, r.
+    particulars : Particulars
+        Length and service speed.
+
+    Returns
+    -------
+    int
+        1 without noise; at most a third of the time to sail one ship length.
+    """
+    step = float(np.median(np.diff(trial.t)))
+    longest = max(int(LONGEST_WINDOW * particulars["length"] / particulars["speed"] / step), 1)
+    longest = min(longest, max(len(trial) // 20, 1))
+    needed = 1
+    for channel in "uvr":
+        ratio = preprocess.noise_ratio(trial.t, trial[channel])
+        while ratio > preprocess.NOISY and needed < longest:
+            needed += 1
+            ratio = preprocess.noise_ratio(trial.t, trial[channel], needed)
+    return needed
+
+
+def _one_trial(
+    trial: Trial,
+    index: int,
+    structure: Structure,
+    terms: Callable[[str, Channels], Floats],
+    samples: str,
+    window: int,
+    gear: SteeringGear | None,
+    preprocessing: str,
+) -> Samples:
+    t = trial.t
+    channels = preprocess.smoothed_channels(trial, structure.required_channels, preprocessing)
+    if samples == "spline":
+        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
+        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)
+        integrals, moments = _spline_integrals(t, channels, structure, terms, rudder)
+    else:
+        integrals, moments = {}, {}
+        for q in structure.equations:
+            values = terms(q, channels)
+            mean = values[:-1] if samples == "euler" else 0.5 * (values[:-1] + values[1:])
+            integrals[q] = mean * np.diff(t)[:, None]
+            moments[q] = 0.5 * integrals[q] * np.diff(t)[:, None]
+    if "q" in integrals:
+        memory = twice_integrated(t, integrals.pop("q"), moments["q"])
+        integrals["r"] = np.hstack([integrals["r"], memory])
+    first = np.arange(0, len(t) - window, max(window // 2, 1))
+    last = first + window
+    features, targets = {}, {}
+    for q, steps in integrals.items():
+        summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+        features[q] = steps if window == 1 else summed[last] - summed[first]
+        targets[q] = channels[q][last] - channels[q][first]
+    part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+    return eliminated(part) if "q" in structure.equations else part
+
+
+def _spline_integrals(
+    t: Floats,
+    channels: Channels,
+    structure: Structure,
+    terms: Callable[[str, Channels], Floats],
+    rudder: Rudder,
+) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Integral of the terms over each sampling step, arrays of shape (n_samples - 1, n_terms).
+
+    And their first moments about the end of the step.
+    """
+    edges = np.union1d(t, rudder.corners)
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    times = middle[:, None] + half[:, None] * NODES
+    at_nodes: dict[str, Floats] = {}
+    for name, values in channels.items():
+        at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
+    step = np.searchsorted(t, middle, side="right") - 1
+    starts = np.flatnonzero(np.diff(step, prepend=-1))
+    weights = half[:, None] * WEIGHTS
+    to_end = t[step + 1][:, None] - times
+    integrals, moments = {}, {}
+    for q in structure.equations:
+        values = terms(q, at_nodes).reshape(*times.shape, -1)
+        integrals[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights), starts, axis=0)
+        moments[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights * to_end), starts, axis=0)
+    return integrals, moments
+
+
+def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:
+    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
+    if name == "delta":
+        return rudder
+    if name == "n":
+        return lambda times: np.interp(times, t, values)
+    return broken_spline(t, values, rudder)
+
+
+def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
+    """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
+
+    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the
+    acceleration of the rudder jumps, the third does.
+
+    Parameters
+    ----------
+    t, values : array of shape (n_samples,)
+        s and the unit of the channel.
+    rudder : Rudder
+        With the corners.
+
+    Returns
+    -------
+    BSpline
+    """
+    if len(t) <= DEGREE:
+        return make_interp_spline(t, values, k=1)
+    interior = list(range(2, len(t) - 2))  # not-a-knot ends
+    broken: list[float] = []
+    for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
+        multiplicity = DEGREE - 1 - int(smoothness)
+        nearest = sorted(interior, key=lambda i: abs(t[i] - corner))[:multiplicity]
+        after = int(np.searchsorted(t, corner))
+        if any(abs(i - after) > 2 for i in nearest) or len(nearest) < multiplicity:
+            continue  # too close to another corner or to an end
+        kept = [i for i in interior if i not in nearest]
+        if _solvable(t, _knots(t, kept, [*broken, *[corner] * multiplicity])):
+            interior, broken = kept, [*broken, *[corner] * multiplicity]
+    return make_interp_spline(t, values, k=DEGREE, t=_knots(t, interior, broken))
+
+
+def _knots(t: Floats, interior: Sequence[int], broken: Sequence[float]) -> Floats:
+    inner = np.sort(np.concatenate([t[list(interior)], np.asarray(broken, dtype=float)]))
+    return np.concatenate([np.repeat(t[0], DEGREE + 1), inner, np.repeat(t[-1], DEGREE + 1)])
+
+
+def _solvable(t: Floats, knots: Floats) -> bool:
+    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
+    inner = slice(1, len(t) - 1)
+    return bool(np.all((knots[: len(t)][inner] < t[inner]) & (t[inner] < knots[DEGREE + 1 :][inner])))

@@ -1,0 +1,104 @@
+"""Artificial bee colony."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.search.search import Objective, Recorder, SearchResult, check_bounds, check_count
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ArtificialBeeColony:
+    """Artificial bee colony (Karaboga 2005; Zhu 2018, section 5.3.3).
+
+    Employed bees move each food source along one dimension towards or away from another; onlookers do the
+    same to sources drawn by their fitness; a source that did not improve for too long is left and
+    drawn anew. All bees of a stage fly at once, from the same sources, so that the objective is
+    evaluated for a batch of candidates; of several onlookers at one source the best counts.
+
+    Parameters
+    ----------
+    sources : int
+        Food sources, and onlookers.
+    rounds : int
+        Of all three stages.
+    limit : int
+        Moves without improvement after which a source is left.
+    """
+
+    sources: int = 20
+    rounds: int = 30
+    limit: int = 20
+
+    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
+        """Minimise; see `Optimiser.minimise`."""
+        n = check_count(self.sources, 2, "sources")
+        check_count(self.rounds, 1, "rounds")
+        check_count(self.limit, 1, "limit")
+        low, high = check_bounds(bounds)
+        rng = np.random.default_rng(seed)
+        record = Recorder(objective)
+        sources = low + (high - low) * rng.random((n, len(low)))
+        values = record(sources)
+        record.end_round()
+        idle = np.zeros(n, dtype=np.int64)
+        everyone = np.arange(n)
+        for _ in range(self.rounds):
+            for bees in ("employed", "onlookers"):
+                if bees == "employed":
+                    chosen = everyone
+                else:
+                    chosen = np.searchsorted(_chances(values), rng.random(n), side="right")
+                moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)
+                _settle(sources, values, idle, chosen, moved, record(moved))
+            left = np.flatnonzero(idle > self.limit)
+            if left.size:
+                sources[left] = low + (high - low) * rng.random((left.size, len(low)))
+                values[left] = record(sources[left])
+                idle[left] = 0
+            record.end_round()
+        return record.result()
+
+
+def _moved(sources: Floats, chosen: NDArray[np.int64], rng: np.random.Generator) -> Floats:
+    """The chosen sources, each moved in one dimension: x + a (x - x of another), a in [-1, 1]."""
+    n, dimensions = sources.shape
+    draw = rng.random((3, len(chosen)))
+    other = (chosen + 1 + (draw[0] * (n - 1)).astype(np.int64)) % n
+    axis = (draw[1] * dimensions).astype(np.int64)
+    moved = sources[chosen]
+    away = sources[chosen, axis] - sources[other, axis]
+    moved[np.arange(len(chosen)), axis] += (2.0 * draw[2] - 1.0) * away
+    return moved
+
+
+def _chances(values: Floats) -> Floats:
+    """Cumulative chance of each source to be chosen, by its fitness."""
+    fitness = np.where(values >= 0.0, 1.0 / (1.0 + np.maximum(values, 0.0)), 1.0 - values)
+    chances = fitness.cumsum()
+    if not 0.0 < chances[-1] < np.inf:
+        chances = np.arange(1.0, len(values) + 1.0)
+    chances /= chances[-1]
+    return chances
+
+
+def _settle(
+    sources: Floats,
+    values: Floats,
+    idle: NDArray[np.int64],
+    chosen: NDArray[np.int64],
+    moved: Floats,
+    found: Floats,
+) -> None:
+    """Take the best move of each chosen source where it improves; count the tries of those that do not."""
+    idle += np.bincount(chosen, minlength=len(values))
+    better = np.flatnonzero(found < values[chosen])
+    better = better[np.argsort(-found[better], kind="stable")]  # of several at one source the best is last
+    improved = chosen[better]
+    sources[improved], values[improved] = moved[better], found[better]
+    idle[improved] = 0

@@ -1,0 +1,150 @@
+"""What a search for C minimises: the samples are read once, and a candidate costs the same for any number."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from identification.regression.decomposition import Decomposition, decompose_triangle, stacked, triangle
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorOfC:
+    """Mean squared error of the fits for each C, on the samples they were fitted to or on others.
+
+    Its arrays are as large as the triangles of the folds, whatever the number of samples.
+
+    Attributes
+    ----------
+    offset : array of shape (n_folds, 1, n_rows)
+        Error of the mean alone.
+    gain : array of shape (n_folds, n_directions, n_rows)
+        What each direction explains of it, by 1 / (s^2 + 1/C).
+    squares : array of shape (n_folds, 1, n_directions)
+        Squares of the singular values s.
+    n_samples : int
+        Samples that the errors belong to.
+    """
+
+    offset: Floats
+    gain: Floats
+    squares: Floats
+    n_samples: int
+
+    def __call__(self, log_c: Floats) -> Floats:
+        """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
+        error = self.offset - (1.0 / (self.squares + 10.0**-log_c)) @ self.gain
+        values: Floats = np.einsum("kij,kij->i", error, error) / self.n_samples
+        return values
+
+
+def training_error(
+    X: Floats, y: Floats, scale: bool | ArrayLike, fit_intercept: bool, weights: Floats | None = None
+) -> ErrorOfC:
+    """Error on the samples fitted (Zhu 2018, eq. 5.14), which falls monotonically with C.
+
+    Its minimum is the upper bound of C: use it to reproduce the paper, not to choose.
+    """
+    whole = triangle(X, y, fit_intercept, weights)
+    fit = decompose_triangle(whole, len(y), scale, fit_intercept)
+    return _errors([fit], [whole], len(y), fit_intercept)
+
+
+def held_out_error(
+    X: Floats,
+    y: Floats,
+    scale: bool | ArrayLike,
+    fit_intercept: bool,
+    blocks: NDArray[np.int64],
+    weights: Floats | None = None,
+) -> ErrorOfC:
+    """Error on each block of samples of the fit to all others.
+
+    Parameters
+    ----------
+    X, y, scale, fit_intercept, weights
+        As of `LSSVM` and `decomposition.triangle`.
+    blocks : array of shape (n_samples,)
+        Index of each sample's block, 0 to n_blocks - 1.
+
+    Returns
+    -------
+    ErrorOfC
+    """
+    rows = [blocks == k for k in range(int(blocks.max()) + 1)]
+    parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]
+    fits = [
+        decompose_triangle(
+            stacked([part for j, part in enumerate(parts) if j != k]),
+            len(y) - int(rows[k].sum()),
+            scale,
+            fit_intercept,
+        )
+        for k in range(len(rows))
+    ]
+    return _errors(fits, parts, len(y), fit_intercept)
+
+
+def _errors(
+    fits: Sequence[Decomposition], judged: Sequence[Floats], n_samples: int, fit_intercept: bool
+) -> ErrorOfC:
+    """Errors of fits on the samples of which the triangles are given."""
+    first = int(fit_intercept)
+    rows, n_features = len(judged[0]), len(judged[0]) - 1 - first
+    offset = np.empty((len(fits), 1, rows))
+    gain, squares = np.zeros((len(fits), n_features, rows)), np.zeros((len(fits), 1, n_features))
+    for k, (fit, R) in enumerate(zip(fits, judged, strict=True)):
+        features, target = R[:, first:-1], R[:, -1]
+        if fit_intercept:
+            features = features - R[:, :1] * fit.centre
+            target = target - R[:, 0] * fit.mean
+        kept = fit.numerical_rank
+        offset[k, 0] = target
+        squares[k, 0, :kept] = fit.singular_values[:kept] ** 2
+        explained = features @ (fit.directions[:kept] / fit.scale).T
+        gain[k, :kept] = (explained * (fit.projections * fit.singular_values)[:kept]).T
+    return ErrorOfC(offset, gain, squares, n_samples)
+
+
+def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> NDArray[np.int64]:
+    """Blocks of samples that follow each other, never shuffled: neighbours in time are alike.
+
+    Parameters
+    ----------
+    n_samples : int
+        In the order of time, one trial after the other.
+    folds : int or "trials"
+        Number of blocks, equally long but for one sample; "trials" makes a block of each trial.
+    groups : array-like of shape (n_samples,), optional
+        Trial of each sample; needed for folds="trials".
+
+    Returns
+    -------
+    array of shape (n_samples,)
+        Index of the block of each sample.
+
+    Raises
+    ------
+    InputError
+        For fewer than 2 blocks, and for more blocks than samples.
+    """
+    if folds == "trials":
+        found = np.zeros(0) if groups is None else np.unique(np.asarray(groups))
+        if len(found) < 2:
+            raise InputError(
+                f"folds: 'trials' found with {len(found)} trials, expected at least 2 to hold one out; "
+                "give a number of blocks, such as folds=5"
+            )
+        return np.searchsorted(found, np.asarray(groups)).astype(np.int64)
+    if isinstance(folds, bool) or not isinstance(folds, int | np.integer) or not 2 <= folds <= n_samples:
+        raise InputError(
+            f"folds: {folds!r} found, expected an integer from 2 to the number of samples ({n_samples}), "
+            "or 'trials'"
+        )
+    return (np.arange(n_samples) * int(folds)) // n_samples

@@ -1,0 +1,1 @@
+"""Refinement of a model by what it simulates, and priors."""

@@ -1,0 +1,155 @@
+"""Linear hydrodynamic derivatives from main dimensions, for ships of which nothing was measured.
+
+Sources: Clarke, Gedling & Hine 1983, The application of manoeuvring criteria in hull design using linear
+theory, Transactions of RINA 125 (hull and rudder); Kijima, Katsuno, Nakiri & Furukawa 1990, On the
+manoeuvring performance of a ship with the parameter of loading condition, J. Soc. Naval Architects of
+Japan 168 (hull). Both about midship, even keel, prime system by rho L^2 U^2 / 2 and rho L^3 U^2 / 2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.term_table import Structure, inertia
+from shipgym.ships.terms import Term
+
+Floats = NDArray[np.float64]
+
+LINEAR_SYMBOLS = ("v", "r", "delta")
+
+
+def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
+    """Sway force and yaw moment by sway speed, yaw rate and rudder, Clarke et al. 1983.
+
+    Parameters
+    ----------
+    particulars : Particulars
+        With beam, draught, block coefficient and rudder area.
+
+    Returns
+    -------
+    dict of str to float
+        Y_v, Y_r, Y_delta, N_v, N_r, N_delta of the hydrodynamic forces alone, without the ship's own inertia;
+        rudder positive to starboard.
+    """
+    slender, flat, full, shallow = _proportions(particulars)
+    scale = -math.pi * shallow**2
+    return {
+        "Y_v": scale * (1.0 + 0.40 * full * flat),
+        "Y_r": scale * (-0.5 + 2.2 * slender - 0.080 * flat),
+        "N_v": scale * (0.5 + 2.4 * shallow),
+        "N_r": scale * (0.25 + 0.039 * flat - 0.56 * slender),
+        **_rudder(particulars),
+    }
+
+
+def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
+    """Sway force and yaw moment by sway speed and yaw rate, Kijima et al. 1990; the rudder by Clarke.
+
+    Parameters and returns as in `clarke_derivatives`. Kijima's beta is -v/U, and his Y_r comes less the
+    mass and added mass in surge, which is added here.
+    """
+    p = particulars
+    slender, _, full, shallow = _proportions(p)
+    k = 2.0 * shallow
+    by_length = shallow  # from rho L T U^2 / 2 to rho L^2 U^2 / 2
+    return {
+        "Y_v": -by_length * (0.5 * math.pi * k + 1.4 * full * slender),
+        "Y_r": -by_length * 1.5 * full * slender + p.mass_prime - p.require("X_udot"),
+        "N_v": -by_length * k,
+        "N_r": by_length * (k**2 - 0.54 * k),
+        **_rudder(p),
+    }
+
+
+def _proportions(p: Particulars) -> tuple[float, float, float, float]:
+    """Beam by length, beam by draught, block coefficient and draught by length."""
+    B, T, block = p.require("beam"), p.require("draught"), p.require("block_coefficient")
+    return B / p.length, B / T, block, T / p.length
+
+
+def _rudder(p: Particulars) -> dict[str, float]:
+    """Clarke et al. 1983: Y_delta of 3 A / L^2 half a length aft; starboard moves the stern to port."""
+    Y = -3.0 * p.require("rudder_area") / p.length**2
+    return {"Y_delta": Y, "N_delta": -0.5 * Y}
+
+
+FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
+    "clarke": clarke_derivatives,
+    "kijima": kijima_derivatives,
+}
+
+
+def formula_coefficients(
+    formula: str, structure: Structure, particulars: Particulars
+) -> dict[str, tuple[Floats, NDArray[np.bool_]]]:
+    """Coefficients of the SI features of a structure, as far as formulas give them.
+
+    Parameters
+    ----------
+    formula : {"clarke", "kijima"}
+        Which.
+    structure : Structure
+        With sway and yaw, and terms in v, r and delta alone, or times powers of the speed.
+    particulars : Particulars
+        Mass and added mass are estimated where absent.
+
+    Returns
+    -------
+    dict of str to (array of shape (n_terms,), array of bool of shape (n_terms,))
+        For each equation the coefficients, and which of them the formulas give; the others are zero.
+
+    Raises
+    ------
+    InputError
+        For a structure that the formulas tell nothing of, and for particulars that do not suffice.
+    """
+    ship = particulars.completed()
+    found = {q: [_linear_symbol(term) for term in terms] for q, terms in structure.equations.items()}
+    lacking = [q for q in ("v", "r") if not set(LINEAR_SYMBOLS) <= set(found.get(q, ()))]
+    if lacking:
+        raise InputError(
+            f"prior: {formula!r} found with structure {structure.name!r}, for which the formulas give no "
+            "coefficients: they are those of the terms v, r and delta in sway and yaw; choose another "
+            "structure, such as 'abkowitz' or 'steering7', or a reference ship as prior"
+        )
+    rates = dict(zip(LINEAR_SYMBOLS, _accelerations(FORMULAS[formula](ship), ship).T, strict=True))
+    speed, length = ship.require("speed"), ship.length
+    coefficients = {}
+    for q, terms in structure.equations.items():
+        values, known = np.zeros(len(terms)), np.zeros(len(terms), dtype=bool)
+        for i, (term, symbol) in enumerate(zip(terms, found[q], strict=True)):
+            if q == "u" or symbol is None:
+                continue
+            # acceleration = rate * (v/U, r L/U or delta) * U^2/L, yaw by another L; whatever power of U the
+            # feature lacks is that of service speed
+            speeds = {"v": 1, "r": 1, "delta": 2}[symbol]
+            lengths = {"v": -1, "r": 0, "delta": -1}[symbol] - (1 if q == "r" else 0)
+            carried = structure.speed_power(q, term) + sum(p for s, p in term.powers if s in ("U", "u"))
+            rate = rates[symbol][0 if q == "v" else 1]
+            values[i] = rate * speed ** float(speeds - carried) * length ** float(lengths)
+            known[i] = True
+        coefficients[q] = (values, known)
+    return coefficients
+
+
+def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
+    """Sway and yaw acceleration by v, r and delta, prime system, shape (2, 3)."""
+    forces = np.array([[derivatives[f"{force}_{s}"] for s in LINEAR_SYMBOLS] for force in "YN"])
+    forces[:, 1] -= [ship.mass_prime, ship.mass_prime * ship.xg_prime]  # turning with the body's axes
+    accelerations: Floats = np.linalg.solve(inertia(ship)[1:, 1:], forces)
+    return accelerations
+
+
+def _linear_symbol(term: Term) -> str | None:
+    """The one of v, r and delta that a term is, times powers of the surge speed; None for other terms."""
+    others = [(symbol, power) for symbol, power in term.powers if symbol not in ("u", "U")]
+    if len(others) == 1 and others[0][0] in LINEAR_SYMBOLS and others[0][1] == 1:
+        return others[0][0]
+    return None

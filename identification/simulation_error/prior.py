@@ -1,0 +1,363 @@
+"""Coefficients pulled toward what is known of similar ships: what holds in short trials and hard turns.
+
+Generalised ridge regression: |y - X w|^2 + (w - w0)' S (w - w0) is made small by fitting w - w0 to the
+samples and to the root of S as further samples (Hoerl & Kennard 1970; Tikhonov 1963).
+
+Two kinds of prior. A reference ship: w0 is what the structure gives on its virtual trials at the target's
+scale, and S is the moment of those trials' features, so that this is the same as mixing samples of a
+reference ship's zigzags and turns into the regression. Formulas (Clarke 1983, Kijima 1990): w0 is theirs,
+and S is diagonal, each coefficient weighed by what its term contributes in a hard turn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimators.estimator import Machine
+from identification.estimators.lssvm import TruncatedLSSVM
+from identification.estimators.methods import FitTask, Machines, Method
+from identification.regression.samples import Samples, build_samples
+from identification.simulation_error.formulas import FORMULAS, formula_coefficients
+from identification.simulation_error.similarity import AUTO, select_reference
+from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
+from identification.validation.guard import hard_turn_features, reasons_unstable
+from identification.validation.guarded_fit import with_coefficients
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.ships import GreyBox, ShipModel, converted_model
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
+BLOCKS = 5  # of time, into which a single trial is cut
+#: Virtual trials of a reference ship: rudder and heading of zigzags, rudder of turns, degrees.
+ZIGZAGS = ((10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False))
+TURNS = (35.0, -35.0, 15.0, -15.0)
+LONG, STEP = 20.0, 0.05  # ship lengths at service speed
+
+
+@dataclass(frozen=True, eq=False)
+class Prior:
+    """What the coefficients of the SI features are pulled to.
+
+    Attributes
+    ----------
+    name : str
+        The reference ship, or whose formulas.
+    centre : dict of str to array of shape (n_terms,)
+        w0 of each equation.
+    roots : dict of str to array of shape (n_rows, n_terms)
+        Root of S per sample and second of window: S is strength^2 n_samples duration^2 root' root.
+    known : dict of str to array of bool of shape (n_terms,)
+        Which coefficients the prior tells; the others are free.
+    """
+
+    name: str
+    centre: dict[str, Floats]
+    roots: dict[str, Floats]
+    known: dict[str, NDArray[np.bool_]]
+
+
+def formula_prior(formula: str, blank: ShipModel) -> Prior:
+    """The prior of the formulas of Clarke 1983 or Kijima 1990; arguments as in `formula_coefficients`."""
+    ship, table = blank.particulars, blank.table
+    found = formula_coefficients(formula, table, ship)
+    sizes = hard_turn_features(table, ship, blank.service_shaft_speed)
+    return Prior(
+        formula,
+        {q: values for q, (values, _) in found.items()},
+        {q: np.diag(sizes[q])[known] for q, (_, known) in found.items()},
+        {q: known for q, (_, known) in found.items()},
+    )
+
+
+def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
+    """The prior of a reference ship: its virtual trials at the target's scale, in the target's structure.
+
+    Parameters
+    ----------
+    reference : str or ShipModel
+        A model, its name or file; "auto" for the shipped one most like the target.
+    blank : ShipModel
+        The target but for its coefficients.
+
+    Returns
+    -------
+    Prior
+
+    Raises
+    ------
+    InputError
+        For a reference that does not exist, or too little known to choose one.
+    """
+    ship, table = blank.particulars, blank.table
+    model = _at_target(reference, blank)
+    samples = build_samples(
+        virtual_trials(model), table, ship, smooth=False, gear=blank.steering, window=1,
+        shaft_speed=blank.service_shaft_speed,
+    )  # fmt: skip
+    centre, roots = {}, {}
+    for q, features in samples.features.items():
+        centre[q] = (
+            TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, samples.targets[q]).coef_
+        )
+        per_second = features / samples.duration[:, None] / np.sqrt(len(samples))
+        roots[q] = np.asarray(np.linalg.qr(per_second, mode="r"))
+    assert isinstance(model.table, GreyBox)
+    known = {q: np.ones(len(values), dtype=bool) for q, values in centre.items()}
+    return Prior(model.table.ship.name, centre, roots, known)
+
+
+def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
+    """A reference ship at the target's scale."""
+    ship = blank.particulars
+    if reference == AUTO:
+        reference, _ = select_reference(ship.completed())
+    return converted_model(reference, ship, blank.steering, blank.service_shaft_speed)
+
+
+def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
+    """A reference ship's turning circles at the target's scale; arguments as in `reference_prior`."""
+    turns = virtual_trials(_at_target(reference, blank))[len(ZIGZAGS) :]
+    return [Trial(t.t[::2], {c: v[::2] for c, v in t.channels.items()}, name=t.name) for t in turns]
+
+
+def virtual_trials(model: ShipModel) -> list[Trial]:
+    """Zigzags and turning circles to both sides, up to the rudder's limit.
+
+    Parameters
+    ----------
+    model : ShipModel
+
+    Returns
+    -------
+    list of Trial
+        With the channel n.
+    """
+    travel = model.particulars["length"] / model.particulars["speed"]
+    timing = {"duration": LONG * travel, "dt": STEP * travel}
+    limit = model.steering.rudder_limit_deg
+    runs = [zigzag(model, min(rudder, limit), heading, port, **timing) for rudder, heading, port in ZIGZAGS]
+    runs += [turning_circle(model, float(np.clip(rudder, -limit, limit)), **timing) for rudder in TURNS]
+    trials = []
+    for index, run in enumerate(runs):
+        channels = {name: run[name] for name in model.state_names}
+        channels["n"] = np.full(len(run), model.service_shaft_speed)
+        trials.append(Trial(run.t, channels, name=f"virtual-{index}"))
+    return trials
+
+
+def with_prior(
+    method: Method, prior: str | ShipModel, strength: float | None, blank: ShipModel, folds: str = TRIALS
+) -> Method:
+    """The method, with its coefficients pulled toward a prior.
+
+    The method fits what the prior leaves: where it drops a direction, the prior's coefficients stay.
+
+    Parameters
+    ----------
+    method : Method
+        As asked for.
+    prior : str or ShipModel
+        "auto", "clarke", "kijima", or a reference ship.
+    strength : float, optional
+        0 leaves the method as it is, infinity gives the prior; None chooses by cross-validation.
+    blank : ShipModel
+        The target but for its coefficients.
+    folds : {"trials", "largest-rudder"}
+        What the strength is chosen by (`choose_strength`).
+
+    Returns
+    -------
+    Method
+
+    Raises
+    ------
+    InputError
+        For a grey box, which has a reference ship, and for a prior that tells nothing of the structure.
+    """
+    if isinstance(blank.table, GreyBox):
+        raise InputError(
+            f"prior: {prior!r} found with structure 'grey-box', which has a reference ship already; leave "
+            "the prior out, or choose another structure"
+        )
+    if strength is not None and strength != np.inf:
+        check_number(
+            strength, "prior_strength", at_least=0.0, hint="0 for no prior, inf for the prior itself"
+        )
+    given = (
+        formula_prior(prior, blank)
+        if isinstance(prior, str) and prior in FORMULAS
+        else reference_prior(prior, blank)
+    )
+    return replace(
+        method, fit=partial(_fit, method, given, strength, check_choice(folds, FOLDS, "prior_folds"))
+    )
+
+
+def _fit(
+    method: Method,
+    prior: Prior,
+    strength: float | None,
+    folds: str,
+    make: Callable[[], Machine],
+    task: FitTask,
+) -> Machines:
+    report: dict[str, Any] = {"prior_source": prior.name}
+    if strength is None:
+        strength, scores = choose_strength(make, method, prior, task, folds)
+        report["prior_scores"] = scores
+        best, strength = strength, _steady_strength(make, method, prior, strength, task)
+        if strength > best:
+            report["prior_raised_from"] = best
+    machines = fit_toward(make, method, prior, strength, task)
+    report["prior_strength"] = None if np.isinf(strength) else strength  # JSON knows no infinity
+    for machine in machines.values():
+        machine.prior_ = report  # type: ignore[attr-defined]
+    return machines
+
+
+def _steady_strength(
+    make: Callable[[], Machine], method: Method, prior: Prior, least: float, task: FitTask
+) -> float:
+    """The least strength, from a given one on, with which the model does not run away; that one if none."""
+    for strength in STRENGTHS[STRENGTHS.index(least) :]:
+        machines = fit_toward(make, method, prior, strength, task)
+        if not reasons_unstable(with_coefficients(task.blank, machines), task.trials):
+            return float(strength)
+    return least
+
+
+def fit_toward(
+    make: Callable[[], Machine], method: Method, prior: Prior, strength: float, task: FitTask
+) -> Machines:
+    """Machines pulled toward a prior with a given strength.
+
+    Parameters
+    ----------
+    make : callable
+        Makes an unfitted machine.
+    method : Method
+        Fits them where there is no pull.
+    prior : Prior
+    strength : float
+        From 0, which is the method as it is, to infinity, which is the prior.
+    task : FitTask
+        With the regression.
+
+    Returns
+    -------
+    dict of str to Machine
+    """
+    if strength == 0.0:
+        return method.fit(make, task)
+    return {q: _toward(make(), task.samples, q, prior, strength) for q in task.samples.features}
+
+
+def _toward(machine: Machine, samples: Samples, q: str, prior: Prior, strength: float) -> Machine:
+    X, centre, known = samples.features[q], prior.centre[q], prior.known[q]
+    rest = samples.targets[q] - X @ centre
+    if np.isinf(strength):
+        return _held(machine, X, rest, centre, known)
+    pull = strength * np.sqrt(len(X)) * float(np.mean(samples.duration)) * prior.roots[q]
+    machine.fit(np.vstack([X, pull]), np.concatenate([rest, np.zeros(len(pull))]))
+    machine.coef_ = machine.coef_ + centre
+    if hasattr(machine, "weights_"):
+        machine.weights_ = machine.weights_[: len(X)]
+    return machine
+
+
+def _held(machine: Machine, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]) -> Machine:
+    """The prior's own coefficients; those it does not tell are fitted."""
+    free = np.flatnonzero(~known)
+    machine.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
+    coefficients, moment, covariance = centre.copy(), np.zeros((len(known),) * 2), np.zeros((len(known),) * 2)
+    if free.size:
+        coefficients[free] = machine.coef_
+        moment[np.ix_(free, free)] = machine.inverse_moment_
+        covariance[np.ix_(free, free)] = machine.covariance_
+    machine.coef_, machine.inverse_moment_, machine.covariance_ = coefficients, moment, covariance
+    machine.n_features_in_ = len(known)  # type: ignore[attr-defined]
+    return machine
+
+
+def choose_strength(
+    make: Callable[[], Machine], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
+) -> tuple[float, dict[str, float]]:
+    """The strongest pull that is as good as the best on samples held out.
+
+    Held out are the trials one by one, or blocks of time of a single trial, or each of those with the largest
+    rudder by a fit to all that have less. As good: within one standard error of the best (Breiman et al.
+    1984), because what the prior is for, hard turns, is in none of them.
+
+    Parameters
+    ----------
+    make, method, prior, task
+        As in `fit_toward`.
+    folds : {"trials", "largest-rudder"}
+        What is held out.
+
+    Returns
+    -------
+    strength : float
+    scores : dict of str to float
+        Mean square error held out, by that of no change at all, for each strength.
+    """
+    splits = list(_folds(task, folds))
+    errors = np.array([
+        [_error(fit_toward(make, method, prior, s, replace(task, samples=fit)), held) for fit, held in splits]
+        for s in STRENGTHS
+    ])  # fmt: skip
+    mean = errors.mean(axis=1)
+    best = int(np.argmin(mean))
+    excess = errors - errors[best]
+    spread = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
+    as_good = np.flatnonzero(excess.mean(axis=1) <= spread)
+    return float(STRENGTHS[int(as_good[-1])]), {
+        f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)
+    }
+
+
+def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:
+    """Samples to fit and samples held out."""
+    samples = task.samples
+    if folds == LARGEST_RUDDER:
+        largest = of_largest_rudder(task.trials, "prior_folds")
+        fit = _rows(samples, ~largest[samples.trial])
+        yield from ((fit, _rows(samples, samples.trial == held)) for held in np.flatnonzero(largest))
+        return
+    if samples.trial.max() > samples.trial.min():
+        groups = samples.trial
+    else:
+        groups = np.minimum(np.arange(len(samples)) * BLOCKS // len(samples), BLOCKS - 1)
+    for group in np.unique(groups):
+        yield _rows(samples, groups != group), _rows(samples, groups == group)
+
+
+def _rows(samples: Samples, rows: NDArray[np.bool_]) -> Samples:
+    return replace(
+        samples,
+        features={q: X[rows] for q, X in samples.features.items()},
+        targets={q: y[rows] for q, y in samples.targets.items()},
+        start=samples.start[rows],
+        duration=samples.duration[rows],
+        trial=samples.trial[rows],
+    )
+
+
+def _error(machines: Mapping[str, Machine], held: Samples) -> float:
+    """Mean over the equations of the square error by the square of the target."""
+    ratios = [
+        np.mean((held.targets[q] - held.features[q] @ machine.coef_) ** 2)
+        / max(float(np.mean(held.targets[q] ** 2)), np.finfo(float).tiny)
+        for q, machine in machines.items()
+    ]
+    return float(np.mean(ratios))

@@ -1,0 +1,388 @@
+"""Refinement: a model fitted to what it simulates, in segments, from where another method left off.
+
+Equation-error methods regress on noisy velocities, which biases them; here noise is only in what is
+compared. Whole trials would let a drift of heading leak into the coefficients, hence segments
+(multiple shooting, Bock 1983; the output-error method of Maine & Iliff 1985, NASA RP-1138).
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from identification.regression.samples import Samples
+from identification.simulation_error.prior import reference_turns
+from identification.simulation_error.segments import (
+    BLOCK,
+    Segment,
+    Shooter,
+    Shooting,
+    about_mean,
+    compared_channels,
+    cut,
+)
+from identification.uncertainty.covariance import newey_west
+from identification.validation.guard import reasons_unstable
+from identification.validation.guarded_fit import GuardedFit
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+STARTS = ("free", "measured")
+ROUNDS = 3  # of fits, between which scales of the residuals and starts of the segments are renewed
+OFFSET = np.radians(1.0)  # standard deviation of a rudder's offset, as far as is known beforehand
+STRONGER = 10.0  # times as strong is the prior while the refined model runs away,
+ATTEMPTS = 4  # so often at most
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """Settings of the refinement.
+
+    Attributes
+    ----------
+    segment_lengths : float
+        Length of a segment: the time to sail so many ship lengths at service speed.
+    staggered : bool
+        Whether a second set of segments begins half a segment later.
+    segment_start : {"free", "measured"}
+        Whether the state at the start of each segment is fitted with it, which leaves no bias by noise, or
+        is the smoothed measurement.
+    pull : float
+        Strength of the pull toward the start: relative cost of a coefficient whose term changes by the whole
+        acceleration (root mean squares over the trials).
+    rudder_offsets : bool
+        Whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
+        the mean of them: its own terms tell the neutral helm.
+    extra_trials : sequence of Trial
+        Further trials that the refinement alone sees, such as turns of a reference ship.
+    extra_weight : float
+        Of their squared residuals, relative to those of the trials.
+    anchor : str or ShipModel, optional
+        A reference ship whose turning circles, at the target's scale, join the extra trials: what holds the
+        steady turn, which lies outside all zigzags. "auto" for the shipped one most like the target.
+    anchor_weight : float
+        Of the squared residuals of those turns.
+    """
+
+    segment_lengths: float = 3.4
+    staggered: bool = True
+    segment_start: str = "free"
+    pull: float = 1e-6
+    rudder_offsets: bool = False
+    extra_trials: Sequence[Trial] = ()
+    extra_weight: float = 1.0
+    anchor: str | ShipModel | None = None
+    anchor_weight: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_number(self.segment_lengths, "segment_lengths", above=0.0, hint="in ship lengths")
+        check_choice(self.segment_start, STARTS, "segment_start")
+        check_number(self.pull, "pull", at_least=0.0)
+        check_number(self.extra_weight, "extra_weight", above=0.0)
+        check_number(self.anchor_weight, "anchor_weight", above=0.0)
+
+    def plain(self) -> dict[str, Any]:
+        """The settings for the provenance, extra trials by name and hash."""
+        extra = [{"name": trial.name, "sha256": trial.sha256} for trial in self.extra_trials]
+        names = [item.name for item in fields(self) if item.name not in ("extra_trials", "anchor")]
+        anchor = self.anchor.name if isinstance(self.anchor, ShipModel) else self.anchor
+        return {name: getattr(self, name) for name in names} | {"extra_trials": extra, "anchor": anchor}
+
+
+def split_settings(settings: Mapping[str, Any]) -> tuple[Refinement, dict[str, Any]]:
+    """The settings of the refinement, and those left for the machine it starts from."""
+    names = {item.name for item in fields(Refinement)}
+    own = {name: value for name, value in settings.items() if name in names}
+    return Refinement(**own), {name: value for name, value in settings.items() if name not in names}
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A refined fit.
+
+    Attributes
+    ----------
+    fit : GuardedFit
+        As the start, with the refined model.
+    covariance : array of shape (n_coefficients, n_coefficients) or None
+        Of the coefficients of the accelerations; None where the start stayed.
+    influences : list of array of shape (n_stretches, n_coefficients)
+        By trial: by how much stretches of time moved those coefficients, for the bootstrap.
+    report : dict
+        For the provenance: settings, cost before and after, scales, offsets, decision.
+    width : float
+        Of the stretches, s.
+    """
+
+    fit: GuardedFit
+    covariance: Floats | None
+    influences: list[Floats]
+    report: dict[str, Any]
+    width: float = 0.0
+
+
+def refine(
+    start: GuardedFit, samples: Samples, trials: Sequence[Trial], settings: Refinement, memory: float
+) -> Refined:
+    """Refine a fit by the errors of what its model simulates in segments of the trials.
+
+    Parameters
+    ----------
+    start : GuardedFit
+        The fit to start from.
+    samples : Samples
+        Its regression: tells how large the terms are in the trials.
+    trials : sequence of Trial
+        Those behind the samples.
+    settings : Refinement
+    memory : float
+        Time over which residuals are taken to be correlated, s.
+
+    Returns
+    -------
+    Refined
+        The start itself where its model runs away already, or the refined ones do under every prior.
+
+    Raises
+    ------
+    InputError
+        For extra trials that lack channels.
+    """
+    problem = _Problem(start, samples, trials, settings)
+    if not start.stable or not problem.finite():
+        return Refined(start, None, [], settings.plain() | {"decision": "not refined: the start runs away"})
+    rejected: list[dict[str, Any]] = []
+    prior = settings.pull
+    for _ in range(ATTEMPTS):
+        solution = problem.solve(prior)
+        model = problem.model(solution.parameters)
+        reasons = reasons_unstable(model, trials)
+        if not reasons:
+            fit = replace(start, model=model, machines=problem.machines(solution.parameters))
+            covariance, influences = problem.covariance(solution, prior, memory)
+            report = settings.plain() | problem.report(solution) | {"decision": "refined", "pull": prior}
+            report |= {"rejected": rejected} if rejected else {}
+            return Refined(
+                fit, covariance, influences, report, stretch(model, solution.segments[: problem.own])
+            )
+        rejected.append({"pull": prior, "reasons": reasons})
+        prior = max(prior * STRONGER, 1e-9)
+    report = settings.plain() | {"decision": "not refined: it runs away", "rejected": rejected}
+    return Refined(start, None, [], report)
+
+
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    parameters: Floats
+    segments: list[Segment]
+    scales: Floats
+    shooting: Shooting
+    costs: tuple[float, float]  # mean squared residual in the last round's scales, before and after
+    evaluations: int
+
+
+class _Problem:
+    """Segments, parameters and their prior of one refinement."""
+
+    def __init__(
+        self, start: GuardedFit, samples: Samples, trials: Sequence[Trial], settings: Refinement
+    ) -> None:
+        self.start, self.settings, self.trials = start, settings, trials
+        blank = start.model
+        if "q" in blank.table.equations:
+            raise InputError(
+                f"method 'output-error': structure {blank.structure!r} with a memory of yaw found,"
+                " whose state no trial records, expected one without; choose method 'tls-svm'"
+            )
+        self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
+        self.sizes = np.concatenate([_term_sizes(samples, q) for q in blank.table.equations])
+        turns = [] if settings.anchor is None else reference_turns(settings.anchor, blank)
+        channels = compared_channels(blank, [*trials, *settings.extra_trials])
+        for trial in settings.extra_trials:
+            missing = [c for c in blank.table.required_channels if c not in trial]
+            if missing:
+                raise InputError(
+                    f"extra trial {trial.name!r}: channel {missing[0]!r} is missing, expected "
+                    f"{', '.join(blank.table.required_channels)}"
+                )
+        lengths, staggered = settings.segment_lengths, settings.staggered
+        own = cut(trials, blank, channels, lengths, staggered)
+        self.own = len(own)
+        self.segments, count = own, len(trials)
+        for further, weight in (
+            (settings.extra_trials, settings.extra_weight),
+            (turns, settings.anchor_weight),
+        ):
+            extra = cut(further, blank, channels, lengths, staggered)
+            self.segments = self.segments + [
+                replace(segment, trial=count + segment.trial, weight=weight) for segment in extra
+            ]
+            count += len(further)
+        free, offsets = settings.segment_start == "free", settings.rudder_offsets
+        self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
+        values = np.concatenate([start.machines[q].coef_ for q in blank.table.equations])
+        self.first = np.concatenate([values / self.sizes, np.zeros(len(trials) if offsets else 0)])
+
+    def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
+        return self.shooter.shoot(parameters, segments, scales, len(self.trials))
+
+    def finite(self) -> bool:
+        """Whether the start sails all segments."""
+        self._first_scales()
+        return bool(np.all(np.isfinite(self.scales)))
+
+    def _first_scales(self) -> None:
+        shooting = self.shoot(self.first, self.segments, self.shooter.units)
+        self.scales = self._scales(shooting, self.shooter.units)
+
+    def _scales(self, shooting: Shooting, scales: Floats) -> Floats:
+        """Root mean square of the residuals of each channel in the trials, per sample."""
+        rows = shooting.rows[self.own - 1].stop
+        errors = shooting.residuals[:rows].reshape(-1, len(scales)) * scales
+        counts = np.concatenate(
+            [np.diff(s.blocks, append=len(s.measured)) for s in self.segments[: self.own]]
+        )
+        rms = np.sqrt(np.sum(errors**2, axis=0) / np.sum(counts))
+        floor = 1e-9 * self.shooter.units
+        return np.asarray(np.maximum(rms, floor))
+
+    def solve(self, prior: float) -> _Solution:
+        """Fit, renew scales and starts of the segments, and fit again."""
+        parameters, segments, scales = self.first, self.segments, self.scales
+        evaluations, before = 0, 0.0
+        for _ in range(ROUNDS):
+            weights = self._prior_weights(prior, segments)
+
+            @lru_cache(maxsize=2)
+            def shot(key: bytes, held: tuple[Any, ...] = (segments, scales)) -> Shooting:
+                return self.shoot(np.frombuffer(key), *held)
+
+            def residuals(z: Floats, held: Floats = weights, look: Any = shot) -> Floats:
+                pull = held * (z - self.first)
+                return np.concatenate([look(np.ascontiguousarray(z).tobytes()).residuals, pull])
+
+            def jacobian(z: Floats, held: Floats = weights, look: Any = shot) -> Floats:
+                return np.vstack([look(np.ascontiguousarray(z).tobytes()).jacobian, np.diag(held)])
+
+            before = self._mean_cost(self.shoot(self.first, segments, scales))
+            found = least_squares(
+                residuals,
+                parameters,
+                jacobian,
+                method="trf",
+                x_scale="jac",
+                ftol=1e-6,
+                xtol=1e-6,
+                max_nfev=30,
+            )
+            evaluations += found.nfev
+            parameters = found.x
+            shooting = shot(np.ascontiguousarray(parameters).tobytes())
+            last = (segments, scales)
+            segments = self.shooter.moved(segments, shooting.moves)
+            scales = self._scales(shooting, scales)
+        costs = (before, self._mean_cost(shooting))
+        return _Solution(parameters, last[0], last[1], shooting, costs, evaluations)
+
+    def _mean_cost(self, shooting: Shooting) -> float:
+        own = shooting.residuals[: shooting.rows[self.own - 1].stop]
+        return float(np.mean(own**2))
+
+    def _prior_weights(self, prior: float, segments: Sequence[Segment]) -> Floats:
+        rows = sum(segment.measured.size for segment in segments[: self.own])
+        weights = np.full(len(self.first), np.sqrt(prior * rows))
+        weights[len(self.sizes) :] = 1.0 / OFFSET
+        return weights
+
+    def model(self, parameters: Floats) -> ShipModel:
+        """The model of some parameters."""
+        names = self.start.model.table.coefficient_names
+        values = np.linalg.solve(self.matrix, parameters[: len(self.sizes)] * self.sizes)
+        coefficients = dict(zip(names, values.tolist(), strict=True))
+        return replace(self.start.model, coefficients=coefficients)
+
+    def machines(self, parameters: Floats) -> dict[str, Any]:
+        """Copies of the start's machines with the refined coefficients, for the diagnostics."""
+        machines, first = {}, 0
+        for q, machine in self.start.machines.items():
+            last = first + len(machine.coef_)
+            machines[q] = copy.copy(machine)
+            machines[q].coef_ = (parameters * np.resize(self.sizes, len(parameters)))[first:last]
+            first = last
+        return machines
+
+    def covariance(self, solution: _Solution, prior: float, memory: float) -> tuple[Floats, list[Floats]]:
+        """Sandwich covariance of the coefficients of the accelerations, and each stretch's influence.
+
+        Scores are added up over the samples of the same time, which the staggered set has twice, and over
+        time as by Newey & West 1987. Extra trials and the prior count as known.
+        """
+        shooting, n_terms = solution.shooting, len(self.sizes)
+        weights = self._prior_weights(prior, solution.segments)
+        jacobian = shooting.jacobian
+        inverse = np.linalg.pinv(jacobian.T @ jacobian + np.diag(weights**2), rcond=1e-14, hermitian=True)
+        segments = solution.segments[: self.own]
+        width = stretch(self.start.model, segments)
+        scores = _scores(shooting, segments, width)
+        rows = shooting.rows[self.own - 1].stop
+        times = 2.0 if self.settings.staggered else 1.0
+        used = float(np.einsum("ij,jk,ik->", jacobian[:rows], inverse, jacobian[:rows]))
+        used += sum(len(move) for move in shooting.moves[: self.own]) / times
+        factor = (rows / times) / max(rows / times - used, 1.0)
+        total = np.zeros_like(inverse)
+        for score in scores:
+            total += newey_west(score, round(memory / width))
+        cov = (factor * inverse @ total @ inverse)[:n_terms, :n_terms] * np.outer(self.sizes, self.sizes)
+        influences = [-np.sqrt(factor) * (score @ inverse)[:, :n_terms] * self.sizes for score in scores]
+        return 0.5 * (cov + cov.T), influences
+
+    def report(self, solution: _Solution) -> dict[str, Any]:
+        """For the provenance."""
+        names = [trial.name for trial in self.trials]
+        offsets = np.degrees(about_mean(solution.parameters[len(self.sizes) :])).tolist()
+        return {
+            "segments": self.own,
+            "cost_before": solution.costs[0],
+            "cost_after": solution.costs[1],
+            "evaluations": solution.evaluations,
+            "residual_rms": dict(zip(self.shooter.channels, solution.scales.tolist(), strict=True)),
+            "rudder_offsets_deg": dict(zip(names, offsets, strict=True)) if offsets else {},
+        }
+
+
+def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:
+    """Width of the bins of time in which residuals are added up, s: a block, or a sampling step."""
+    steps = [float(np.median(np.diff(s.times))) for s in segments if len(s.times) > 1]
+    return float(max(BLOCK * model.particulars["length"] / model.particulars["speed"], *steps, 0.0))
+
+
+def _term_sizes(samples: Samples, equation: str) -> Floats:
+    """Coefficients whose terms would make up the whole change of a velocity, shape (n_terms,)."""
+    whole = np.sqrt(np.mean(samples.targets[equation] ** 2))
+    terms = np.sqrt(np.mean(samples.features[equation] ** 2, axis=0))
+    return np.asarray(whole / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny)
+
+
+def _scores(shooting: Shooting, segments: Sequence[Segment], width: float) -> list[Floats]:
+    """Scores of each trial in bins of time, arrays of shape (n_bins, n_parameters)."""
+    size = shooting.jacobian.shape[1]
+    bins: dict[int, dict[int, Floats]] = {}
+    for segment, rows in zip(segments, shooting.rows, strict=False):
+        scores = shooting.jacobian[rows] * shooting.residuals[rows][:, None]
+        blocks = scores.reshape(len(segment.times), -1, size).sum(axis=1)
+        own = bins.setdefault(segment.trial, {})
+        for index, block in zip(np.floor(segment.times / width).astype(int).tolist(), blocks, strict=True):
+            own[index] = own.get(index, np.zeros(size)) + block
+    empty = np.zeros(size)
+    return [np.array([own.get(i, empty) for i in range(min(own), max(own) + 1)]) for own in bins.values()]

@@ -1,0 +1,329 @@
+"""Stretches of trials that a model sails from a start of their own: multiple shooting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.regression import preprocess
+from identification.regression.rudder import Rudder, rebuild, straight
+from identification.regression.samples import between_gaps
+from shipgym.kernels import layout
+from shipgym.ships import ShipModel
+from shipgym.ships.simulate import LONGEST_STEP
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+STEP = 1e-5  # of finite differences, of parameters that are about 1
+BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
+FEWEST_SAMPLES = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Segment:
+    """A stretch of a trial.
+
+    Attributes
+    ----------
+    trial : int
+        Index of the trial.
+    inputs : array of shape (n_points, 3)
+        Time, s, rudder, rad, and shaft speed, 1/s, on the grid of the integration.
+    samples : array of shape (n_points,)
+        Sample at each point of the grid, -1 for none.
+    measured : array of shape (n_samples, n_channels)
+        What is compared with.
+    blocks : array of shape (n_blocks,)
+        First sample of each block over which residuals are averaged.
+    times : array of shape (n_blocks,)
+        When the blocks begin, s.
+    start : array of shape (n_state,)
+        State of the kernels at the first sample.
+    weight : float
+        Of its squared residuals.
+    """
+
+    trial: int
+    inputs: Floats
+    samples: Integers
+    measured: Floats
+    blocks: Integers
+    times: Floats
+    start: Floats
+    weight: float = 1.0
+
+
+def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
+    """Channels whose residuals are minimised: velocities that the model has equations of, and heading."""
+    heading = "r" in model.table.equations and all("psi" in trial for trial in trials)
+    return tuple(model.table.equations) + (("psi",) if heading else ())
+
+
+def cut(
+    trials: Sequence[Trial],
+    model: ShipModel,
+    channels: Sequence[str],
+    lengths: float,
+    staggered: bool,
+    smooth: Callable[[Floats, Floats], Floats] = preprocess.smooth,
+) -> list[Segment]:
+    """Cut trials into segments, and again into a set that begins half a segment later.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        The records; a gap in time ends a segment.
+    model : ShipModel
+        Gives length, service speed and steering gear.
+    channels : sequence of str
+        To compare.
+    lengths : float
+        Of a segment: the time to sail so many ship lengths at service speed.
+    staggered : bool
+        Whether the second set is added.
+    smooth : callable
+        Of times and values: gives the state at the start of a segment.
+
+    Returns
+    -------
+    list of Segment
+    """
+    travel = model.particulars["length"] / model.particulars["speed"]
+    segments = []
+    for index, trial in enumerate(trials):
+        for piece in between_gaps(trial, model.particulars):
+            states, rudder = _states(piece, smooth), _rudder(piece, model)
+            for shift in (0.0, 0.5) if staggered else (0.0,):
+                edges = _edges(piece.t, lengths * travel, shift)
+                segments += [
+                    _segment(piece, index, rows, states, channels, rudder, travel)
+                    for rows in map(slice, edges[:-1], edges[1:] + 1)
+                ]
+    return segments
+
+
+def _edges(t: Floats, duration: float, shift: float) -> Integers:
+    """First samples of the segments, and the last sample; the last segment may be half as long again."""
+    count = max(round((t[-1] - t[0]) / duration - shift), 1)
+    times = t[0] + shift * duration + np.arange(count) * (t[-1] - t[0] - shift * duration) / count
+    edges = np.append(np.searchsorted(t, times), len(t) - 1)
+    apart = np.append(np.diff(edges) >= FEWEST_SAMPLES, True)
+    apart[0] = True
+    return np.asarray(edges[apart] if len(t) > FEWEST_SAMPLES else edges[[0, -1]])
+
+
+def _states(trial: Trial, smooth: Callable[[Floats, Floats], Floats]) -> Floats:
+    """States of the kernels along a trial, smoothed, shape (n_samples, n_state)."""
+    states = np.zeros((len(trial), layout.N_STATE))
+    for k, name in enumerate(layout.STATE_NAMES):
+        if name in trial and name not in ("x", "y"):
+            states[:, k] = trial[name] if name in ("delta", "n") else smooth(trial.t, trial[name])
+    return states
+
+
+def _rudder(trial: Trial, model: ShipModel) -> Rudder:
+    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in model.table.equations))
+    delta = trial["delta"]
+    return straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
+
+
+def _segment(
+    trial: Trial,
+    index: int,
+    rows: slice,
+    states: Floats,
+    channels: Sequence[str],
+    rudder: Rudder,
+    travel: float,
+) -> Segment:
+    t = trial.t[rows]
+    steps = np.maximum(np.ceil(np.diff(t) / (LONGEST_STEP * travel) - 1e-9), 1).astype(int)
+    parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], steps, strict=True)]
+    inside = rudder.corners[(rudder.corners > t[0]) & (rudder.corners < t[-1])]
+    times = np.union1d(np.concatenate([*parts, t[-1:]]), inside)
+    samples = np.full(len(times), -1)
+    samples[np.searchsorted(times, t)] = np.arange(len(t))
+    n = np.interp(times, trial.t, trial["n"]) if "n" in trial else np.zeros(len(times))
+    block = max(int(BLOCK * travel / np.median(np.diff(t))), 1)
+    first = np.arange(0, len(t), block)
+    return Segment(
+        trial=index,
+        inputs=np.column_stack([times, rudder(times), n]),
+        samples=samples,
+        measured=np.column_stack([trial[name][rows] for name in channels]),
+        blocks=first,
+        times=t[first],
+        start=states[rows.start],
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Shooting:
+    """What the segments of all trials say of a set of parameters.
+
+    Attributes
+    ----------
+    residuals : array of shape (n_rows,)
+        Simulated less measured, by the scale of the channel, blocks averaged.
+    jacobian : array of shape (n_rows, n_parameters)
+    moves : list of array of shape (n_free,)
+        By segment: how its start would move.
+    rows : list of slice
+        Rows of each segment; within it the blocks one after the other, the channels of a block together.
+    """
+
+    residuals: Floats
+    jacobian: Floats
+    moves: list[Floats]
+    rows: list[slice]
+
+
+class Shooter:
+    """Sails all segments with a model and with its neighbours, a lane each.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Gives the compiled accelerations and all but their coefficients.
+    channels : sequence of str
+        To compare.
+    term_sizes : array of shape (n_coefficients,)
+        Coefficients of the accelerations (SI) that stand for a parameter of 1.
+    free : bool
+        Whether each segment's start is fitted with it, else it is the smoothed measurement.
+    offsets : bool
+        Whether each trial has an offset of its rudder among the parameters, rad.
+    """
+
+    def __init__(
+        self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool, offsets: bool
+    ) -> None:
+        self.model, self.channels, self.sizes = model, tuple(channels), term_sizes
+        self.columns = [layout.STATE_NAMES.index(name) for name in channels]
+        self.free = self.columns if free else []
+        self.offsets = offsets
+        self.sail = model.kernel("segments").sail
+        self.column = model.ship_column()
+        ship = model.particulars
+        units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
+        units["p"] = units["r"]
+        self.units = np.array([units[name] for name in channels])
+
+    def shoot(
+        self, parameters: Floats, segments: Sequence[Segment], scales: Floats, n_trials: int
+    ) -> Shooting:
+        """Residuals and Jacobian at some parameters, the starts of the segments projected out.
+
+        The residual of a segment that may choose its start is what a linear step of the start leaves
+        (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal. 10(2), with the Jacobian of
+        Kaufman 1975).
+
+        Parameters
+        ----------
+        parameters : array of shape (n_coefficients + n_trials,)
+            Coefficients by `term_sizes`, then offsets of the rudder, rad (where there are any), of which only
+            the differences from their mean matter.
+        segments : sequence of Segment
+        scales : array of shape (n_channels,)
+            Residuals that count as 1.
+        n_trials : int
+            Trials with an offset.
+
+        Returns
+        -------
+        Shooting
+            Not finite where a ship ran away.
+        """
+        residuals, jacobians, moves, rows = [], [], [], []
+        n_terms, at = len(self.sizes), 0
+        offsets = about_mean(parameters[n_terms:])
+        shares = about_mean(np.eye(len(offsets)))
+        for segment in segments:
+            offset = offsets[segment.trial] if self._has_offset(segment, n_trials) else 0.0
+            nominal, slopes = self._slopes(parameters[:n_terms], offset, segment)
+            counts = np.diff(segment.blocks, append=len(segment.measured))
+            factor = np.sqrt(segment.weight * counts)[:, None] / scales
+            value = (_averaged(nominal - segment.measured, segment.blocks, counts) * factor).ravel()
+            slope = _averaged(slopes, segment.blocks, counts) * factor[:, :, None]
+            slope = slope.reshape(len(value), -1)
+            value, slope, move = _without_start(value, slope, len(self.free))
+            jacobian = np.zeros((len(value), len(parameters)))
+            jacobian[:, :n_terms] = slope[:, :n_terms]
+            if self._has_offset(segment, n_trials):
+                jacobian[:, n_terms:] = np.outer(slope[:, n_terms], shares[segment.trial])
+            residuals.append(value)
+            jacobians.append(jacobian)
+            moves.append(move)
+            rows.append(slice(at, at := at + len(value)))
+        return Shooting(np.concatenate(residuals), np.concatenate(jacobians), moves, rows)
+
+    def moved(self, segments: Sequence[Segment], moves: Sequence[Floats]) -> list[Segment]:
+        """The segments with their starts moved."""
+        found = []
+        for segment, move in zip(segments, moves, strict=True):
+            start = segment.start.copy()
+            start[self.free] += move * self.units[: len(self.free)]
+            found.append(replace(segment, start=start))
+        return found
+
+    def _has_offset(self, segment: Segment, n_trials: int) -> bool:
+        return self.offsets and segment.trial < n_trials
+
+    def _slopes(self, parameters: Floats, offset: float, segment: Segment) -> tuple[Floats, Floats]:
+        """Simulated channels, and their derivatives by coefficients, rudder offset and start."""
+        n_terms, n_free = len(parameters), len(self.free)
+        n_moves = n_terms + 1 + n_free
+        column = self.column.copy()
+        column[layout.row(layout.COEFFICIENTS) :] = parameters * self.sizes
+        first = layout.row(layout.COEFFICIENTS)
+        slopes = np.empty((len(segment.measured), len(self.channels), n_moves))
+        nominal = np.empty((len(segment.measured), len(self.channels)))
+        for begin in range(0, n_moves, layout.LANES - 1):
+            moves = np.arange(begin, min(begin + layout.LANES - 1, n_moves))
+            lanes = np.arange(1, len(moves) + 1)
+            ship = np.repeat(column, layout.LANES).reshape(-1, layout.LANES)
+            state = np.repeat(segment.start, layout.LANES).reshape(-1, layout.LANES)
+            offsets = np.full(layout.LANES, offset)
+            for lane, move in zip(lanes.tolist(), moves.tolist(), strict=True):
+                if move < n_terms:
+                    ship[first + move, lane] += STEP * self.sizes[move]
+                elif move == n_terms:
+                    offsets[lane] += STEP
+                else:
+                    state[self.free[move - n_terms - 1], lane] += STEP * self.units[move - n_terms - 1]
+            out = np.empty((len(segment.measured), layout.N_STATE * layout.LANES))
+            self.sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
+            found = out.reshape(len(out), layout.N_STATE, layout.LANES)[:, self.columns]
+            nominal = found[:, :, 0]
+            with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
+                slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP
+        return nominal, slopes
+
+
+def about_mean(values: Floats) -> Floats:
+    """Values less their mean along the first axis."""
+    return values - values.mean(axis=0) if len(values) else values
+
+
+def _averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
+    """Means over the blocks of samples along the first axis."""
+    means: Floats = np.add.reduceat(values, blocks, axis=0)
+    return means / counts.reshape(-1, *(1,) * (values.ndim - 1))
+
+
+def _without_start(value: Floats, slope: Floats, n_free: int) -> tuple[Floats, Floats, Floats]:
+    """Residuals and slopes without what a move of the start accounts for, and that move."""
+    if not n_free:
+        return value, slope, np.zeros(0)
+    rest, start = slope[:, :-n_free], slope[:, -n_free:]
+    if not (np.all(np.isfinite(slope)) and np.all(np.isfinite(value))):
+        return value, rest, np.zeros(n_free)
+    q, r = np.linalg.qr(start)
+    seen = q.T @ value
+    move = np.linalg.lstsq(r, -seen, rcond=1e-10)[0]
+    return value - q @ seen, rest - q @ (q.T @ rest), move

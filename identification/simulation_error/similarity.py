@@ -1,0 +1,144 @@
+"""Which ship is most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.checks import quoted
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel, load_model
+from shipgym.ships.catalogue import REFERENCE_SHIPS
+from shipgym.ships.particulars import Particulars
+
+Floats = NDArray[np.float64]
+
+GRAVITY = 9.81
+AUTO = "auto"
+#: Rudder area by length and draught of ships whose particulars lack it: Mei 2019, Table 4.
+RUDDER_SHARE = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
+#: Correlations so close are those of one hull: the ship nearest in length is taken.
+ALIKE = 0.01
+
+
+def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
+    """Block coefficient, L/B, B/T, inverse Froude number and rudder area by L T.
+
+    Parameters
+    ----------
+    particulars : Particulars
+        Of a ship; what is not known becomes nan.
+    printed : bool
+        Whether the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of sqrt(g L)/V0: then a model
+        of 7 m is like no ship at all.
+
+    Returns
+    -------
+    array of shape (5,)
+    """
+    p = particulars
+    L = p.length
+    B, T, V, area, block = (
+        np.nan if p[name] is None else float(p[name])
+        for name in ("beam", "draught", "speed", "rudder_area", "block_coefficient")
+    )
+    time = L / V if printed else np.sqrt(GRAVITY * L) / V
+    return np.array([block, L / B, B / T, time, area / (L * T)])
+
+
+def correlations(target: ArrayLike, candidates: Mapping[str, ArrayLike]) -> dict[str, float]:
+    """Pearson correlation of each candidate's features with the target's.
+
+    Each feature is first divided by its 2-norm over all ships. Features that are nan for any ship are left
+    out.
+
+    Parameters
+    ----------
+    target : array-like of shape (n_features,)
+        Features of the target (`similarity_vector`).
+    candidates : mapping of str to array-like of shape (n_features,)
+        Of the candidates.
+
+    Returns
+    -------
+    dict of str to float
+        By candidate.
+
+    Raises
+    ------
+    InputError
+        If fewer than three features are known of all ships.
+    """
+    table = np.array([np.asarray(target, dtype=float), *map(np.asarray, candidates.values())], dtype=float)
+    known = np.all(np.isfinite(table), axis=0)
+    if known.sum() < 3:
+        raise InputError(
+            f"particulars: only {known.sum()} of block coefficient, L/B, B/T, L/V0 and rudder area are "
+            "known, expected at least 3 to find a reference ship; give beam, draught, block_coefficient and "
+            "rudder_area in [ship], or name the reference_model"
+        )
+    table = table[:, known] / np.linalg.norm(table[:, known], axis=0)
+    return {
+        name: float(np.corrcoef(table[0], row)[0, 1]) for name, row in zip(candidates, table[1:], strict=True)
+    }
+
+
+def select_reference(
+    particulars: Particulars,
+    channels: Collection[str] | None = None,
+    candidates: Collection[str] = tuple(REFERENCE_SHIPS),
+    printed: bool = False,
+) -> tuple[str, dict[str, float]]:
+    """The shipped reference ship most like a ship.
+
+    Parameters
+    ----------
+    particulars : Particulars
+        Of the target.
+    channels : collection of str, optional
+        Recorded of the target: a reference ship that rolls needs p and phi.
+    candidates : collection of str
+        Names of models to choose from.
+    printed : bool
+        As in `similarity_vector`.
+
+    Returns
+    -------
+    name : str
+        Of the ship with the highest correlation; of hulls of one form that nearest in length.
+    correlations : dict of str to float
+        Of all candidates.
+
+    Raises
+    ------
+    InputError
+        If too little is known of the target.
+    """
+    ships = {name: load_model(name) for name in candidates}
+    usable = {name: ship for name, ship in ships.items() if channels is None or _fits(ship, channels)}
+    if not usable:
+        raise InputError(
+            f"reference_model: none of {quoted(ships)} can be evaluated at {quoted(channels or ())}, "
+            "because all of them roll; record p and phi, or allow other candidates"
+        )
+    vectors = {name: similarity_vector(_known(name, ship), printed) for name, ship in usable.items()}
+    found = correlations(similarity_vector(particulars, printed), vectors)
+    best = max(found.values())
+    alike = [name for name, value in found.items() if value > best - ALIKE]
+    lengths = {name: usable[name].particulars.length / particulars.length for name in alike}
+    return min(alike, key=lambda name: (abs(np.log(lengths[name])), -found[name])), found
+
+
+def _fits(ship: ShipModel, channels: Collection[str]) -> bool:
+    return "phi" not in ship.state_names or {"p", "phi"} <= set(channels)
+
+
+def _known(name: str, ship: ShipModel) -> Particulars:
+    """Particulars of a reference ship, with block coefficient and rudder area."""
+    p = ship.particulars.completed()
+    if p.rudder_area is None and name in RUDDER_SHARE and p.draught is not None:
+        p = replace(p, rudder_area=RUDDER_SHARE[name] * p.length * p.draught)
+    return p

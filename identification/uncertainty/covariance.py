@@ -1,0 +1,107 @@
+"""How certain the coefficients are, together: one covariance over all equations of motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimators.estimator import Machine, weights
+from identification.estimators.threads import on_one_thread
+from identification.regression.samples import Samples
+
+Floats = NDArray[np.float64]
+Machines = Mapping[str, Machine]
+
+
+def residuals(machines: Machines, samples: Samples) -> dict[str, Floats]:
+    """Target less prediction of each equation, arrays of shape (n_rows,)."""
+    return {q: samples.targets[q] - machines[q].predict(samples.features[q]) for q in machines}
+
+
+@on_one_thread
+def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) -> Floats:
+    """Covariance of the coefficients of all equations, residuals correlated across equations and in time.
+
+    With the coefficients of each equation a linear map of its targets, the covariance follows from that
+    of the residuals. Without memory they are independent in time (classical formula, with the
+    covariance of the residuals between equations); with memory it is estimated as by Newey & West
+    1987 (Econometrica 55(3)) with Bartlett's weights, each trial by itself. Exact features are assumed.
+    Of a machine that weights its samples it is the residuals times their weights that count (Huber's
+    sandwich).
+
+    Parameters
+    ----------
+    machines : mapping of str to Machine
+        Fitted to `samples` without intercept, by equation.
+    samples : Samples
+        The regression.
+    memory : float
+        Time over which residuals are taken to be correlated, s.
+
+    Returns
+    -------
+    array of shape (n_coefficients, n_coefficients)
+        In the order of the equations and their features.
+    """
+    errors = {
+        q: error * weights(machines[q], samples.features[q])
+        for q, error in residuals(machines, samples).items()
+    }
+    freedom = {q: effective_freedom(machines[q], samples.features[q]) for q in machines}
+    maps = {q: samples.features[q] @ machines[q].inverse_moment_ for q in machines}
+    if memory <= 0.0:
+        blocks = [
+            [
+                (errors[p] @ errors[q]) / np.sqrt(freedom[p] * freedom[q]) * (maps[p].T @ maps[q])
+                for q in machines
+            ]
+            for p in machines
+        ]
+        return np.block(blocks)
+    scores = np.hstack(
+        [maps[q] * (errors[q] * np.sqrt(len(samples) / freedom[q]))[:, None] for q in machines]
+    )
+    total = np.zeros((scores.shape[1],) * 2)
+    for trial in np.unique(samples.trial):
+        rows = samples.trial == trial
+        spacing = float(np.median(np.diff(samples.start[rows]))) if rows.sum() > 1 else memory
+        total += newey_west(scores[rows], max(round(memory / spacing), 0))
+    return 0.5 * (total + total.T)
+
+
+def effective_freedom(machine: Machine, features: Floats) -> float:
+    """Samples less effective number of parameters, at least 1."""
+    moment = features.T @ (features * weights(machine, features)[:, None])
+    used = float(np.einsum("ij,ji->", machine.inverse_moment_, moment))
+    return max(len(features) - used, 1.0)
+
+
+def coefficient_covariance(acceleration_covariance: Floats, acceleration_matrix: Floats) -> Floats:
+    """Covariance of the hydrodynamic derivatives from that of the coefficients of the accelerations.
+
+    Parameters
+    ----------
+    acceleration_covariance : array of shape (n, n)
+        Of the coefficients of the features.
+    acceleration_matrix : array of shape (n, n)
+        Maps hydrodynamic derivatives to those coefficients (`Structure.acceleration_matrix`).
+
+    Returns
+    -------
+    array of shape (n, n)
+    """
+    half = np.linalg.solve(acceleration_matrix, acceleration_covariance)
+    covariance: Floats = np.linalg.solve(acceleration_matrix, half.T)
+    return 0.5 * (covariance + covariance.T)
+
+
+def newey_west(scores: Floats, lags: int) -> Floats:
+    """Long-run second moment of the rows of scores, shape (n_columns, n_columns)."""
+    lags = min(lags, len(scores) - 1)
+    total: Floats = scores.T @ scores
+    for lag in range(1, lags + 1):
+        shifted = scores[lag:].T @ scores[:-lag]
+        total += (1.0 - lag / (lags + 1.0)) * (shifted + shifted.T)
+    return total

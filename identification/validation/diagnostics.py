@@ -1,0 +1,277 @@
+"""What the data can tell and what the fit left over: excitation, collinearity, residuals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimators.estimator import Machine
+from identification.regression import preprocess
+from identification.regression.samples import Samples
+from identification.uncertainty.covariance import residuals
+from shipgym.errors import InputError
+from shipgym.ships.structures import Structure
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
+RUDDER_NOISE = 6.0  # neither does one that moves less than so many times its noise,
+MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
+SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
+MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
+COLLINEAR = 0.98  # correlation of two features
+MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
+
+
+@dataclass(frozen=True)
+class EquationDiagnostics:
+    """Fit of one equation of motion.
+
+    Attributes
+    ----------
+    samples, terms : int
+        Rows and columns of the regression.
+    rank : int
+        Directions that were kept.
+    condition_number : float
+        Largest by smallest singular value of the features, each scaled to a root mean square of 1.
+    r_squared : float
+        Share of the change of velocity that is explained.
+    residual_rms : float
+        Root mean square of what is left of the change of velocity over a window, SI units.
+    residual_autocorrelation : tuple of float
+        Of the residuals at lags of 1 to 10 windows, without overlap.
+    variance_inflation : dict of str to float
+        By term: how much the others increase its variance.
+    collinear_pairs : tuple of (str, str, float)
+        Pairs of terms with a correlation beyond 0.98, and the correlation.
+    dropped : tuple of tuple of str
+        Terms that make up each dropped direction.
+    """
+
+    samples: int
+    terms: int
+    rank: int
+    condition_number: float
+    r_squared: float
+    residual_rms: float
+    residual_autocorrelation: tuple[float, ...]
+    variance_inflation: dict[str, float]
+    collinear_pairs: tuple[tuple[str, str, float], ...]
+    dropped: tuple[tuple[str, ...], ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, ready for JSON."""
+        return asdict(self)
+
+
+def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse trials from which nothing can be identified.
+
+    Raises
+    ------
+    InputError
+        For no trial, a missing channel, times that nearly coincide, or rudders that never move.
+    """
+    if structure.captive:
+        raise InputError(
+            f"structure: '{structure.name}' found, which is identified from captive tests with the channels "
+            "X, Y, N, expected one for free-running trials; use identification.identify_forces"
+        )
+    if not trials:
+        raise InputError(
+            'trials: none is marked use = "fit", expected at least one; mark the trials to identify from'
+        )
+    for trial in trials:
+        for channel in structure.required_channels:
+            if channel not in trial:
+                raise InputError(
+                    f"trial {trial.name!r}: channel {channel!r} is missing, structure {structure.name!r} "
+                    f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
+                    'out (use = "skip")'
+                )
+        _check_steps(trial)
+    if not structure.has_rudder:
+        return
+    still = [trial for trial in trials if _is_still(trial.t, trial["delta"])]
+    if len(still) == len(trials):
+        angle = np.degrees(np.median(still[0]["delta"]))
+        raise InputError(
+            f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout, expected it to move: "
+            "nothing is excited and these coefficients cannot be identified; add a trial in which the "
+            "rudder moves, such as a zigzag"
+        )
+
+
+def _check_steps(trial: Trial) -> None:
+    steps = np.diff(trial.t)
+    k, usual = int(np.argmin(steps)), float(np.median(steps))
+    if steps[k] < SHORTEST_STEP * usual:
+        raise InputError(
+            f"trial {trial.name!r}: samples at {trial.t[k]:.12g} and {trial.t[k + 1]:.12g} s are only "
+            f"{steps[k]:.2g} s apart, expected a step near the usual {usual:.3g} s; remove the repeated row"
+        )
+
+
+def _is_still(t: Floats, delta: Floats) -> bool:
+    """Whether a rudder does nothing but scatter: its running median moves no more than noise would."""
+    width = min(MEDIAN_WIDTH, len(delta))
+    medians = np.median(np.lib.stride_tricks.sliding_window_view(delta, width), axis=1)
+    scatter = min(RUDDER_NOISE * preprocess.noise_level(t, delta), MOST_RUDDER)
+    return bool(np.ptp(medians) < max(LEAST_RUDDER, scatter))
+
+
+def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
+    """Refuse a regression with fewer rows than terms, or of a motion that never changes.
+
+    Raises
+    ------
+    InputError
+        Naming the shortest trial, or the channel.
+    """
+    for q, change in samples.targets.items():
+        if not np.any(change):
+            raise InputError(
+                f"trial {trials[0].name!r}: channel {q!r} never changes, in none of the {len(trials)} trials "
+                f"to fit, expected the {MOTIONS.get(q, q)} to be excited and measured; leave the column out "
+                "if it was not measured, or choose a structure without that equation"
+            )
+    terms = max(len(structure.regression_names(q)) for q in structure.regressed)
+    if len(samples) <= terms:
+        shortest = min(trials, key=len)
+        raise InputError(
+            f"trial {shortest.name!r}: {len(shortest)} samples found, in all {len(samples)} rows for {terms} "
+            "coefficients in one equation, expected several times as many; add trials, longer or sampled "
+            "more often"
+        )
+
+
+def diagnose(
+    machines: Mapping[str, Machine], samples: Samples, structure: Structure
+) -> dict[str, EquationDiagnostics]:
+    """Diagnostics of each equation.
+
+    Parameters
+    ----------
+    machines : mapping of str to Machine
+        Fitted to `samples`, by equation.
+    samples : Samples
+        The regression.
+    structure : Structure
+        Names the terms.
+
+    Returns
+    -------
+    dict of str to EquationDiagnostics
+        By equation: those of `u`, `v`, `r` that the structure has.
+    """
+    errors = residuals(machines, samples)
+    apart = without_overlap(samples)
+    found = {}
+    for q, machine in machines.items():
+        names = structure.regression_names(q)
+        features, target, error = samples.features[q], samples.targets[q], errors[q]
+        size = np.sqrt(np.mean(features**2, axis=0))
+        scaled = features / np.where(size > 0.0, size, 1.0)
+        singular = np.linalg.svd(scaled, compute_uv=False)
+        groups = getattr(machine, "collinear_groups_", ())
+        found[q] = EquationDiagnostics(
+            samples=len(target),
+            terms=len(names),
+            rank=int(getattr(machine, "rank_", len(singular))),
+            condition_number=float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0])),
+            r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
+            residual_rms=float(np.sqrt(np.mean(error**2))),
+            residual_autocorrelation=autocorrelation(error[apart], 10),
+            variance_inflation=dict(zip(names, variance_inflation(scaled).tolist(), strict=True)),
+            collinear_pairs=_collinear_pairs(scaled, names),
+            dropped=tuple(tuple(names[i] for i in group) for group in groups),
+        )
+    return found
+
+
+def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
+    """Autocorrelation at lags of 1, 2, ... samples.
+
+    Parameters
+    ----------
+    values : array of shape (n_samples,)
+        A series.
+    lags : int
+        How many lags at most.
+
+    Returns
+    -------
+    tuple of float
+        Shorter for a short series.
+    """
+    centred = values - values.mean()
+    power = float(centred @ centred)
+    if power == 0.0:
+        return ()
+    return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
+
+
+def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
+    """Correlation of one series with another that is shifted.
+
+    Parameters
+    ----------
+    first, second : array of shape (n_samples,)
+        Two series at the same times.
+    lags : array of int of shape (n_lags,)
+        Samples by which the first comes after the second; negative where it comes before.
+
+    Returns
+    -------
+    array of shape (n_lags,)
+        Between -1 and 1; 0 where a series is constant or shorter than the lag.
+    """
+    a, b = first - first.mean(), second - second.mean()
+    power = float(np.sqrt((a @ a) * (b @ b)))
+    if power == 0.0:
+        return np.zeros(len(lags))
+    n = len(a)
+    return np.array([_shifted(a, b, int(k)) / power if abs(k) < n else 0.0 for k in lags])
+
+
+def _shifted(a: Floats, b: Floats, lag: int) -> float:
+    return float(a[lag:] @ b[: len(b) - lag]) if lag >= 0 else float(a[:lag] @ b[-lag:])
+
+
+def variance_inflation(scaled: Floats) -> Floats:
+    """Factor by which the other features increase the variance of each coefficient.
+
+    Parameters
+    ----------
+    scaled : array of shape (n_samples, n_features)
+        Features with a root mean square of 1.
+
+    Returns
+    -------
+    array of shape (n_features,)
+        1 for a feature orthogonal to the others.
+    """
+    moment = scaled.T @ scaled / len(scaled)
+    factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)
+    return factors
+
+
+def without_overlap(samples: Samples) -> NDArray[np.int64]:
+    """Rows whose windows do not overlap."""
+    step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
+    return np.arange(0, len(samples), step)
+
+
+def _collinear_pairs(scaled: Floats, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
+    moment = scaled.T @ scaled / len(scaled)
+    first, second = np.nonzero(np.triu(np.abs(moment) > COLLINEAR, k=1))
+    return tuple(
+        (names[i], names[j], float(moment[i, j]))
+        for i, j in zip(first.tolist(), second.tolist(), strict=True)
+    )

@@ -1,0 +1,48 @@
+"""Which trials a choice is judged by: each held out in turn, or those of the largest rudder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.trials.trial import Trial
+
+TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
+FOLDS = (TRIALS, LARGEST_RUDDER)
+ALIKE = 0.9  # of the largest rudder counts as the largest
+
+
+def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
+    """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
+
+    The hard turn is in no zigzag. How well small rudders predict larger ones is the nearest that the data
+    tells of it.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With the channel delta.
+    where : str
+        The argument that asks for it, for messages.
+
+    Returns
+    -------
+    array of bool of shape (n_trials,)
+
+    Raises
+    ------
+    InputError
+        If all of them have the same rudder.
+    """
+    rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
+    largest: NDArray[np.bool_] = rudders > ALIKE * rudders.max()
+    if largest.all():
+        raise InputError(
+            f"{where}: {LARGEST_RUDDER!r} found, but all trials to fit ({len(trials)}) reach "
+            f"{np.degrees(rudders.max()):.3g} deg, expected some with less rudder than others; take "
+            f"{TRIALS!r}, or add trials of another rudder angle"
+        )
+    return largest

@@ -1,0 +1,137 @@
+"""Models that run away: how they are noticed, and what the regression is given to hold them.
+
+A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in the data take over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import UnstableModelError
+from shipgym.manoeuvres import turning_circle
+from shipgym.ships import ShipModel, Structure
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.simulate import open_loop
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+#: Rudder angles of the trial manoeuvres, degrees; the first is cut to the rudder's limit.
+RUDDERS_DEG = (35.0, 10.0)
+#: Ship lengths sailed at service speed between reversals of the rudder.
+REVERSALS = (2.5, 5.0, 10.0, 20.0)
+#: Length of a trial manoeuvre, ship lengths at service speed.
+LONG = 50.0
+STEP = 0.02  # of the time to sail one ship length
+
+#: No manoeuvre at service power takes a ship beyond these, by service speed and by speed by length.
+FASTEST = 1.5
+QUICKEST = 3.0
+
+#: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
+#: SIMMAN 2008 slows down to 0.37 at r L / U = 0.8 and a drift of 20 degrees.
+#: The shaft turns somewhat slower under its load.
+HARD_TURN = {
+    "speed": 0.47, "drift": np.radians(20.5), "yaw_rate": 0.8, "rudder": np.radians(35.0), "shaft": 0.9,
+    "heel": np.radians(5.0),
+}  # fmt: skip
+
+#: Strengths of the penalty tried in turn: rms error allowed in the regression, relative to what the terms
+#: contribute in a hard turn.
+STRENGTHS = tuple(float(strength) for strength in np.geomspace(1e-3, 1.0, 19))
+
+
+def hard_turn_features(
+    structure: Structure, particulars: Particulars, shaft_speed: float = 1.0
+) -> dict[str, Floats]:
+    """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
+    speed = HARD_TURN["speed"] * particulars["speed"]
+    state = {
+        "u": speed * np.cos(HARD_TURN["drift"]),
+        "v": -speed * np.sin(HARD_TURN["drift"]),
+        "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
+        "delta": HARD_TURN["rudder"],
+        "n": HARD_TURN["shaft"] * shaft_speed,
+        "p": HARD_TURN["heel"] * HARD_TURN["speed"] * particulars["speed"] / particulars["length"],
+        "phi": HARD_TURN["heel"],
+    }
+    channels = {name: np.array([state.get(name, 0.0)]) for name in structure.required_channels}
+    sizes = {
+        q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
+    }
+    if "q" in sizes:
+        memory = sizes.pop("q") * particulars["length"] / speed
+        sizes["r"] = np.concatenate([sizes["r"], memory])
+    return sizes
+
+
+def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
+    """Simulations in which a model runs away.
+
+    The trials themselves, open loop; turning circles to both sides; and rudder reversed at intervals,
+    from short to long, which excites what a zigzag of any other angle would.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The candidate.
+    trials : sequence of Trial
+        Those it was identified from.
+
+    Returns
+    -------
+    list of str
+        What ran away, in words; empty for a stable model. Stops after the first kind that does.
+    """
+    travel = model.particulars["length"] / model.particulars["speed"]
+    angles = sorted({min(angle, model.steering.rudder_limit_deg) for angle in RUDDERS_DEG}, reverse=True)
+    sides = [side for angle in angles for side in (angle, -angle)]
+    predictions = (
+        (f"trial {trial.name!r}, open loop", partial(open_loop, model, trial), float(trial["u"].min()))
+        for trial in trials
+    )
+    timing = (LONG * travel, STEP * travel)
+    turns = (
+        (f"turning circle, {side:+.0f} deg", partial(turning_circle, model, side, *timing), 0.0)
+        for side in sides
+    )
+    reversals = (
+        (f"rudder {side:+.0f} deg reversed every {gap:g} L/U", partial(_reversed, model, side, gap), 0.0)
+        for side in sides
+        for gap in REVERSALS
+    )
+    for kind in (predictions, turns, reversals):
+        reasons = [
+            f"{name}: {cause}" for name, run, least in kind if (cause := _runs_away(model, run, least))
+        ]
+        if reasons:
+            return reasons
+    return []
+
+
+def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
+    """Rudder hard over from side to side, at intervals in ship lengths."""
+    steps = np.arange(round(LONG / STEP))
+    commands = np.tile(model.service_command, (len(steps), 1))
+    commands[:, 0] = np.where(steps // round(interval / STEP) % 2 == 0, 1.0, -1.0) * np.radians(rudder_deg)
+    return model.simulate(commands, STEP * model.particulars["length"] / model.particulars["speed"])
+
+
+def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -> str | None:
+    """What is wrong with a simulation, None if nothing; ships go astern only where they were seen to."""
+    try:
+        trial = run()
+    except UnstableModelError as error:
+        return f"ran away after {error.time_s:.0f} s"
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > FASTEST * speed:
+        return f"surge speed from {trial['u'].min():.3g} to {trial['u'].max():.3g} m/s"
+    if np.abs(trial["v"]).max() > speed:
+        return f"sway speed of {np.abs(trial['v']).max():.3g} m/s"
+    if np.abs(trial["r"]).max() * length > QUICKEST * speed:
+        return f"yaw rate of {np.degrees(np.abs(trial['r']).max()):.3g} deg/s"
+    return None

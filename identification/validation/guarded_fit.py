@@ -1,0 +1,95 @@
+"""Fit, and fit again with a penalty while the model runs away."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from identification.estimators.estimator import Machine
+from identification.estimators.methods import FitTask, Method, fit_held
+from identification.regression.coefficients import with_accelerations
+from identification.regression.samples import Samples
+from identification.validation.guard import STRENGTHS, hard_turn_features, reasons_unstable
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
+
+@dataclass(frozen=True)
+class GuardedFit:
+    """A fit and what the guard did to it.
+
+    Attributes
+    ----------
+    model : ShipModel
+        With the identified coefficients.
+    machines : dict of str to Machine
+        By equation.
+    stable : bool
+        Whether the model passed the guard.
+    report : dict
+        For the provenance: `decision`, `strength` of the penalty, and why the fit without it was rejected.
+    """
+
+    model: ShipModel
+    machines: dict[str, Machine]
+    stable: bool
+    report: dict[str, Any]
+
+
+def guarded_fit(
+    method: Method,
+    settings: Mapping[str, Any],
+    samples: Samples,
+    blank: ShipModel,
+    trials: Sequence[Trial],
+    guarded: bool = True,
+) -> GuardedFit:
+    """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
+
+    Parameters
+    ----------
+    method : Method
+        Makes the machines.
+    settings : mapping
+        Of the machines.
+    samples : Samples
+        The regression.
+    blank : ShipModel
+        The model but for its coefficients.
+    trials : sequence of Trial
+        Those behind the samples.
+    guarded : bool
+        Whether penalties may be tried.
+
+    Returns
+    -------
+    GuardedFit
+        Not stable, and without a penalty, where none helped.
+
+    Raises
+    ------
+    InputError
+        For settings that the method does not know.
+    """
+    machines = method.machines(settings, FitTask(samples, blank, trials))
+    model = with_coefficients(blank, machines)
+    reasons = reasons_unstable(model, trials)
+    if not reasons:
+        return GuardedFit(model, machines, True, {"decision": "stable as fitted"})
+    rejected = {"rejected": reasons}
+    if not (guarded and method.regularised):
+        return GuardedFit(model, machines, False, {"decision": "runs away, not guarded", **rejected})
+    sizes = hard_turn_features(blank.table, blank.particulars, blank.service_shaft_speed)
+    for strength in STRENGTHS:
+        held = fit_held(samples, sizes, strength)
+        candidate = with_coefficients(blank, held)
+        if not reasons_unstable(candidate, trials):
+            report = {"decision": "penalised by hard turn", "strength": strength, **rejected}
+            return GuardedFit(candidate, held, True, report)
+    return GuardedFit(model, machines, False, {"decision": "runs away under every penalty", **rejected})
+
+
+def with_coefficients(blank: ShipModel, machines: Mapping[str, Machine]) -> ShipModel:
+    """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
+    return with_accelerations(blank, {q: machine.coef_ for q, machine in machines.items()})

@@ -1,0 +1,267 @@
+"""One episode of an environment: what ship and agent did, to be kept, replayed and identified again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Integral
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.checks import check_number, check_table, check_text, quoted
+from shipgym.errors import InputError
+from shipgym.trials.trial import Trial
+from shipgym.trials.units import CHANNELS
+
+Floats = NDArray[np.float64]
+
+#: What has to be recorded of any ship.
+REQUIRED_STATES = ("x", "y", "psi", "delta")
+
+
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """What happened in one episode, immutable, SI units and the project's signs.
+
+    States and info are those at the beginning and after each of the n steps; commands, actions and rewards
+    belong to the steps.
+
+    Parameters
+    ----------
+    environment : str
+        Id of the environment.
+    model : str
+        Name of the ship model.
+    dt : float
+        Control interval, s.
+    length : float
+        Of the ship, between perpendiculars, m.
+    rudder_limit : float
+        rad.
+    states : mapping of str to array-like of shape (n_steps + 1,)
+        All that the environment's `physical_state` names; at least x, y, psi and delta.
+    actions : array-like of shape (n_steps, n_actions)
+        As the agent gave them.
+    rewards : array-like of shape (n_steps,)
+        Sum of the parts.
+    commands : mapping of str to array-like of shape (n_steps,), optional
+        What was ordered in each step, ``delta`` in rad and ``n`` in 1/s, where that is known.
+    reward_parts : mapping of str to array-like of shape (n_steps,), optional
+        Parts of the rewards, as `info` names them.
+    info : mapping of str to array-like of shape (n_steps + 1,), optional
+        What else `info` told in numbers, at the beginning and after each step; true is 1.
+    waypoints : array-like of shape (n_waypoints, 2), optional
+        Of the path to follow, north and east, m.
+    corridor : float, optional
+        Half the width of the corridor along the path, m.
+    beam : float, optional
+        Of the ship, m.
+    arguments : mapping of str to Any, optional
+        Of the environment, ready for JSON.
+    seed : int, optional
+        With which the environment was last reset.
+    number : int
+        Of the episode since then, from 0: `reset(seed=seed)` and so many times `reset()` begin it again.
+    terminated, truncated : bool
+        How it ended; neither where it was cut off.
+    success : bool, optional
+        What the environment said about it, if it did.
+
+    Raises
+    ------
+    InputError
+        Naming the field, what was found and what is expected.
+    """
+
+    environment: str
+    model: str
+    dt: float
+    length: float
+    rudder_limit: float
+    states: Mapping[str, Floats]
+    actions: Floats
+    rewards: Floats
+    commands: Mapping[str, Floats] = field(default_factory=dict)
+    reward_parts: Mapping[str, Floats] = field(default_factory=dict)
+    info: Mapping[str, Floats] = field(default_factory=dict)
+    waypoints: Floats | None = None
+    corridor: float | None = None
+    beam: float | None = None
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+    number: int = 0
+    terminated: bool = False
+    truncated: bool = False
+    success: bool | None = None
+
+    def __post_init__(self) -> None:
+        check_text(self.environment, "environment")
+        check_text(self.model, "model")
+        check_number(self.dt, "dt", above=0.0)
+        length = check_number(self.length, "length", above=0.0)
+        check_number(self.rudder_limit, "rudder_limit", above=0.0, at_most=np.pi / 2.0)
+        if self.beam is not None:
+            check_number(self.beam, "beam", above=0.0, at_most=length)
+        if self.corridor is not None:
+            check_number(self.corridor, "corridor", above=0.0)
+        check_table(self.arguments, "arguments")
+        for name in ("seed", "number"):
+            _check_count(getattr(self, name), name)
+        for name in ("terminated", "truncated", "success"):
+            _check_flag(getattr(self, name), name)
+        self._set_series()
+        self._set_waypoints()
+
+    def _set_series(self) -> None:
+        rewards = series(self.rewards, "rewards", None)
+        if not len(rewards):
+            raise InputError("rewards: none found, expected at least one step")
+        actions = _finite(self.actions, "actions")
+        if actions.ndim != 2 or len(actions) != len(rewards):
+            raise InputError(
+                f"actions: shape {actions.shape} found, expected ({len(rewards)}, n_actions), a row for "
+                "each reward"
+            )
+        self._set("rewards", rewards)
+        self._set("actions", actions)
+        counts = {"states": 1, "info": 1, "commands": 0, "reward_parts": 0}
+        for group, more in counts.items():
+            table = check_table(getattr(self, group), group)
+            arrays = {
+                name: series(values, f"{group}.{name}", len(rewards) + more) for name, values in table.items()
+            }
+            self._set(group, arrays)
+        missing = [name for name in REQUIRED_STATES if name not in self.states]
+        if missing:
+            raise InputError(f"states: {quoted(missing)} missing, found {quoted(self.states)}")
+
+    def _set_waypoints(self) -> None:
+        if self.waypoints is None:
+            return
+        points = _finite(self.waypoints, "waypoints")
+        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
+            raise InputError(
+                f"waypoints: shape {points.shape} found, expected (n, 2), north and east of two or more"
+            )
+        self._set("waypoints", points)
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    @property
+    def n_steps(self) -> int:
+        """Number of steps."""
+        return len(self.rewards)
+
+    @property
+    def t(self) -> Floats:
+        """Time of the states, s, of shape (n_steps + 1,)."""
+        return np.asarray(self.dt * np.arange(self.n_steps + 1), dtype=np.float64)
+
+    def to_trial(self, name: str | None = None, use: str = "fit") -> Trial:
+        """What the ship did, as a trial that can be identified.
+
+        Parameters
+        ----------
+        name : str, optional
+            Of the trial; by default environment, seed and number of the episode.
+        use : {"fit", "validate", "skip"}
+            What the trial is for.
+
+        Returns
+        -------
+        Trial
+            States that are channels of trials, the orders `delta_command` and `n_command` held from each
+            sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
+
+        Raises
+        ------
+        InputError
+            For an episode of a single step, which is too short for a trial.
+        """
+        channels = {key: values for key, values in self.states.items() if key in CHANNELS}
+        channels["psi"] = np.unwrap(channels["psi"])
+        for key, values in self.commands.items():
+            held = np.append(values, values[-1])
+            channels[f"{key}_command"] = held
+            if key == "n":
+                channels.setdefault("n", held)
+        return Trial(
+            self.t,
+            channels,
+            name=f"{self.environment} seed {self.seed} episode {self.number}" if name is None else name,
+            use=use,
+            length=self.length,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the episode as JSON: to a temporary name, then renamed.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be written.
+        """
+        from shipgym.envs.episode_file import save
+
+        save(self, Path(path))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Episode:
+        """Read an episode that was saved; its numbers are the very same.
+
+        Raises
+        ------
+        InputError
+            Naming the file and the field at fault.
+        """
+        from shipgym.envs.episode_file import load
+
+        return load(Path(path))
+
+
+def series(values: ArrayLike, where: str, count: int | None) -> Floats:
+    """Finite numbers over time, of shape (count,), as a read-only array.
+
+    Raises
+    ------
+    InputError
+        Naming the first value that is not finite, or the length found.
+    """
+    array = _finite(values, where)
+    if array.ndim != 1 or (count is not None and len(array) != count):
+        raise InputError(
+            f"{where}: shape {array.shape} found, expected ({'n_steps' if count is None else count},)"
+        )
+    return array
+
+
+def _finite(values: Any, where: str) -> Floats:
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: expected an array of numbers") from None
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = tuple(wrong[0].tolist())
+        index = place[0] if len(place) == 1 else place
+        raise InputError(f"{where}: {array[place]} found at {index}, expected finite numbers")
+    array.setflags(write=False)
+    return array
+
+
+def _check_count(value: Any, where: str) -> None:
+    if value is None and where == "seed":
+        return
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
+        raise InputError(f"{where}: {value!r} found, expected a whole number from 0 on")
+
+
+def _check_flag(value: Any, where: str) -> None:
+    if value is None and where == "success":
+        return
+    if not isinstance(value, bool):
+        raise InputError(f"{where}: {value!r} found, expected true or false")

@@ -1,0 +1,349 @@
+"""A virtual towing tank: captive tests of any ship model, its motion prescribed and its forces measured.
+
+The tests are those of the planar motion mechanism (Gertler 1967, The DTMB
+planar-motion-mechanism system; ITTC 7.5-02-06-02, Captive model test).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.ships.inertia import inertia, rigid_inertia
+from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+__all__ = [
+    "Tank",
+    "inertia",
+    "pure_surge",
+    "pure_sway",
+    "pure_yaw",
+    "rigid_inertia",
+    "static_drift",
+    "yaw_with_drift",
+]
+
+FORCES = ("X", "Y", "N")
+
+
+@dataclass(frozen=True)
+class Tank:
+    """How a captive test is run and measured.
+
+    Attributes
+    ----------
+    speed : float or None
+        Of the carriage, m/s; None: the ship's service speed.
+    rudder_deg : float
+        Held, degrees.
+    shaft_speed : float or None
+        Held, 1/s; None: that at service speed. For ships with a shaft.
+    cycles : int
+        Periods of an oscillation that are recorded.
+    samples : int
+        In each period, and at each angle of a static test.
+    noise : float
+        Standard deviation of white noise on each force, in parts of its root mean square over the test.
+    seed : int
+        Of the noise.
+    model_inertia : bool
+        Whether the inertia of the ship herself (mass times acceleration, centripetal terms included) stays in
+        the forces, as the balance of a planar motion mechanism feels it; otherwise they are those of the
+        water alone.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+    """
+
+    speed: float | None = None
+    rudder_deg: float = 0.0
+    shaft_speed: float | None = None
+    cycles: int = 3
+    samples: int = 200
+    noise: float = 0.0
+    seed: int = 0
+    model_inertia: bool = True
+    water_depth: float = np.inf
+
+    def __post_init__(self) -> None:
+        if self.speed is not None:
+            check_number(self.speed, "tank speed", above=0.0)
+        if self.shaft_speed is not None:
+            check_number(self.shaft_speed, "tank shaft_speed", above=0.0, hint="ahead")
+        check_number(self.rudder_deg, "tank rudder_deg", at_least=-90.0, at_most=90.0)
+        check_number(self.cycles, "tank cycles", at_least=1)
+        check_number(self.samples, "tank samples", at_least=8)
+        check_number(self.noise, "tank noise", at_least=0.0)
+        check_number(self.seed, "tank seed", at_least=0)
+
+    def carriage_speed(self, model: ShipModel) -> float:
+        """Speed of the carriage, m/s."""
+        return float(model.particulars["speed"] if self.speed is None else self.speed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A prescribed motion: time, and velocities and accelerations (u, v, r) of shape (n_samples, 3)."""
+
+    t: Floats
+    velocity: Floats
+    acceleration: Floats
+
+
+def static_drift(
+    model: ShipModel, drift_deg: Sequence[float], hold_s: float = 1.0, tank: Tank | None = None
+) -> Trial:
+    """Tow a ship steadily at one drift angle after the other.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    drift_deg : sequence of float
+        Drift angles at midship, degrees, positive with the bow to starboard of the course: v = -U sin(drift).
+    hold_s : float
+        Time for which each is recorded, s.
+    tank : Tank, optional
+        Speed, rudder, shaft, noise, ...
+
+    Returns
+    -------
+    Trial
+        With the forces X, Y (N) and N (N m); `tank.samples` rows an angle.
+
+    Raises
+    ------
+    InputError
+        For no angle, or a number out of range.
+    """
+    tank = tank or Tank()
+    angles = [
+        check_number(angle, f"drift_deg[{i}]", at_least=-180.0, at_most=180.0)
+        for i, angle in enumerate(drift_deg)
+    ]
+    if not angles:
+        raise InputError("drift_deg: no angle found, expected at least one")
+    check_number(hold_s, "hold_s", above=0.0)
+    drift = np.repeat(np.radians(angles), tank.samples)
+    t = hold_s / tank.samples * np.arange(len(drift), dtype=float)
+    speed, none = tank.carriage_speed(model), np.zeros(len(t))
+    velocity = np.stack([speed * np.cos(drift), -speed * np.sin(drift), none], axis=-1)
+    return _tow(model, tank, _Motion(t, velocity, np.zeros_like(velocity)), "static drift")
+
+
+def pure_surge(
+    model: ShipModel, amplitude: float, period_s: float | None = None, tank: Tank | None = None
+) -> Trial:
+    """Oscillate a ship in surge about the speed of the carriage.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    amplitude : float
+        Of the surge speed, m/s, less than the speed of the carriage.
+    period_s : float, optional
+        s; by default 10 times the time to travel one ship length.
+    tank : Tank, optional
+        Speed, rudder, shaft, noise, ...
+
+    Returns
+    -------
+    Trial
+        With the forces X, Y (N) and N (N m).
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+    """
+    tank = tank or Tank()
+    speed = tank.carriage_speed(model)
+    check_number(amplitude, "amplitude", above=0.0, below=speed, hint="less than the carriage's speed")
+    return _oscillate(model, tank, period_s, (speed, 0.0, 0.0), (amplitude, 0.0, 0.0), "pure surge")
+
+
+def pure_sway(
+    model: ShipModel, amplitude: float, period_s: float | None = None, tank: Tank | None = None
+) -> Trial:
+    """Oscillate a ship in sway, her heading along the tank.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    amplitude : float
+        Of the sway speed, m/s.
+    period_s, tank
+        As in `pure_surge`.
+
+    Returns
+    -------
+    Trial
+        With the forces X, Y (N) and N (N m).
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+    """
+    tank = tank or Tank()
+    check_number(amplitude, "amplitude", above=0.0)
+    speed = tank.carriage_speed(model)
+    return _oscillate(model, tank, period_s, (speed, 0.0, 0.0), (0.0, amplitude, 0.0), "pure sway")
+
+
+def pure_yaw(
+    model: ShipModel, amplitude_deg_s: float, period_s: float | None = None, tank: Tank | None = None
+) -> Trial:
+    """Oscillate a ship in yaw, always along her path, without sway.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    amplitude_deg_s : float
+        Of the yaw rate, degrees per second.
+    period_s, tank
+        As in `pure_surge`.
+
+    Returns
+    -------
+    Trial
+        With the forces X, Y (N) and N (N m).
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+    """
+    return yaw_with_drift(model, amplitude_deg_s, 0.0, period_s, tank)
+
+
+def yaw_with_drift(
+    model: ShipModel,
+    amplitude_deg_s: float,
+    drift_deg: float,
+    period_s: float | None = None,
+    tank: Tank | None = None,
+) -> Trial:
+    """Oscillate a ship in yaw at a constant drift angle.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    amplitude_deg_s : float
+        Of the yaw rate, degrees per second.
+    drift_deg : float
+        Drift angle at midship, degrees: v = -U sin(drift).
+    period_s, tank
+        As in `pure_surge`.
+
+    Returns
+    -------
+    Trial
+        With the forces X, Y (N) and N (N m).
+
+    Raises
+    ------
+    InputError
+        For a number out of range.
+    """
+    tank = tank or Tank()
+    rate = float(np.radians(check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0)))
+    drift = float(np.radians(check_number(drift_deg, "drift_deg", at_least=-90.0, at_most=90.0)))
+    speed = tank.carriage_speed(model)
+    mean = (speed * np.cos(drift), -speed * np.sin(drift), 0.0)
+    name = "pure yaw" if drift == 0.0 else "yaw with drift"
+    return _oscillate(model, tank, period_s, mean, (0.0, 0.0, rate), name)
+
+
+def _oscillate(
+    model: ShipModel,
+    tank: Tank,
+    period_s: float | None,
+    mean: tuple[float, float, float],
+    amplitude: tuple[float, float, float],
+    name: str,
+) -> Trial:
+    """Velocities (u, v, r) that swing about their mean as a cosine."""
+    usual = 10.0 * model.particulars["length"] / tank.carriage_speed(model)
+    period = check_number(usual if period_s is None else period_s, "period_s", above=0.0)
+    t = period / tank.samples * np.arange(tank.cycles * tank.samples + 1, dtype=float)
+    frequency = 2.0 * np.pi / period
+    velocity = np.array(mean) + np.outer(np.cos(frequency * t), amplitude)
+    acceleration = -frequency * np.outer(np.sin(frequency * t), amplitude)
+    return _tow(model, tank, _Motion(t, velocity, acceleration), name)
+
+
+def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
+    """The measured motion and forces: inertia times (the ship's own acceleration - the prescribed one)."""
+    limit = model.steering.rudder_limit_deg
+    check_number(
+        tank.rudder_deg, "tank rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit"
+    )
+    if tank.shaft_speed is not None and "n" not in model.command_names:
+        raise InputError(
+            f"tank shaft_speed: {tank.shaft_speed:g} found, but {model.name!r} has no shaft; leave it"
+        )
+    shaft = model.service_shaft_speed if tank.shaft_speed is None else tank.shaft_speed
+    psi = _integral(motion.t, motion.velocity[:, 2])
+    columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
+    columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
+    none = np.zeros(len(psi))
+    states = np.stack([columns.get(state, none) for state in model.state_names], axis=-1)
+    commands = np.stack([columns[command] for command in model.command_names], axis=-1)
+    rates = model.derivatives(states, commands, tank.water_depth)
+    own = np.zeros((len(psi), 4))
+    for i, rate in enumerate("uvrp"):
+        if rate in model.state_names:
+            own[:, i] = rates[:, model.state_names.index(rate)]
+    own[:, :3] -= motion.acceleration
+    forces = own @ inertia(model, tank.water_depth).T
+    if not tank.model_inertia:
+        forces += _ship_s_own(model, motion)
+    channels = {
+        "x": _integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
+        "y": _integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
+        **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
+        **({"n": columns["n"]} if "n" in model.command_names else {}),
+        **dict(zip(FORCES, _noisy(forces, tank).T, strict=True)),
+    }
+    title = f"{model.name}, {name}"
+    return Trial(motion.t, channels, name=title, kind="captive", length=model.particulars["length"])
+
+
+def _ship_s_own(model: ShipModel, motion: _Motion) -> Floats:
+    """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3)."""
+    mass, static, yaw = rigid_inertia(model)
+    u, v, r = motion.velocity.T
+    udot, vdot, rdot = motion.acceleration.T
+    ahead = mass * (udot - v * r) - static * r * r
+    aside = mass * (vdot + u * r) + static * rdot
+    turning = yaw * rdot + static * (vdot + u * r)
+    return np.stack([ahead, aside, turning], axis=-1)
+
+
+def _noisy(forces: Floats, tank: Tank) -> Floats:
+    """Forces with their white noise."""
+    size = tank.noise * np.sqrt((forces**2).mean(axis=0))
+    noisy: Floats = forces + size * np.random.default_rng(tank.seed).standard_normal(forces.shape)
+    return noisy
+
+
+def _integral(t: Floats, rate: Floats) -> Floats:
+    """Integral over time from zero by the trapezoid rule, shape (n_samples,)."""
+    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])

@@ -1,0 +1,124 @@
+"""Gust spectra of the wind over the sea, and the first-order filter that stands for them."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.sea.conditions import Wind
+
+Floats = NDArray[np.float64]
+
+#: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
+SURFACE_DRAG = 0.003
+HARRIS_LENGTH, DAVENPORT_LENGTH = 1800.0, 1200.0  # m
+#: Frequencies for which NORSOK N-003 gives its spectrum, Hz.
+NORSOK_BAND = (1.0 / 2400.0, 0.5)
+
+
+class GaussMarkov(NamedTuple):
+    """A first-order Gauss-Markov process of mean zero.
+
+    Its autocorrelation is standard_deviation^2 exp(-|lag| / time_constant), its one-sided spectrum
+    4 s^2 T / (1 + (2 pi f T)^2) per Hz.
+
+    Attributes
+    ----------
+    time_constant : float
+        s.
+    standard_deviation : float
+        In the units of the process.
+    """
+
+    time_constant: float
+    standard_deviation: float
+
+    def spectrum(self, frequency: ArrayLike) -> Floats:
+        """One-sided spectral density at frequencies in Hz."""
+        T = self.time_constant
+        f = np.asarray(frequency, dtype=float)
+        density: Floats = 4.0 * self.standard_deviation**2 * T / (1.0 + (2.0 * np.pi * f * T) ** 2)
+        return density
+
+
+def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") -> Floats:
+    """One-sided spectral density of the wind speed about its mean, 10 m above the sea.
+
+    Parameters
+    ----------
+    frequency : array_like
+        Hz, above 0.
+    speed : float
+        Mean, m/s.
+    spectrum : {"harris", "davenport", "norsok"}
+        Which.
+
+    Returns
+    -------
+    array
+        (m/s)^2 / Hz.
+
+    Notes
+    -----
+    With x = f L / V and the surface drag coefficient k: Harris 1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6),
+    L = 1800 m; Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L = 1200 m; NORSOK N-003 (2007), Froya
+    spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f (V/10)^(-3/4), n = 0.468.
+    """
+    f = np.asarray(frequency, dtype=float)
+    if spectrum == "norsok":
+        y = 172.0 * f * (speed / 10.0) ** -0.75
+        froya: Floats = 320.0 * (speed / 10.0) ** 2 / (1.0 + y**0.468) ** (5.0 / (3.0 * 0.468))
+        return froya
+    if spectrum == "davenport":
+        x = f * DAVENPORT_LENGTH / speed
+        shape = 4.0 * x * DAVENPORT_LENGTH / speed / (1.0 + x * x) ** (4.0 / 3.0)
+    else:
+        x = f * HARRIS_LENGTH / speed
+        shape = 4.0 * HARRIS_LENGTH / speed / (2.0 + x * x) ** (5.0 / 6.0)
+    density: Floats = SURFACE_DRAG * speed**2 * shape
+    return density
+
+
+def gust_variance(speed: float, spectrum: str = "harris") -> float:
+    """Variance of the wind speed, the integral of :func:`gust_spectrum`, (m/s)^2.
+
+    Harris: 2^(2/3) B(1/2, 1/3) k V^2 = 6.677 k V^2 (B is Euler's beta function); Davenport: 6 k V^2; NORSOK:
+    over the band for which it is given.
+    """
+    if spectrum == "davenport":
+        return 6.0 * SURFACE_DRAG * speed**2
+    if spectrum == "harris":
+        beta = math.gamma(1.0 / 2.0) * math.gamma(1.0 / 3.0) / math.gamma(5.0 / 6.0)
+        return float(2.0 ** (2.0 / 3.0) * beta * SURFACE_DRAG * speed**2)
+    f = np.geomspace(*NORSOK_BAND, 400)
+    return float(np.trapezoid(f * gust_spectrum(f, speed, "norsok"), np.log(f)))
+
+
+def gust_filter(wind: Wind) -> GaussMarkov:
+    """First-order process with the variance of the gusts and the same most energetic frequency.
+
+    f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3) V / 1800 m,
+    Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V; NORSOK's is found by search. How
+    far the filter's spectrum is from the full one is stated in `docs/weather.md`.
+
+    Parameters
+    ----------
+    wind : Wind
+
+    Returns
+    -------
+    GaussMarkov
+        Of the speed along the mean wind, m/s; without gusts of standard deviation 0.
+    """
+    if not wind.gust or wind.calm:
+        return GaussMarkov(1.0, 0.0)
+    if wind.spectrum == "norsok":
+        f = np.geomspace(*NORSOK_BAND, 2000)
+        peak = float(f[np.argmax(f * gust_spectrum(f, wind.speed, "norsok"))])
+    else:
+        length = HARRIS_LENGTH if wind.spectrum == "harris" else DAVENPORT_LENGTH
+        peak = math.sqrt(3.0) * wind.speed / length
+    return GaussMarkov(1.0 / (2.0 * math.pi * peak), math.sqrt(gust_variance(wind.speed, wind.spectrum)))

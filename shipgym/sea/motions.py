@@ -1,0 +1,156 @@
+"""First-order heading and roll in waves: closed-form transfer functions, integrated over the spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.sea.conditions import Waves
+from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.harmonics import circle, cosine_series, mirrored
+from shipgym.sea.waves import encounter_frequency, frequencies, spread, wave_spectrum
+from shipgym.ships.particulars import Particulars
+
+Floats = NDArray[np.float64]
+
+#: Relative damping of roll of a ship under way, with bilge keels (0.05 to 0.15 in the literature).
+ROLL_DAMPING = 0.1
+
+
+def heading_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars) -> Floats:
+    """Amplitude of wave-induced heading by wave amplitude.
+
+    The hull follows the sideways motion of the water at half its draught, averaged over its length with
+    the lever as weight: |sin chi| exp(-k T / 2) (6 / L) |j1(q)| with q = k L cos(chi) / 2 and the spherical
+    Bessel function j1. In long waves this is k |sin chi cos chi|. It is the motion at wave frequency, for
+    which the ship's speed does not matter; the slow yaw of a ship that runs before the sea is not in it.
+
+    Parameters
+    ----------
+    omega : array_like
+        Of the waves, rad/s.
+    chi : array_like
+        Where the waves come from, seen from the bow, rad.
+    particulars : Particulars
+        Length and draught.
+
+    Returns
+    -------
+    array
+        rad/m, of the shape to which omega and chi broadcast.
+    """
+    L, T = particulars.length, particulars.require("draught")
+    k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
+    q = 0.5 * k * L * np.cos(chi)
+    response: Floats = np.abs(np.sin(chi)) * np.exp(-0.5 * k * T) * 6.0 / L * np.abs(_j1(q))
+    return response
+
+
+def roll_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars, speed: float) -> Floats:
+    """Amplitude of roll by wave amplitude.
+
+    A linear oscillator driven by the effective wave slope: k |sin chi| exp(-k T / 2), averaged over length
+    and beam, times the amplification 1 / sqrt((1 - a^2)^2 + (2 z a)^2), a = encounter by natural
+    frequency (Conolly 1969, Rolling and its stabilisation by active fins, Transactions of RINA 111;
+    Lloyd 1989, Seakeeping). In long waves it is the wave slope across the ship.
+
+    Parameters
+    ----------
+    omega, chi : array_like
+        As in :func:`heading_response`.
+    particulars : Particulars
+        Length, beam, draught and roll period.
+    speed : float
+        At which the waves are met, m/s.
+
+    Returns
+    -------
+    array
+        rad/m.
+    """
+    L, B, T = particulars.length, particulars.require("beam"), particulars.require("draught")
+    k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
+    along, across = 0.5 * k * L * np.cos(chi) / np.pi, 0.5 * k * B * np.sin(chi) / np.pi
+    slope = k * np.abs(np.sin(chi) * np.sinc(along) * np.sinc(across)) * np.exp(-0.5 * k * T)
+    natural = 2.0 * np.pi / particulars.require("roll_period")
+    a = encounter_frequency(omega, speed, chi) / natural
+    response: Floats = slope / np.hypot(1.0 - a * a, 2.0 * ROLL_DAMPING * a)
+    return response
+
+
+def _j1(q: Floats) -> Floats:
+    """Spherical Bessel function of the first kind and order 1."""
+    from scipy.special import spherical_jn
+
+    value: Floats = np.sign(q) * spherical_jn(1, np.abs(q))
+    return value
+
+
+@dataclass(frozen=True)
+class WaveMotion:
+    """Variance of wave-induced heading and roll over the direction of the waves.
+
+    Attributes
+    ----------
+    chi : array of shape (points,)
+        Where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to below 2 pi, rad.
+    heading_variance, roll_variance : array of shape (points,)
+        rad2.
+    estimated : tuple of str
+        Names of the particulars that were estimated for it.
+    """
+
+    chi: Floats
+    heading_variance: Floats
+    roll_variance: Floats
+    estimated: tuple[str, ...] = ()
+
+    def heading_variance_harmonics(self, n: int = 8) -> Floats:
+        """Cosine series of the heading's variance, mean first, shape (n + 1,).
+
+        A sum may be slightly negative where the variance is 0 (waves from ahead and astern): clip it there.
+        """
+        return cosine_series(self.heading_variance, n)
+
+    def roll_variance_harmonics(self, n: int = 8) -> Floats:
+        """Cosine series of the roll's variance, mean first, shape (n + 1,); to be clipped at 0 as well."""
+        return cosine_series(self.roll_variance, n)
+
+
+def wave_motion(waves: Waves, particulars: Particulars, speed: float | None = None) -> WaveMotion:
+    """Variance of wave-induced heading and roll for waves from all directions.
+
+    Parameters
+    ----------
+    waves : Waves
+        Its direction does not matter here.
+    particulars : Particulars
+        Estimated where absent (:func:`shipgym.sea.estimates.weather_particulars`).
+    speed : float, optional
+        At which roll meets the waves, m/s; by default the service speed, or 0 where that is not known.
+
+    Returns
+    -------
+    WaveMotion
+
+    Raises
+    ------
+    InputError
+        For particulars too few.
+    """
+    ship = weather_particulars(particulars)
+    chi = circle()
+    quarter = chi[: len(chi) // 2 + 1]  # symmetric: port as starboard
+    omega = frequencies(waves)
+    spectrum = wave_spectrum(waves, omega)
+    U = (ship.speed or 0.0) if speed is None else speed
+    heading = heading_response(omega, quarter[:, None], ship)
+    roll = roll_response(omega, quarter[:, None], ship, U)
+    heading_variance, roll_variance = (
+        spread(mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves)
+        for response in (heading, roll)
+    )
+    used = {"metacentric_height", "roll_period", "block_coefficient"}
+    return WaveMotion(chi, heading_variance, roll_variance, tuple(sorted(ship.estimated & used)))

@@ -1,0 +1,260 @@
+"""Wave spectra, and the linear filters that stand for first-order motion and slow drift."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.sea.conditions import Waves
+from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.gusts import GaussMarkov
+from shipgym.sea.harmonics import circle
+from shipgym.ships.particulars import Particulars
+
+Floats = NDArray[np.float64]
+
+
+class WaveFilter(NamedTuple):
+    """h(s) = gain s / (s^2 + 2 damping w0 s + w0^2), driven by white noise of unit intensity.
+
+    Its output has unit variance: gain^2 = 4 damping w0. At sea w0 is the frequency of encounter, and the
+    gain follows it.
+
+    Attributes
+    ----------
+    peak_frequency : float
+        w0 for a ship at rest, rad/s.
+    damping : float
+        lambda, relative damping.
+    gain : float
+        rad^(1/2) / s^(1/2).
+    """
+
+    peak_frequency: float
+    damping: float
+    gain: float
+
+    def spectrum(self, omega: ArrayLike) -> Floats:
+        """One-sided spectral density of the output per rad/s, whose integral is 1."""
+        w, w0 = np.asarray(omega, dtype=float), self.peak_frequency
+        power = (self.gain * w) ** 2 / ((w0**2 - w**2) ** 2 + (2.0 * self.damping * w0 * w) ** 2)
+        density: Floats = power / np.pi
+        return density
+
+
+def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
+    """Spectrum of a fully developed sea (Pierson & Moskowitz 1964) by Hs and Tp.
+
+    Parameters
+    ----------
+    omega : array_like
+        rad/s; at 0 the spectrum is 0.
+    Hs : float
+        Significant height, m.
+    Tp : float
+        Period of the peak, s.
+
+    Returns
+    -------
+    array
+        One-sided density of the elevation, m2 s/rad; its integral is Hs^2 / 16.
+    """
+    peak = 2.0 * np.pi / Tp
+    ratio = np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak  # exp(-1.25 * 50^4) is 0
+    density: Floats = 5.0 / 16.0 * Hs**2 / peak * ratio**-5 * np.exp(-1.25 * ratio**-4)
+    return density
+
+
+def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Floats:
+    """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs.
+
+    Parameters
+    ----------
+    omega : array_like
+        rad/s.
+    Hs, Tp : float
+        Significant height, m, and period of the peak, s.
+    gamma : float
+        Peak enhancement; 1 gives :func:`pierson_moskowitz`.
+
+    Returns
+    -------
+    array
+        One-sided density of the elevation, m2 s/rad; its integral is Hs^2 / 16. The factor
+        1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the exact integral.
+    """
+    ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
+    density: Floats = pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
+    return density
+
+
+def _enhancement(ratio: Floats, gamma: float) -> Floats:
+    width = np.where(ratio <= 1.0, 0.07, 0.09)
+    factor: Floats = gamma ** np.exp(-0.5 * ((ratio - 1.0) / width) ** 2)
+    return factor
+
+
+@lru_cache(maxsize=64)
+def _enhanced(gamma: float) -> float:
+    """What the peak enhancement multiplies the variance with."""
+    logarithm = np.linspace(np.log(0.2), np.log(50.0), 4001)
+    ratio = np.exp(logarithm)
+    plain = pierson_moskowitz(ratio, 4.0, 2.0 * np.pi) * ratio
+    return float(np.trapezoid(plain * _enhancement(ratio, gamma), logarithm) / np.trapezoid(plain, logarithm))
+
+
+def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
+    """Spectrum of the elevation of a sea, m2 s/rad."""
+    return jonswap(omega, waves.significant_height, waves.peak_period, waves.gamma)
+
+
+def frequencies(waves: Waves, points: int = 400) -> Floats:
+    """Frequencies for integrals over the spectrum, from 0.4 to 12 times that of the peak, rad/s."""
+    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, points)
+
+
+def spread(curve: Floats, waves: Waves) -> Floats:
+    """Average a curve over the directions from which the waves of a sea come.
+
+    Parameters
+    ----------
+    curve : array of shape (points,)
+        What waves from one direction do (a variance or a mean force, which add up), over
+        :func:`shipgym.sea.harmonics.circle`.
+    waves : Waves
+        Gives the spreading.
+
+    Returns
+    -------
+    array of shape (points,)
+        Over the mean direction.
+    """
+    if waves.spreading == "long-crested":
+        return curve
+    mu = circle(len(curve))
+    weight = np.where(np.cos(mu) > 0.0, np.cos(mu) ** 2, 0.0)
+    averaged: Floats = np.fft.irfft(np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve))
+    return averaged
+
+
+def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
+    """Frequency with which a ship under way meets waves in deep water.
+
+    Parameters
+    ----------
+    omega : array_like
+        Of the waves, rad/s.
+    speed : array_like
+        Of the ship, m/s.
+    chi : array_like
+        Where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard, rad.
+
+    Returns
+    -------
+    array
+        |omega + omega^2 U cos(chi) / g|, rad/s.
+    """
+    w = np.asarray(omega, dtype=float)
+    met: Floats = np.abs(w + w * w * np.asarray(speed) * np.cos(chi) / GRAVITY)
+    return met
+
+
+def wave_filter(waves: Waves) -> WaveFilter:
+    """Second-order filter whose output has the shape of the wave spectrum and unit variance.
+
+    The relative damping is fitted by least squares to the spectrum of unit variance; it depends on the peak
+    enhancement alone.
+
+    Parameters
+    ----------
+    waves : Waves
+
+    Returns
+    -------
+    WaveFilter
+
+    Notes
+    -----
+    Saelid, Jenssen & Balchen 1983 (Design and analysis of a dynamic positioning system based on Kalman
+    filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, section 8.2.
+    """
+    peak = 2.0 * np.pi / waves.peak_period
+    damping = _fitted_damping(waves.gamma)
+    return WaveFilter(peak, damping, float(2.0 * np.sqrt(damping * peak)))
+
+
+@lru_cache(maxsize=64)
+def _fitted_damping(gamma: float) -> float:
+    from scipy.optimize import minimize_scalar
+
+    w = np.linspace(0.02, 4.0, 2000)
+    target = jonswap(w, 4.0, 2.0 * np.pi, gamma)
+
+    def misfit(damping: float) -> float:
+        error = WaveFilter(1.0, damping, 2.0 * damping**0.5).spectrum(w) - target
+        return float(error @ error)
+
+    return float(minimize_scalar(misfit, bounds=(0.01, 1.0), method="bounded").x)
+
+
+def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
+    """Share of the drift force of an infinitely deep hull that one of this draught takes up.
+
+    Parameters
+    ----------
+    omega : array_like
+        rad/s.
+    draught : float
+        m.
+
+    Returns
+    -------
+    array
+        pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii & Takahashi 1975,
+        Experimental study on the resistance increase of a ship in regular oblique waves, 14th ITTC).
+    """
+    from scipy.special import i1e, k1e
+
+    kT = np.asarray(omega, dtype=float) ** 2 * draught / GRAVITY
+    ratio = k1e(kT) * np.exp(-2.0 * np.minimum(kT, 300.0)) / (np.pi * i1e(kT))
+    share: Floats = 1.0 / (1.0 + ratio**2)
+    return share
+
+
+def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
+    """Process s(t) of the slowly varying drift force, mean force * (1 + s).
+
+    By Newman's approximation the force is the squared envelope of a narrow-banded process with spectrum
+    S(w) c(w), where c is the mean force by squared amplitude. The squared envelope of a Gaussian process is
+    exponentially distributed: its standard deviation is its mean, so that of s is 1. Its spectrum at zero
+    frequency, 8 integral S^2 c^2 dw, gives the integral time scale pi integral S^2 c^2 dw /
+    (integral S c dw)^2. For c the attenuation with draught is taken.
+
+    Parameters
+    ----------
+    waves : Waves
+    particulars : Particulars
+        Gives the draught.
+
+    Returns
+    -------
+    GaussMarkov
+        Time constant, s, and standard deviation, without unit. The Gaussian s lacks the long tail of the
+        exponential distribution and falls below -1 for 16 % of the time.
+
+    Notes
+    -----
+    Newman 1974, Second order slowly varying forces on vessels in irregular waves; Faltinsen 1990, Sea Loads,
+    section 5, equation 5.45 for the spectrum.
+    """
+    if waves.calm:
+        return GaussMarkov(1.0, 0.0)
+    omega = frequencies(waves)
+    draught = weather_particulars(particulars).require("draught")
+    shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)  # the height does not matter
+    weighted = shape * draught_attenuation(omega, draught)
+    time_constant = np.pi * np.trapezoid(weighted**2, omega) / np.trapezoid(weighted, omega) ** 2
+    return GaussMarkov(float(time_constant), 1.0)

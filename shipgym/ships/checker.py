@@ -1,0 +1,289 @@
+"""What is wrong with a ship model: a battery that any model, a user's own included, can be put through."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.ships.catalogue import load_model
+from shipgym.ships.grey_box import GreyBox
+from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.term_table import Structure
+
+if TYPE_CHECKING:
+    from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+SAMPLES = 512
+#: Range of the states looked at, in service speed, service speed by length and rudder limit.
+SURGE, SWAY, YAW_RATE, RUDDER = (0.2, 1.1), 0.3, 0.8, 1.0
+ROLL_RATE, HEEL, MEMORY = 0.5, np.radians(15.0), 0.5  # the memory of yaw by (service speed by length)^2
+RATES = ("u", "v", "r", "p", "q")
+ANGULAR = ("r", "p", "q")
+CAPSIZED = np.radians(60.0)
+STEP = 0.02  # of the time to sail a ship length
+STRAIGHT_LENGTHS, TURN_LENGTHS = 30.0, 40.0
+SMALL_RUDDER = np.radians(5.0)
+RESPONSE_LENGTHS = 3.0
+AGREEMENT = 1e-9
+ASYMMETRIC = 0.1
+SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
+
+
+@dataclass(frozen=True)
+class ModelCheck:
+    """What a check of a model found.
+
+    Attributes
+    ----------
+    name : str
+        Of the model.
+    problems : tuple of str
+        What makes it unfit to be simulated or steered, each with a remedy; empty for a sound model.
+    remarks : tuple of str
+        What is unusual, and may be right.
+    asymmetry : float
+        Root mean square of the accelerations' port/starboard difference over twice their own, over states
+        that a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated.
+    """
+
+    name: str
+    problems: tuple[str, ...]
+    remarks: tuple[str, ...]
+    asymmetry: float
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are no problems."""
+        return not self.problems
+
+    def __str__(self) -> str:
+        """Verdict, then a line for each problem and remark."""
+        verdict = "sound" if self.ok else f"{len(self.problems)} problem(s)"
+        lines = [f"{self.name}: {verdict}; port/starboard asymmetry {100.0 * self.asymmetry:.1f} %"]
+        lines += [f"  problem: {problem}" for problem in self.problems]
+        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+
+
+def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
+    """Look for what is wrong with a model.
+
+    The file and its coefficients; the inertia; accelerations over the states that a manoeuvre passes
+    (finite, as the table of terms says, alike to both sides); straight running; the side to which the rudder
+    turns the ship; hard turns to both sides; the covariance.
+
+    Parameters
+    ----------
+    model : ShipModel, str or Path
+        A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
+        coefficient is missing for instance, is a problem found.
+
+    Returns
+    -------
+    ModelCheck
+    """
+    if not isinstance(model, ShipModel):
+        try:
+            model = load_model(model)
+        except InputError as error:
+            return ModelCheck(str(model), (str(error),), (), float("nan"))
+    try:
+        model.ship_column()
+    except InputError as error:
+        return ModelCheck(model.name, (str(error),), (), float("nan"))
+    problems = list(_wrong_accelerations(model))
+    remarks: list[str] = []
+    asymmetry = float("nan")
+    if not problems:
+        asymmetry = _asymmetry(model)
+        problems += [*_wrong_courses(model), *_wrong_rudder(model)]
+        remarks += _unusual(model, asymmetry)
+    problems += _wrong_covariance(model)
+    return ModelCheck(model.name, tuple(problems), tuple(remarks), asymmetry)
+
+
+def _states(model: ShipModel) -> dict[str, Floats]:
+    """States and commands over the range of hard manoeuvres, each of shape (n,), always the same."""
+    random = np.random.default_rng(0)
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    u = speed * random.uniform(*SURGE, SAMPLES)
+    delta = model.steering.limit * RUDDER * random.uniform(-1.0, 1.0, SAMPLES)
+    return {
+        "u": u,
+        "v": SWAY * u * random.uniform(-1.0, 1.0, SAMPLES),
+        "r": YAW_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
+        "p": ROLL_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
+        "phi": HEEL * random.uniform(-1.0, 1.0, SAMPLES),
+        "q": MEMORY * (speed / length) ** 2 * random.uniform(-1.0, 1.0, SAMPLES),
+        "delta": delta,
+        "n": np.full(SAMPLES, model.service_shaft_speed),
+    }
+
+
+def _rates(model: ShipModel) -> list[str]:
+    """Velocities of the model, and its memory of yaw: what has an acceleration."""
+    return [name for name in RATES if name in model.state_names]
+
+
+def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
+    """Accelerations in the order of `_rates`, shape (n, n_rates)."""
+    zero = np.zeros(SAMPLES)
+    states = np.stack([channels.get(name, zero) for name in model.state_names], axis=-1)
+    commands = np.stack([channels[name] for name in model.command_names], axis=-1)
+    which = [model.state_names.index(name) for name in _rates(model)]
+    return model.derivatives(states, commands)[:, which]
+
+
+def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
+    channels = _states(model)
+    found = _accelerations(model, channels)
+    if not np.all(np.isfinite(found)):
+        row, axis = np.argwhere(~np.isfinite(found))[0]
+        known = [name for name in (*RATES, "phi", "delta") if name in model.state_names]
+        state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
+        yield (
+            f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
+            f"{state} (SI units), expected a number; look for coefficients that are far too large"
+        )
+        return
+    if isinstance(model.dynamics, Structure):
+        written = _from_table(model, model.dynamics, channels)
+        scale = np.abs(written).max(axis=0) + np.finfo(float).tiny
+        worst = float((np.abs(found - written) / scale).max())
+        if not worst < AGREEMENT:
+            yield (
+                f"derivatives: the compiled accelerations differ by {worst:.1e} from those of the table, "
+                f"expected less than {AGREEMENT:g}; empty the cache of compiled ships"
+            )
+
+
+def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats]) -> Floats:
+    """Accelerations as sums of the table's terms, shape (n, n_rates)."""
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    shaft = model.service_shaft_speed
+    theta = table.kernel_coefficients(model.coefficients, model.particulars, shaft)
+    rates = _rates(model)
+    accelerations = np.zeros((SAMPLES, len(rates)))
+    accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
+    row = 0
+    for equation, terms in table.equations.items():
+        features = table.features(equation, channels, model.particulars, shaft)
+        accelerations[:, rates.index(equation)] = features @ theta[row : row + len(terms)]
+        row += len(terms)
+    if "q" in rates:
+        accelerations[:, rates.index("r")] += channels["q"]
+    if isinstance(table, GreyBox):
+        known = table.converted_accelerations(channels, model.particulars, shaft)
+        for axis, equation in enumerate("uvr"):
+            own = accelerations[:, axis] if equation in table.equations else 0.0
+            accelerations[:, axis] = known[equation] + own
+    return accelerations
+
+
+def _asymmetry(model: ShipModel) -> float:
+    """Difference of the accelerations from their mirror image over their size, all in the prime system."""
+    channels = _states(model)
+    odd = ("v", "r", "p", "phi", "q", "delta")
+    mirrored = channels | {name: -channels[name] for name in odd}
+    rates = _rates(model)
+    sign = [-1.0 if name in odd else 1.0 for name in rates]
+    ours, image = _accelerations(model, channels), _accelerations(model, mirrored) * sign
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    unit = [(length if q in ANGULAR else 1.0) * (length / speed if q == "q" else 1.0) for q in rates]
+    difference, size = (ours - image) * unit, (ours * unit)
+    total = float(np.sqrt(np.mean(size**2)))
+    return float(np.sqrt(np.mean(difference**2))) / (2.0 * total) if total > 0.0 else 0.0
+
+
+def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
+    """From service with the rudder held, over so many ship lengths at service speed."""
+    step = STEP * model.particulars["length"] / model.particulars["speed"]
+    commands = np.tile(model.service_command, (round(lengths / STEP), 1))
+    commands[:, 0] = rudder
+    return model.simulate(commands, step)
+
+
+def _wrong_courses(model: ShipModel) -> Iterator[str]:
+    limit = model.steering.limit
+    courses: dict[str, Callable[[], Trial]] = {
+        "straight ahead": lambda: _run(model, 0.0, STRAIGHT_LENGTHS),
+        f"rudder {np.degrees(limit):.0f} deg to starboard": lambda: _run(model, limit, TURN_LENGTHS),
+        f"rudder {np.degrees(limit):.0f} deg to port": lambda: _run(model, -limit, TURN_LENGTHS),
+    }
+    for name, sail in courses.items():
+        try:
+            trial = sail()
+            wrong, heel = "", float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
+        except UnstableModelError as error:
+            wrong, heel = str(error), abs(error.state.get("phi", 0.0))
+        if not heel < CAPSIZED:
+            yield (
+                f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than "
+                f"{np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose coefficient of phi "
+                "rights the ship where it is negative; identify it from trials with more roll"
+            )
+        elif wrong:
+            yield f"{name}: {wrong}; identify it from trials with larger rudder angles, or with fewer terms"
+
+
+def _wrong_rudder(model: ShipModel) -> Iterator[str]:
+    if not _steers(model):
+        return
+    try:
+        turned = [_run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1] for side in (1.0, -1.0)]
+    except UnstableModelError:
+        return  # told by the courses
+    if not turned[0] > turned[1]:
+        port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
+        yield (
+            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate of {starboard:.3g} "
+            f"deg/s, as much to port {port:.3g} deg/s, expected the first to be larger: a positive rudder "
+            "turns to starboard; read the trials with rudder_positive='port', or turn the signs of the terms "
+            "odd in the rudder"
+        )
+
+
+def _steers(model: ShipModel) -> bool:
+    """Whether the model has a rudder and can turn."""
+    table = model.dynamics
+    return not isinstance(table, Structure) or (table.has_rudder and "r" in table.equations)
+
+
+def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
+    if asymmetry > ASYMMETRIC:
+        yield (
+            f"port and starboard differ by {100.0 * asymmetry:.0f} % of the accelerations: more than the "
+            "propeller of a single-screw ship explains; identify from trials that begin to both sides"
+        )
+    if not _steers(model):
+        yield "no rudder turns this model: it is none for an autopilot"
+    try:
+        final = float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1]) / model.particulars["speed"]
+    except UnstableModelError:
+        return
+    if not SPEED_KEPT[0] < final < SPEED_KEPT[1]:
+        yield (
+            f"straight ahead with the rudder amidships its speed becomes {100.0 * final:.0f} % of service "
+            "speed: look at the terms of surge, the service speed and the shaft speed"
+        )
+
+
+def _wrong_covariance(model: ShipModel) -> Iterator[str]:
+    if model.covariance is None:
+        return
+    variances = np.diag(model.covariance)
+    for name, value in zip(model.coefficients, variances, strict=True):
+        if not value >= 0.0:
+            yield f"covariance: variance of '{name}' is {value:g}, expected at least 0"
+            return
+    scale = np.where(variances > 0.0, np.sqrt(variances), 1.0)
+    least = float(np.linalg.eigvalsh(model.covariance / np.outer(scale, scale)).min())
+    if not least > -1e-6:
+        yield f"covariance: least eigenvalue of the correlations {least:.2g}, expected none below 0"

@@ -1,0 +1,285 @@
+"""A ship's steering from one form into another: state space, Nomoto's forms, prime system, and back.
+
+    any ShipModel  ->  steering_state_space, state_space  ->  nomoto (second order, with T of the first)
+    (A, B)  ->  nomoto_of;  linear_steering_ship          nomoto1_ship, nomoto2_ship  ->  any of the above
+    prime  <->  SI: prime_matrices, si_matrices           another length and speed: scale_model
+
+Of a ship with surge or roll the linear forms keep sway and yaw; from a linear form comes back a ship that
+keeps her speed. From Nomoto's form sway cannot come back: two ships that drift otherwise may turn alike.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.ships.linear import (
+    Nomoto,
+    StraightRunning,
+    linearise,
+    nomoto,
+    nomoto_of,
+    steering_state_space,
+    straight_running,
+)
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
+
+if TYPE_CHECKING:
+    from control import StateSpace, TransferFunction
+
+Floats = NDArray[np.float64]
+
+__all__ = [
+    "Nomoto", "StraightRunning", "linear_steering_ship", "linearise", "nomoto", "nomoto1_ship",
+    "nomoto2_ship", "nomoto_of", "prime_matrices", "si_matrices", "state_space", "steering_state_space",
+    "straight_running", "transfer_function",
+]  # fmt: skip
+
+
+def state_space(model: ShipModel, heading: bool = False, gear: bool = False) -> StateSpace:
+    """A ship's steering about straight running as a linear system.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Any ship with a straight course.
+    heading : bool
+        Whether the heading psi is a state.
+    gear : bool
+        Whether the rudder is a state, driven by its order through the gear's lag, without limit and rate.
+
+    Returns
+    -------
+    control.StateSpace
+        States v (q in a table with a memory of yaw), r, and psi, delta where asked for: deviations from
+        straight running in SI units, rudder positive to starboard. Input `delta`, or `delta_command`; the
+        states are the outputs.
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course, or its gear no lag to make a state of.
+    """
+    import control  # here, because it takes a second to import
+
+    A, B = steering_state_space(model)
+    names = ["q" if "q" in model.state_names else "v", "r"]
+    if heading:
+        A = np.block([[A, np.zeros((2, 1))], [np.array([[0.0, 1.0, 0.0]])]])
+        B = np.vstack([B, [[0.0]]])
+        names.append("psi")
+    if gear:
+        lag = model.steering.time_constant
+        if not lag > 0.0:
+            raise InputError(
+                f"steering of {model.name!r}: no lag found, expected a time_constant above 0: a ramp of "
+                "constant rate is not linear; leave gear=False"
+            )
+        A = np.block([[A, B], [np.zeros((1, len(A))), np.array([[-1.0 / lag]])]])
+        B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
+        names.append("delta")
+    return control.ss(
+        A, B, np.eye(len(A)), np.zeros((len(A), 1)), name=model.name.replace(".", "-"),
+        states=names, outputs=names, inputs=["delta_command" if gear else "delta"],
+    )  # fmt: skip
+
+
+def transfer_function(form: Nomoto, order: int = 2) -> TransferFunction:
+    """Nomoto's transfer function from rudder to yaw rate, both in rad.
+
+    Parameters
+    ----------
+    form : Nomoto
+        Of `nomoto`.
+    order : {2, 1}
+        K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), or K / (1 + T s).
+
+    Returns
+    -------
+    control.TransferFunction
+
+    Raises
+    ------
+    InputError
+        For another order, or a form of second order whose poles are a complex pair.
+    """
+    import control
+
+    if order == 1:
+        return control.tf([form.K], [form.T, 1.0], inputs=["delta"], outputs=["r"])
+    if order != 2:
+        raise InputError(f"order: {order!r} found, expected 2 or 1")
+    _need_time_constants(form)
+    denominator = np.polymul([form.T1, 1.0], [form.T2, 1.0])
+    return control.tf([form.K * form.T3, form.K], denominator, inputs=["delta"], outputs=["r"])
+
+
+def nomoto1_ship(
+    K: float, T: float, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto"
+) -> ShipModel:
+    """The ship of Nomoto's first-order form, T rdot + r = K delta.
+
+    Parameters
+    ----------
+    K : float
+        Gain, 1/s, positive to starboard; of the sign of T.
+    T : float
+        Time constant, s; both negative for a ship unstable on her course.
+    particulars : Particulars
+        Length and service speed, which she keeps.
+    steering : SteeringGear, optional
+        By default a usual one.
+    name : str
+        Of the model.
+
+    Returns
+    -------
+    ShipModel
+        Of structure `nomoto`.
+
+    Raises
+    ------
+    InputError
+        For a number that is none, or zero, or a rudder that turns to the wrong side (K / T < 0).
+    """
+    _check_effect(check_number(K, "K") * check_number(T, "T"), "K and T")
+    coefficients = {"c_r": -1.0 / T, "c_d": K / T}
+    return ShipModel(name, "nomoto", particulars, steering or SteeringGear(), coefficients)
+
+
+def nomoto2_ship(
+    form: Nomoto, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto2"
+) -> ShipModel:
+    """The ship of Nomoto's second-order form.
+
+    Parameters
+    ----------
+    form : Nomoto
+        K, T1, T2, T3; its T is not used.
+    particulars, steering, name
+        As in `nomoto1_ship`.
+
+    Returns
+    -------
+    ShipModel
+        Of structure `nomoto2`, which turns as the form says and does not drift.
+
+    Raises
+    ------
+    InputError
+        For time constants that are zero or a complex pair.
+    """
+    _need_time_constants(form)
+    product = form.T1 * form.T2
+    if product == 0.0 or form.K == 0.0:
+        raise InputError(f"nomoto: {form} found, expected K, T1 and T2 other than 0")
+    coefficients = {
+        "c_r": -(form.T1 + form.T2) / product,
+        "c_d": form.K * form.T3 / product,
+        "e_r": -1.0 / product,
+        "e_d": form.K / product,
+    }
+    return ShipModel(name, "nomoto2", particulars, steering or SteeringGear(), coefficients)
+
+
+def linear_steering_ship(
+    A: ArrayLike,
+    B: ArrayLike,
+    particulars: Particulars,
+    steering: SteeringGear | None = None,
+    name: str = "linear-steering",
+) -> ShipModel:
+    """The ship of linear steering dynamics d/dt (v, r) = A (v, r) + B delta at service speed.
+
+    Parameters
+    ----------
+    A : array-like of shape (2, 2)
+    B : array-like of shape (2, 1)
+        SI units, delta positive to starboard, as `steering_state_space` gives them.
+    particulars : Particulars
+        Length and service speed.
+    steering, name
+        As in `nomoto1_ship`.
+
+    Returns
+    -------
+    ShipModel
+        Of structure `linear-steering`: at another speed its derivatives follow by the prime system.
+
+    Raises
+    ------
+    InputError
+        For matrices of another shape, or with values that are no numbers.
+    """
+    a, b = prime_matrices(A, B, particulars.require("length"), particulars.require("speed"))
+    rows = np.hstack([a, b])
+    coefficients = {
+        f"{equation}_{term}": float(rows[i, j])
+        for i, equation in enumerate("bc")
+        for j, term in enumerate("vrd")
+    }
+    return ShipModel(name, "linear-steering", particulars, steering or SteeringGear(), coefficients)
+
+
+def prime_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
+    """Linear steering dynamics in the prime system: v by U, r by U / L, time by L / U.
+
+    Parameters
+    ----------
+    A : array-like of shape (2, 2)
+    B : array-like of shape (2, 1)
+        SI units.
+    length, speed : float
+        m and m/s.
+
+    Returns
+    -------
+    A : array of shape (2, 2)
+    B : array of shape (2, 1)
+
+    Raises
+    ------
+    InputError
+        For matrices of another shape, or a length or speed that is not positive.
+    """
+    a, b, unit, time = _checked(A, B, length, speed)
+    return a * time * unit / unit[:, None], b * time / unit[:, None]
+
+
+def si_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
+    """Linear steering dynamics of the prime system in SI units, the inverse of `prime_matrices`."""
+    a, b, unit, time = _checked(A, B, length, speed)
+    return a / time / unit * unit[:, None], b / time * unit[:, None]
+
+
+def _checked(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats, Floats, float]:
+    """Matrices, units of (v, r) and of time."""
+    check_number(length, "length", above=0.0, hint="in m")
+    check_number(speed, "speed", above=0.0, hint="in m/s")
+    a, b = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
+    for name, matrix, shape in (("A", a, (2, 2)), ("B", b, (2, 1))):
+        if matrix.shape != shape or not np.all(np.isfinite(matrix)):
+            raise InputError(f"{name}: shape {matrix.shape} found, expected {shape} finite numbers")
+    return a, b, np.array([speed, speed / length]), length / speed
+
+
+def _check_effect(effect: float, what: str) -> None:
+    if not effect > 0.0:
+        raise InputError(
+            f"{what}: of different sign, or zero, expected both positive (a stable ship) or both negative: a "
+            "positive rudder turns to starboard"
+        )
+
+
+def _need_time_constants(form: Nomoto) -> None:
+    if not np.all(np.isfinite([form.K, form.T1, form.T2, form.T3])):
+        raise InputError(
+            f"nomoto: {form} found, expected numbers: poles that are a complex pair have no two time "
+            "constants; use state_space"
+        )

@@ -1,0 +1,114 @@
+"""Mass and added mass that belong to a ship's accelerations, so that these can be turned into forces."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.ships.shared_structure import SharedStructure
+from shipgym.ships.ship_model import ShipModel
+
+Floats = NDArray[np.float64]
+
+
+def inertia(model: ShipModel, water_depth: float = np.inf) -> Floats:
+    """Mass and added mass, those with which the model's equations divide its forces.
+
+    Parameters
+    ----------
+    model : ShipModel
+        A reference ship has them in its own numbers; an identified structure in its particulars, which are
+        estimated where absent.
+    water_depth : float
+        m; the tanker's added mass grows in shallow water.
+
+    Returns
+    -------
+    array of shape (3, 4)
+        From the accelerations in surge, sway, yaw and roll to surge force, sway force and yaw moment about
+        midship; SI units.
+
+    Raises
+    ------
+    InputError
+        If the particulars do not tell the mass.
+    """
+    own = {"container": _container, "kvlcc2": _kvlcc2}
+    if model.structure == "tanker":
+        return _tanker(model, water_depth)
+    return own.get(model.structure, _particulars)(model)
+
+
+def rigid_inertia(model: ShipModel) -> tuple[float, float, float]:
+    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, of the ship alone, about midship."""
+    numbers = model.coefficients
+    if model.structure == "container":
+        unit = _prime_mass(model)
+        return numbers["m"] * unit, 0.0, numbers["Iz"] * unit * model.particulars["length"] ** 2
+    if model.structure == "kvlcc2":
+        mass = model.particulars["water_density"] * numbers["volume"]
+        gyradius, xg = 0.25 * numbers["L"], numbers["xG"]
+        return mass, mass * xg, mass * (gyradius**2 + xg**2)
+    p = model.particulars.completed()
+    mass, xg = p.require("mass"), p.require("xg")
+    return mass, mass * xg, mass * (p.require("yaw_gyradius") ** 2 + xg**2)
+
+
+def _prime_mass(model: ShipModel) -> float:
+    """Unit of mass in the prime system, kg."""
+    p = model.particulars.completed()
+    return float(0.5 * p.require("water_density") * p.length**3)
+
+
+def _particulars(model: ShipModel) -> Floats:
+    p = model.particulars.completed()
+    unit, L = _prime_mass(model), p.length
+    if isinstance(model.dynamics, SharedStructure):
+        arms = np.array([1.0, 1.0, L])
+        added = model.dynamics.inertia(model.coefficients, p) * np.outer(arms, arms)
+        return unit * np.hstack([added, np.zeros((3, 1))])
+    m, static = p.mass_prime, p.mass_prime * p.xg_prime
+    prime = np.zeros((3, 4))
+    prime[0, 0] = m - p.require("X_udot")
+    prime[1, 1], prime[1, 2] = m - p.require("Y_vdot"), (static - p.require("Y_rdot")) * L
+    prime[2, 1] = (static - p.require("N_vdot")) * L
+    prime[2, 2] = (p.inertia_prime - p.require("N_rdot")) * L * L
+    return unit * prime
+
+
+def _container(model: ShipModel) -> Floats:
+    """Son & Nomoto 1981; the added mass in sway acts above the centre, so that roll couples to sway."""
+    c, L = model.coefficients, model.particulars["length"]
+    prime = np.zeros((3, 4))
+    prime[0, 0] = c["m"] + c["mx"]
+    prime[1, 1], prime[1, 2], prime[1, 3] = (
+        c["m"] + c["my"],
+        c["my"] * c["alpha_y"] * L,
+        -c["my"] * c["ly"] * L,
+    )
+    prime[1, 2] = prime[2, 1] = c["my"] * c["alpha_y"] * L
+    prime[2, 2] = (c["Iz"] + c["Jz"]) * L * L
+    return _prime_mass(model) * prime
+
+
+def _kvlcc2(model: ShipModel) -> Floats:
+    """Yasukawa & Yoshimura 2015, equations 6 and 7."""
+    c, density = model.coefficients, model.particulars["water_density"]
+    added = 0.5 * density * c["L"] ** 2 * c["d"]
+    mass, static, yaw = rigid_inertia(model)
+    matrix = np.zeros((3, 4))
+    matrix[0, 0] = mass + c["mx"] * added
+    matrix[1, 1], matrix[1, 2] = mass + c["my"] * added, static
+    matrix[2, 1], matrix[2, 2] = static, yaw + c["Jz"] * added * c["L"] ** 2
+    return matrix
+
+
+def _tanker(model: ShipModel, water_depth: float) -> Floats:
+    """Van Berlekom & Goddard 1972, bis system: by the ship's mass, its yaw inertia by mass and length^2."""
+    c, p = model.coefficients, model.particulars
+    shallow = 0.0 if np.isposinf(water_depth) else p["draught"] / (water_depth - p["draught"])
+    matrix = np.zeros((3, 4))
+    matrix[0, 0] = c["m11"] - c["X_udotz"] * shallow
+    matrix[1, 1] = c["m22"] - c["Y_vdotz"] * shallow
+    matrix[2, 2] = (c["m33"] - c["N_rdotz"] * shallow) * p["length"] ** 2
+    return float(p["mass"]) * matrix

@@ -1,0 +1,325 @@
+"""Steering linearised about straight running: state space, Nomoto's forms and course stability.
+
+Sources: Nomoto, Taguchi, Honda & Hirano 1957, On the steering qualities of ships, International
+Shipbuilding Progress 4; Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 7.2
+(second-order transfer function, T = T1 + T2 - T3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+
+if TYPE_CHECKING:
+    from shipgym.ships.ship_model import ShipModel
+
+Floats = NDArray[np.float64]
+
+STEP = 1e-4  # of the finite differences, prime system; the error is its square
+SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed where surge is to be believed
+LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
+LARGEST_SWAY = 0.5  # over service speed, likewise
+AT_REST = 1e-8  # prime acceleration that is none
+BALANCED_BY = {
+    "u": "u",
+    "v": "v",
+    "delta": "r",
+    "phi": "p",
+    "q": "q",
+    "n": "n",
+}  # rate that each unknown brings to 0
+
+
+@dataclass(frozen=True)
+class StraightRunning:
+    """The steady state in which a ship holds its course.
+
+    Attributes
+    ----------
+    surge, sway : float
+        Speeds along the body's axes, m/s.
+    rudder : float
+        The neutral rudder, rad, positive to starboard.
+    heel : float
+        Rad, starboard down; 0 where the model knows no roll.
+    shaft_speed : float
+        1/s; 0 where the model's shaft has no dynamics.
+    memory : float
+        Yaw acceleration that a table with a memory `q` keeps, rad/s^2.
+    """
+
+    surge: float
+    sway: float
+    rudder: float
+    heel: float = 0.0
+    shaft_speed: float = 0.0
+    memory: float = 0.0
+
+    def state(self, model: ShipModel) -> Floats:
+        """The state vector, in the order of `model.state_names`, shape (n_state,)."""
+        values = {
+            "u": self.surge,
+            "v": self.sway,
+            "delta": self.rudder,
+            "phi": self.heel,
+            "n": self.shaft_speed,
+            "q": self.memory,
+        }
+        return np.array([values.get(name, 0.0) for name in model.state_names])
+
+
+@dataclass(frozen=True)
+class Nomoto:
+    """Nomoto's transfer function from rudder to yaw rate, positive to starboard.
+
+        r / delta = K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)),    about    K / (1 + T s).
+
+    K and T are positive for a ship stable on its course and negative for one that is not.
+
+    Attributes
+    ----------
+    K : float
+        Gain, 1/s.
+    T1, T2 : float
+        Time constants, the larger magnitude first, s; nan where the poles are a complex pair.
+    T3 : float
+        Time constant of the zero, s.
+    T : float
+        Time constant of the first-order form, T1 + T2 - T3, s.
+    """
+
+    K: float
+    T1: float
+    T2: float
+    T3: float
+    T: float
+
+    @property
+    def rudder_effect(self) -> float:
+        """K / T, 1/s^2: yaw acceleration per rudder angle in the first-order form."""
+        return self.K / self.T
+
+
+def straight_running(model: ShipModel, speed: float | None = None) -> StraightRunning:
+    """Speed, drift and neutral rudder at which a ship runs straight.
+
+    A single-screw ship needs a little rudder to run straight (Mariner 1.1 degrees to port). Where the model's
+    surge equation has no steady speed near service speed, that of service is held.
+
+    Parameters
+    ----------
+    model : ShipModel
+    speed : float, optional
+        Surge speed that is held instead, m/s, with the shaft as at service speed: a ship that has lost
+        speed in a turn or in weather.
+
+    Returns
+    -------
+    StraightRunning
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course within physical drift and rudder angles.
+    """
+    found = None
+    if speed is None:
+        found = _balance(model, [name for name in BALANCED_BY if name in model.state_names])
+    if found is None or not SLOWEST < found["u"] / model.particulars["speed"] < FASTEST:
+        others = [name for name in BALANCED_BY if name in model.state_names and name != "u"]
+        found = _balance(model, others, speed)
+    if found is None:
+        held = speed or model.particulars["speed"]
+        raise InputError(
+            f"model {model.name!r}: no straight course found with less than "
+            f"{np.degrees(LARGEST_RUDDER):.0f} deg of rudder at {held:g} m/s; identify "
+            f"it from trials that turn to both sides, or check the sign of the rudder"
+        )
+    rest = (found.get(name, 0.0) for name in ("phi", "n", "q"))
+    return StraightRunning(found["u"], found["v"], found["delta"], *rest)
+
+
+def _balance(model: ShipModel, unknowns: list[str], speed: float | None = None) -> dict[str, float] | None:
+    """State without accelerations, found from a speed by changing the unknowns; SI units by name."""
+    from scipy.optimize import root
+
+    columns = [model.state_names.index(name) for name in unknowns]
+    balances = [model.state_names.index(BALANCED_BY[name]) for name in unknowns]
+    scales = _scales(model)
+
+    def state_with(deviations: Floats) -> Floats:
+        state = model.service_state.copy()
+        if speed is not None and "u" in model.state_names:
+            state[model.state_names.index("u")] = speed
+        state[columns] += deviations * scales[columns]
+        return state
+
+    def imbalance(deviations: Floats) -> Floats:
+        return _rates(model, state_with(deviations))[balances]
+
+    found = root(imbalance, np.zeros(len(unknowns)), tol=1e-12)
+    state = dict(zip(model.state_names, state_with(found.x).tolist(), strict=True))
+    at_rest = bool(np.all(np.abs(imbalance(found.x)) < AT_REST))
+    small = abs(state["v"]) < LARGEST_SWAY * model.particulars["speed"]
+    return state if at_rest and small and abs(state["delta"]) < LARGEST_RUDDER else None
+
+
+def _scales(model: ShipModel) -> Floats:
+    """Unit of each state in the prime system (the shaft's: its service speed), shape (n_state,)."""
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    units = {
+        "u": speed,
+        "v": speed,
+        "r": speed / length,
+        "p": speed / length,
+        "q": (speed / length) ** 2,
+        "n": model.service_shaft_speed or 1.0,
+    }
+    return np.array([units.get(name, 1.0) for name in model.state_names])
+
+
+def _rates(model: ShipModel, states: Floats) -> Floats:
+    """Prime time derivatives of states (..., n_state), the rudder held and the shaft at service speed."""
+    commands = np.broadcast_to(model.service_command, (*states.shape[:-1], len(model.command_names))).copy()
+    rudder = states[..., model.state_names.index("delta")]
+    commands[..., 0] = np.clip(rudder, -0.5 * np.pi, 0.5 * np.pi)  # a search may go beyond any rudder
+    time = model.particulars["length"] / model.particulars["speed"]
+    return np.asarray(model.derivatives(states, commands) * time / _scales(model))
+
+
+def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Floats, Floats]:
+    """Linear steering dynamics about a state without yaw rate, by differences.
+
+    Speed and shaft are held. Roll, where the model knows it, is taken to follow at once. Where even the
+    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken,
+    unless a side is given.
+
+    Parameters
+    ----------
+    model : ShipModel
+    at : StraightRunning
+        The state about which small deviations are taken.
+    side : {0, 1, -1}
+        Of both sides the mean, or turns to starboard (1: drift to port, yaw rate to starboard), or to port.
+
+    Returns
+    -------
+    A : array of shape (2, 2)
+    B : array of shape (2, 1)
+        d/dt (v, r) = A (v, r) + B delta, deviations in SI units, delta positive to starboard; the memory q of
+        yaw stands in place of v in a table that has one, because its ship does not drift.
+    """
+    first = "q" if "q" in model.state_names else "v"
+    names = (first, "r", *(name for name in ("p", "phi") if name in model.state_names))
+    varied = [model.state_names.index(name) for name in (*names, "delta")]
+    n = len(names)
+    scales = _scales(model)
+    steps = np.zeros((n + 1, len(scales)))
+    steps[range(n + 1), varied] = STEP * scales[varied]
+    if side:
+        steps *= side * np.array([-1.0] + n * [1.0])[:, None]
+    state = at.state(model)
+    behind = state - (0.0 if side else 1.0) * steps
+    change = (_rates(model, state + steps) - _rates(model, behind))[:, varied[:n]]
+    jacobian = change.T / (STEP * (side * np.array([-1.0] + n * [1.0]) if side else 2.0))
+    if n > 2:
+        follows = np.linalg.solve(jacobian[2:, 2:n], jacobian[2:][:, [0, 1, n]])
+        jacobian = jacobian[:2][:, [0, 1, n]] - jacobian[:2, 2:n] @ follows
+    units = scales[varied[:2]]
+    per_time = model.particulars["speed"] / model.particulars["length"]
+    A = per_time * units[:, None] * jacobian[:, :2] / units
+    B = per_time * units[:, None] * jacobian[:, 2:]
+    return A, B
+
+
+def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
+    """Linear steering dynamics about straight running.
+
+    Parameters
+    ----------
+    model : ShipModel
+
+    Returns
+    -------
+    A : array of shape (2, 2)
+    B : array of shape (2, 1)
+        d/dt (v, r) = A (v, r) + B delta, SI units, delta positive to starboard.
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course.
+    """
+    return linearise(model, straight_running(model))
+
+
+def nomoto_of(A: Floats, B: Floats) -> Nomoto:
+    """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, equations 7.40 to 7.44).
+
+    Parameters
+    ----------
+    A : array of shape (2, 2)
+    B : array of shape (2, 1)
+
+    Returns
+    -------
+    Nomoto
+
+    Raises
+    ------
+    InputError
+        If a steady rudder does not turn the ship.
+    """
+    determinant, trace = float(np.linalg.det(A)), float(np.trace(A))
+    numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
+    if numerator == 0.0 or determinant == 0.0:
+        raise InputError("nomoto: the rudder has no steady effect on the ship, or the ship no damping")
+    poles = np.linalg.eigvals(A)
+    time_constants = -1.0 / poles if np.all(np.isreal(poles)) else np.full(2, np.nan)
+    T1, T2 = sorted(np.real(time_constants).tolist(), key=abs, reverse=True)
+    T3 = float(B[1, 0]) / numerator
+    return Nomoto(K=numerator / determinant, T1=T1, T2=T2, T3=T3, T=-trace / determinant - T3)
+
+
+def nomoto(model: ShipModel) -> Nomoto:
+    """Nomoto's transfer function of a ship about straight running.
+
+    Parameters
+    ----------
+    model : ShipModel
+
+    Returns
+    -------
+    Nomoto
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course, or its rudder no effect.
+    """
+    return nomoto_of(*steering_state_space(model))
+
+
+def is_course_stable(model: ShipModel) -> bool:
+    """Whether the ship, with the rudder held, comes back to a straight course after a disturbance.
+
+    Parameters
+    ----------
+    model : ShipModel
+
+    Returns
+    -------
+    bool
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course.
+    """
+    A, _ = steering_state_space(model)
+    return bool(np.all(np.linalg.eigvals(A).real < 0.0))

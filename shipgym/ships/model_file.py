@@ -1,0 +1,250 @@
+"""The model file: JSON, versioned, written whole or not at all, validated field by field on reading.
+
+Format 1:
+
+    format         1
+    name           text
+    structure      {"name", "source", "normalisation", "quantity", "equations": {"u" | "v" | "r" | "p" | "q":
+                   [{"name", "powers"}, ...]}}, where normalisation ("prime") and quantity ("force") may be
+                   absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
+                   [{"coefficient", "name", "powers", "sign"}, ...]}};
+                   for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether
+                   the shaft speed is known) and "reference": a reference ship, as a whole model file
+    normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
+                   ship
+    service_shaft_speed  1/s
+    coefficients   {name: value}
+    covariance     null or a list of rows, in the order of the coefficients
+    particulars    SI units, added masses in the prime system, "estimated": names
+    steering       {"rudder_limit_deg", "rudder_rate_deg_s", "time_constant"}
+    envelope       null or {"channels", "low", "high", "centre", "shape"} of u, v, r, delta
+    provenance     null or an object
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.errors import InputError
+from shipgym.json_file import read_json, write_json
+from shipgym.ships.envelope import CHANNELS, Envelope
+from shipgym.ships.equations import EQUATIONS, Equations
+from shipgym.ships.grey_box import GreyBox
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
+from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import EQUATION_NAMES, SYMBOLS, Structure
+
+FORMAT = 1
+FIELDS = (
+    "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
+    "steering", "service_shaft_speed", "envelope", "provenance",
+)  # fmt: skip
+REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
+
+
+def save(model: ShipModel, path: Path) -> None:
+    """Write a model file: to a temporary name, then renamed."""
+    write_json(model_fields(model), path)
+
+
+def model_fields(model: ShipModel) -> dict[str, Any]:
+    """What a model file holds, ready for JSON."""
+    return {
+        "format": FORMAT,
+        "name": model.name,
+        "structure": model.dynamics.to_dict(),
+        "normalisation": _normalisation(model.dynamics),
+        "coefficients": model.coefficients,
+        "covariance": None if model.covariance is None else model.covariance.tolist(),
+        "particulars": model.particulars.to_dict(),
+        "steering": model.steering.to_dict(),
+        "service_shaft_speed": model.service_shaft_speed,
+        "envelope": None if model.envelope is None else model.envelope.to_dict(),
+        "provenance": model.provenance,
+    }
+
+
+def load(path: Path) -> ShipModel:
+    """Read and validate a model file."""
+    fields = read_json(path, "model file", "identify the model again or take another copy")
+    try:
+        return read_model(fields, str(path))
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
+
+
+def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
+    """The model that `model_fields` wrote.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
+    if "format" in fields and fields["format"] != FORMAT:
+        raise InputError(
+            f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
+        )
+    check_keys(fields, FIELDS, where)
+    for name in REQUIRED:
+        if name not in fields:
+            raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
+    dynamics = _dynamics(fields["structure"], f"{where}: structure")
+    normalisation = _normalisation(dynamics)
+    if fields.get("normalisation", normalisation) != normalisation:
+        raise InputError(
+            f"{where}: normalisation {fields['normalisation']!r} found, expected {normalisation!r}"
+        )
+    coefficients = _coefficients(fields["coefficients"], dynamics, f"{where}: coefficients")
+    covariance = fields.get("covariance")
+    provenance = fields.get("provenance")
+    model = ShipModel(
+        name=check_text(fields["name"], f"{where}: name"),
+        structure=dynamics.name,
+        particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
+        steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
+        coefficients=coefficients,
+        covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
+        envelope=read_envelope(fields.get("envelope"), f"{where}: envelope"),
+        provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
+        own_table=dynamics if isinstance(dynamics, Structure) else None,
+        service_shaft_speed=check_number(
+            fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
+        ),
+    )
+    if model.particulars.speed is None:
+        raise InputError(f"{where}: particulars.speed: missing, expected the service speed in m/s")
+    model.ship_column()  # refuses particulars that the structure cannot do with
+    return model
+
+
+def _normalisation(dynamics: Structure | Equations) -> str:
+    return dynamics.normalisation if isinstance(dynamics, Structure) else "own"
+
+
+def _dynamics(value: Any, where: str) -> Structure | Equations:
+    """A table of terms, or the name of a reference ship's equations."""
+    table = check_table(value, where)
+    keys = ("name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares")
+    check_keys(table, keys, where)
+    if "shares" in table:
+        return _shared(table, where)
+    if "equations" in table:
+        structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
+        return _grey_box(structure, table, where) if {"reference", "shaft"} & table.keys() else structure
+    return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
+
+
+def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> GreyBox:
+    """A table of terms that is added to a reference ship, which is held whole."""
+    reference = check_table(table.get("reference"), f"{where}.reference")
+    shaft = table.get("shaft", False)
+    if not isinstance(shaft, bool):
+        raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
+    return GreyBox(
+        structure.name,
+        structure.source,
+        structure.equations,
+        structure.normalisation,
+        structure.quantity,
+        read_model(reference, f"{where}.reference"),
+        shaft,
+    )
+
+
+def _structure(table: Mapping[str, Any], where: str) -> Structure:
+    equations = check_table(table.get("equations"), f"{where}.equations")
+    check_keys(equations, EQUATION_NAMES, f"{where}.equations")
+    for equation, terms in equations.items():
+        if not isinstance(terms, list) or not terms:
+            raise InputError(f"{where}.equations.{equation}: expected a list of terms")
+        for i, entry in enumerate(terms):
+            place = f"{where}.equations.{equation}[{i}]"
+            term = check_table(entry, place)
+            check_keys(term, ("name", "powers"), place)
+            check_text(term.get("name"), f"{place}.name")
+            check_keys(check_table(term.get("powers"), f"{place}.powers"), SYMBOLS, f"{place}.powers")
+    check_text(table.get("source"), f"{where}.source")
+    check_text(table.get("name"), f"{where}.name")
+    return Structure.from_dict(table)
+
+
+def _shared(table: Mapping[str, Any], where: str) -> Structure:
+    """A table for the forces of captive tests."""
+    shares = check_table(table["shares"], f"{where}.shares")
+    check_keys(shares, AXES, f"{where}.shares")
+    known = (*SYMBOLS, *ACCELERATIONS)
+    for axis in AXES:
+        listed = shares.get(axis)
+        if not isinstance(listed, list) or not listed:
+            raise InputError(f"{where}.shares.{axis}: expected a list of shares")
+        for i, entry in enumerate(listed):
+            place = f"{where}.shares.{axis}[{i}]"
+            share = check_table(entry, place)
+            check_keys(share, ("coefficient", "name", "powers", "sign"), place)
+            for name in ("coefficient", "name"):
+                check_text(share.get(name), f"{place}.{name}")
+            check_keys(check_table(share.get("powers"), f"{place}.powers"), known, f"{place}.powers")
+            check_number(share.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
+    check_text(table.get("source"), f"{where}.source")
+    check_text(table.get("name"), f"{where}.name")
+    return SharedStructure.from_dict(table)
+
+
+def _coefficients(value: Any, structure: Structure | Equations, where: str) -> dict[str, float]:
+    table = check_table(value, where)
+    names = structure.coefficient_names
+    if len(table) != len(names):
+        raise InputError(
+            f"{where}: {len(table)} found, expected {len(names)} for structure '{structure.name}'; "
+            f"missing: {quoted(name for name in names if name not in table)}"
+        )
+    check_keys(table, names, where)
+    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+
+
+def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    matrix = _numbers(value, (n, n), f"{where}: covariance")
+    if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
+        raise InputError(f"{where}: covariance: not symmetric")
+    if np.any(np.diag(matrix) < 0.0):
+        raise InputError(f"{where}: covariance: a variance on the diagonal is negative")
+    return matrix
+
+
+def read_envelope(value: Any, where: str) -> Envelope | None:
+    """The envelope that `Envelope.to_dict` wrote; None for null.
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
+    if value is None:
+        return None
+    table = check_table(value, where)
+    check_keys(table, ("channels", "low", "high", "centre", "shape"), where)
+    if table.get("channels") != list(CHANNELS):
+        raise InputError(f"{where}.channels: {table.get('channels')!r} found, expected {list(CHANNELS)}")
+    for name, shape in (("low", (4,)), ("high", (4,)), ("centre", (4,)), ("shape", (4, 4))):
+        _numbers(table.get(name), shape, f"{where}.{name}")
+    return Envelope.from_dict(table)
+
+
+def _numbers(value: Any, shape: tuple[int, ...], where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """An array of finite numbers of the given shape."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{where}: expected numbers of shape {shape}, all rows of one length") from None
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        raise InputError(f"{where}: shape {array.shape} found, expected {shape} finite numbers")
+    return array

@@ -1,0 +1,132 @@
+"""A model at another length and speed: from model scale to full scale and back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.ships.envelope import Envelope
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
+from shipgym.ships.term_table import Structure
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+Floats = NDArray[np.float64]
+
+#: Powers of the length with which the particulars grow; those without unit stay.
+GROWTH = {
+    "beam": 1, "draught": 1, "xg": 1, "yaw_gyradius": 1, "rudder_area": 2, "propeller_diameter": 1,
+    "length_overall": 1, "frontal_area": 2, "lateral_area": 2, "lateral_centroid": 1,
+    "lateral_centroid_height": 1, "metacentric_height": 1, "roll_period": 0.5,
+}  # fmt: skip
+
+
+def scale_model(
+    model: ShipModel, length: float, speed: float | None = None, water_density: float | None = None
+) -> ShipModel:
+    """A geometrically similar ship of another length, at another service speed.
+
+    What has no unit stays: the manoeuvre is the same in ship lengths sailed. Speeds go with the ratio of
+    the service speeds, times with that of the times to sail a ship length; the steering gear follows.
+    Scale effects (friction, wake) are not estimated.
+
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    length : float
+        Of the new ship, m.
+    speed : float, optional
+        Its service speed, m/s; by default that of the same Froude number.
+    water_density : float, optional
+        Of its water, kg/m3; by default as it was.
+
+    Returns
+    -------
+    ShipModel
+
+    Raises
+    ------
+    InputError
+        For a length, speed or density that is not positive, and for reference ships, whose equations are
+        written for one length.
+
+    Notes
+    -----
+    Froude's law: speed as the root of the length, so that gravity and inertia stay in proportion (ITTC
+    Recommended Procedure 7.5-02-06-01). At another Froude number the righting moment of a table with roll,
+    which is gravity's, does not follow the speed: keep to the default there.
+    """
+    table = model.dynamics
+    if not isinstance(table, Structure):
+        raise InputError(
+            f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
+            "for one length; expected a model with a table of terms, such as one identified from its trials"
+        )
+    check_number(length, "length", above=0.0, hint="in m")
+    size = length / model.particulars.length
+    if speed is None:
+        speed = model.particulars["speed"] * np.sqrt(size)
+    check_number(speed, "speed", above=0.0, hint="in m/s")
+    fast = float(speed) / model.particulars["speed"]
+    factors = _coefficient_factors(table, model, size, fast)
+    return replace(
+        model,
+        particulars=_particulars(model.particulars, size, float(speed), water_density),
+        steering=_steering(model.steering, fast / size),
+        coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
+        covariance=_covariance(model.covariance, factors),
+        envelope=_envelope(model.envelope, np.array([fast, fast, fast / size, 1.0])),
+        provenance=(model.provenance or {})
+        | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
+        service_shaft_speed=model.service_shaft_speed * fast / size,
+    )
+
+
+def _coefficient_factors(table: Structure, model: ShipModel, size: float, fast: float) -> dict[str, float]:
+    """What each coefficient is multiplied by: 1 for those without unit, the change of units in SI."""
+    if table.normalisation != "si":
+        return dict.fromkeys(table.coefficient_names, 1.0)
+    similar = replace(table, normalisation="service")
+    return {
+        name: similar.feature_scale(equation, term, size, fast, fast / size)
+        for equation in table.equations
+        for name, term in zip(table.names(equation), table.terms(equation), strict=True)
+    }
+
+
+def _particulars(ship: Particulars, size: float, speed: float, water_density: float | None) -> Particulars:
+    changes = {name: ship[name] * size**power for name, power in GROWTH.items() if ship[name] is not None}
+    density = ship.water_density if water_density is None else water_density
+    if ship.mass is not None:
+        denser = 1.0 if water_density is None else water_density / ship.require("water_density")
+        changes["mass"] = ship.mass * size**3 * denser
+    return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
+
+
+def _steering(gear: SteeringGear, quicker: float) -> SteeringGear:
+    return SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker)
+
+
+def _covariance(covariance: Floats | None, factors: Mapping[str, float]) -> Floats | None:
+    if covariance is None:
+        return None
+    scale = np.array(list(factors.values()))
+    scaled: Floats = covariance * np.outer(scale, scale)
+    return scaled
+
+
+def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:
+    if envelope is None:
+        return None
+    return Envelope(
+        envelope.low * scale, envelope.high * scale, envelope.centre * scale, envelope.shape / scale
+    )

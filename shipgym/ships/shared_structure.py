@@ -1,0 +1,265 @@
+"""Tables for forces in which a coefficient may stand in several equations, added masses among them.
+
+The vectorial model of captive tests: Xu, Hassani & Guedes Soares 2020, Truncated least square support vector
+machine for parameter estimation of a nonlinear manoeuvring model based on PMM tests, equations 18 to 21 and
+39 to 41. Its hydrodynamic forces hold accelerations, so that the mass to be accelerated follows from the
+coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.term_table import Structure
+from shipgym.ships.terms import Term
+
+Floats = NDArray[np.float64]
+
+AXES = ("u", "v", "r")
+ACCELERATIONS = ("udot", "vdot", "rdot")
+VR, RR, UR = Term("vr", (("v", 1), ("r", 1))), Term("rr", (("r", 2),)), Term("ur", (("u", 1), ("r", 1)))
+
+
+@dataclass(frozen=True)
+class Share:
+    """A coefficient's share in the force of one equation: sign times coefficient times term.
+
+    Attributes
+    ----------
+    coefficient : str
+        Its name: `Y_vdot`.
+    term : Term
+        Of velocities, or one acceleration (`udot`, `vdot`, `rdot`).
+    sign : float
+        1 or -1.
+    """
+
+    coefficient: str
+    term: Term
+    sign: float = 1.0
+
+    @property
+    def acceleration(self) -> str | None:
+        """The acceleration it is on, None for velocities."""
+        symbol = self.term.powers[0][0] if self.term.powers else ""
+        return symbol if symbol in ACCELERATIONS else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """As it stands in a model file."""
+        term = {"name": self.term.name, "powers": dict(self.term.powers)}
+        return {"coefficient": self.coefficient, **term, "sign": self.sign}
+
+
+@dataclass(frozen=True)
+class SharedStructure(Structure):
+    """A table for the hydrodynamic forces X, Y, N, prime system, that is identified from captive tests.
+
+    Its `equations` are the terms that a simulation sums up: those of velocities of the shares, alike for
+    sway and yaw, and the centripetal ones of the ship's own mass. Make one by `shared_structure`.
+
+    Attributes
+    ----------
+    shares : dict of str to tuple of Share
+        What makes up X (`u`), Y (`v`) and N (`r`).
+    """
+
+    shares: Mapping[str, tuple[Share, ...]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        where = f"structure '{self.name}'"
+        if tuple(self.shares) != AXES:
+            raise InputError(f"{where}: shares of {tuple(self.shares)} found, expected of 'u', 'v', 'r'")
+        for axis, shares in self.shares.items():
+            for share in shares:
+                across = (axis == "u") != (share.acceleration == "udot")
+                if share.acceleration is not None and across:
+                    raise InputError(
+                        f"{where}: '{share.acceleration}' found in the equation of '{axis}', expected 'udot' "
+                        "in that of surge, 'vdot' and 'rdot' in those of sway and yaw"
+                    )
+
+    @property
+    def captive(self) -> bool:
+        """Its added masses are among the unknowns, which only measured forces tell from the mass."""
+        return True
+
+    @cached_property
+    def coefficient_names(self) -> tuple[str, ...]:
+        """Each coefficient once, those of X first."""
+        return tuple(dict.fromkeys(share.coefficient for axis in AXES for share in self.shares[axis]))
+
+    def names(self, equation: str) -> tuple[str, ...]:
+        """Names of the coefficients in one equation."""
+        return tuple(dict.fromkeys(share.coefficient for share in self.shares[equation]))
+
+    def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
+        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3): negative added mass."""
+        matrix = np.zeros((3, 3))
+        for i, axis in enumerate(AXES):
+            for share in self.shares[axis]:
+                if share.acceleration is not None:
+                    j = ACCELERATIONS.index(share.acceleration)
+                    matrix[i, j] += share.sign * coefficients[share.coefficient]
+        return matrix
+
+    def inertia(self, coefficients: Mapping[str, float], particulars: Particulars) -> Floats:
+        """Mass of the ship and identified added mass, prime system, shape (3, 3).
+
+        Raises
+        ------
+        InputError
+            If it is not positive, or the particulars do not tell the mass.
+        """
+        m, static = particulars.mass_prime, particulars.mass_prime * particulars.xg_prime
+        rigid = np.array([[m, 0.0, 0.0], [0.0, m, static], [0.0, static, particulars.inertia_prime]])
+        total: Floats = rigid - self.added_mass(coefficients)
+        if total[0, 0] <= 0.0 or np.linalg.det(total[1:, 1:]) <= 0.0:
+            raise InputError(
+                f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are "
+                "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0"
+            )
+        return total
+
+    def kernel_coefficients(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Coefficients of the SI features of the accelerations: the forces by mass and added mass."""
+        p = particulars.completed()
+        forces = {axis: self._velocity_forces(axis, coefficients, p) for axis in AXES}
+        mobility = np.linalg.inv(self.inertia(coefficients, p))
+        rows = [
+            mobility[0, 0] * forces["u"],
+            mobility[1, 1] * forces["v"] + mobility[1, 2] * forces["r"],
+            mobility[2, 1] * forces["v"] + mobility[2, 2] * forces["r"],
+        ]
+        scales = [
+            [self.feature_scale(axis, term, p.length, p.require("speed"), 0.0) for term in self.terms(axis)]
+            for axis in AXES
+        ]
+        return np.concatenate([row * scale for row, scale in zip(rows, map(np.array, scales), strict=True)])
+
+    def _velocity_forces(self, axis: str, coefficients: Mapping[str, float], p: Particulars) -> Floats:
+        """Coefficient of each term of an equation in its force, that of the ship's own mass included."""
+        terms = self.terms(axis)
+        row = {frozenset(term.powers): i for i, term in enumerate(terms)}
+        force = np.zeros(len(terms))
+        for share in self.shares[axis]:
+            if share.acceleration is None:
+                place = row[frozenset(share.term.powers)]
+                force[place] += share.sign * coefficients[share.coefficient]
+        m, static = p.mass_prime, p.mass_prime * p.xg_prime
+        own = {"u": ((VR, m), (RR, static)), "v": ((UR, -m),), "r": ((UR, -static),)}
+        for term, value in own[axis]:
+            force[row[frozenset(term.powers)]] += value
+        return force
+
+    def acceleration_matrix(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
+        """None: the added masses are among the unknowns, which free-running trials cannot tell apart.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        raise InputError(
+            f"structure '{self.name}': free-running trials found, expected captive tests with the channels "
+            "X, Y, N: its added masses are among the unknowns; use identification.identify_forces"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The table as it stands in a model file."""
+        return {
+            "name": self.name,
+            "source": self.source,
+            "shares": {axis: [share.to_dict() for share in shares] for axis, shares in self.shares.items()},
+        }
+
+    @classmethod
+    def from_dict(cls, table: Mapping[str, Any]) -> SharedStructure:
+        """The table from a model file."""
+        shares = {
+            axis: tuple(
+                Share(s["coefficient"], Term(s["name"], tuple(s["powers"].items())), s["sign"])
+                for s in listed
+            )
+            for axis, listed in table["shares"].items()
+        }
+        return shared_structure(table["name"], table["source"], shares)
+
+
+def shared_structure(name: str, source: str, shares: Mapping[str, tuple[Share, ...]]) -> SharedStructure:
+    """A table for forces from its shares.
+
+    Parameters
+    ----------
+    name, source : str
+        Of the table.
+    shares : dict of str to tuple of Share
+        Of the equations `u`, `v`, `r`.
+
+    Returns
+    -------
+    SharedStructure
+
+    Raises
+    ------
+    InputError
+        For a table that cannot be computed.
+    """
+    velocity = {
+        axis: [share.term for share in listed if share.acceleration is None]
+        for axis, listed in shares.items()
+    }
+    across = _distinct([*velocity.get("v", ()), *velocity.get("r", ()), UR])
+    equations = {"u": _distinct([*velocity.get("u", ()), VR, RR]), "v": across, "r": across}
+    return SharedStructure(name, source, equations, "prime", "force", dict(shares))
+
+
+def _distinct(terms: list[Term]) -> tuple[Term, ...]:
+    """Each product once."""
+    return tuple({frozenset(term.powers): term for term in reversed(terms)}.values())[::-1]
+
+
+def read_shares(text: str) -> tuple[Share, ...]:
+    """Shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`, and others given as `Y_vdot:vr`.
+
+    Parameters
+    ----------
+    text : str
+        Separated by spaces; after a colon the term where it is not that of the coefficient's name, a leading
+        minus for the sign.
+
+    Returns
+    -------
+    tuple of Share
+    """
+    shares = []
+    for word in text.split():
+        sign, body = (-1.0, word[1:]) if word[0] == "-" else (1.0, word)
+        coefficient, _, term = body.partition(":")
+        shares.append(Share(coefficient, _term(term or coefficient.partition("_")[2]), sign))
+    return tuple(shares)
+
+
+def _term(letters: str) -> Term:
+    """A term from its short name: velocities u, v, r, some between bars, or one acceleration."""
+    if letters in ACCELERATIONS:
+        return Term(letters, ((letters, 1),))
+    powers: dict[str, int] = {}
+    bars = False
+    for letter in letters:
+        if letter == "|":
+            bars = not bars
+        else:
+            symbol = f"|{letter}|" if bars else letter
+            powers[symbol] = powers.get(symbol, 0) + 1
+    return Term(letters, tuple(powers.items()))

@@ -1,0 +1,150 @@
+"""Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError, UnstableModelError
+from shipgym.kernels import layout, weather_rows
+from shipgym.sea.conditions import Weather
+from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.orders import checked_orders
+from shipgym.ships.ship_model import Seed, ShipModel, two_commands
+from shipgym.trials.trial import Trial
+from shipgym.trials.units import CHANNELS
+
+Floats = NDArray[np.float64]
+LONGEST_STEP = 0.025  # of the time to travel one ship length
+
+
+def simulate(
+    model: ShipModel,
+    commands: ArrayLike,
+    dt: float,
+    state: ArrayLike | None = None,
+    water_depth: float = np.inf,
+    kind: str | None = None,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
+) -> Trial:
+    """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
+    held = checked_orders(model, commands)
+    if not (np.isfinite(dt) and dt > 0.0):
+        raise InputError(f"dt: {dt} found, expected a step in s above 0")
+    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    states = passage.states(model.kernel_states(initial_state(model, state)[None])[0], len(held))
+    reached = passage.kernel("trajectories").simulate(
+        states, two_commands(held), dt, passage.sky, passage.words, passage.ship
+    )
+    times = dt * np.arange(len(states), dtype=float)
+    if reached < len(held):
+        raise unstable(model, times[reached], states[reached])
+    return as_trial(model, times, states, np.vstack([held, held[-1:]]), kind)
+
+
+def open_loop(model: ShipModel, trial: Trial) -> Trial:
+    """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
+
+    The rudder is taken straight between the samples, as measured: no steering gear stands between.
+
+    Parameters
+    ----------
+    model : ShipModel
+        The ship.
+    trial : Trial
+        With the channels u, v, r, psi, delta (x and y where recorded; n where the model has a shaft).
+
+    Returns
+    -------
+    Trial
+        The simulated state at the times of the trial.
+
+    Raises
+    ------
+    InputError
+        If a channel is missing.
+    UnstableModelError
+        Where the simulated ship leaves every physical range.
+    """
+    needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
+    missing = [name for name in needed if name not in trial.channels]
+    if missing:
+        raise InputError(
+            f"trial {trial.name!r}: channel {missing[0]!r} is missing, it is needed to predict the trial"
+        )
+    t = np.array(trial.t)
+    states = np.empty((len(t), layout.N_STATE))
+    first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
+    n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    states[0] = model.kernel_states(_settled(model, np.array([first]), n[:1]))[0]
+    longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
+    reached = model.kernel("open_loop").open_loop(
+        states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
+    )
+    if reached < len(t) - 1:
+        raise unstable(model, t[reached], states[reached])
+    return Trial(
+        t,
+        _channels(model, states),
+        name=trial.name,
+        kind=trial.kind,
+        use=trial.use,
+        length=model.particulars["length"],
+    )
+
+
+def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
+    """A given state, checked, or straight ahead at service speed."""
+    if state is None:
+        return model.service_state
+    start = np.asarray(state, dtype=float)
+    if start.shape != (len(model.state_names),) or not np.all(np.isfinite(start)):
+        raise InputError(
+            f"state: shape {start.shape} found, expected {len(model.state_names)} finite numbers for "
+            f"{', '.join(model.state_names)}"
+        )
+    return start
+
+
+def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
+    """States of the kernels, the weather behind them and the commands held from each sample on as a Trial."""
+    channels = _channels(model, states)
+    for name, values in zip(weather_rows.CHANNEL_NAMES, states[:, layout.N_STATE :].T, strict=False):
+        if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
+            channels[name] = values
+    for name, command in zip(model.command_names, commands.T, strict=True):
+        channels[f"{name}_command"] = command
+        if name == "n":
+            channels.setdefault(
+                "n", command
+            )  # a shaft without lag turns as ordered, and is part of the record
+    return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
+
+
+def _channels(model: ShipModel, states: Floats) -> dict[str, Floats]:
+    """What can be recorded of the kernels' states; a memory of yaw cannot."""
+    columns = zip(model.state_names, model.own_states(states).T, strict=True)
+    return {name: column for name, column in columns if name in CHANNELS}
+
+
+def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
+    """States whose memory of yaw, which no trial records, is that of a steady yaw rate."""
+    if "q" in model.state_names:
+        commands = np.stack([states[:, -1], shaft], axis=-1)[:, : len(model.command_names)]
+        rates = model.derivatives(states, commands)
+        states[:, model.state_names.index("q")] = -rates[:, model.state_names.index("r")]
+    return states
+
+
+def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
+    """The error for a ship that ran away after a given time and physical state."""
+    last = dict(zip(model.state_names, model.own_states(state[None])[0].tolist(), strict=True))
+    heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
+    long = "" if time_s > 0.0 else ", or the step is far too long for it"
+    return UnstableModelError(
+        f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
+        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",
+        time_s,
+        last,
+    )

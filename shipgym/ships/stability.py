@@ -1,0 +1,103 @@
+"""Whether a ship holds a straight course by itself: the straight-line stability of naval architecture.
+
+Sources: Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SNAME 54; Lewis 1989,
+Principles of Naval Architecture III, chapter IX, section 4 (the criterion C).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.ships.linear import linearise, straight_running
+
+if TYPE_CHECKING:
+    from shipgym.ships.ship_model import ShipModel
+
+Floats = NDArray[np.float64]
+SIDES = {"starboard": 1, "port": -1}
+
+
+@dataclass(frozen=True)
+class StraightLineStability:
+    """Straight-line stability with the rudder held.
+
+    Attributes
+    ----------
+    eigenvalues : dict of str to tuple of complex
+        Of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part
+        first. They are the same for a ship alike to both sides.
+    criterion : dict of str to float, or None
+        C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
+        where the particulars do not tell the mass.
+    """
+
+    eigenvalues: dict[str, tuple[complex, ...]]
+    criterion: dict[str, float] | None
+
+    @property
+    def index(self) -> float:
+        """Largest real part of the eigenvalues of either side, 1/s: negative for a stable ship."""
+        return max(values[0].real for values in self.eigenvalues.values())
+
+    @property
+    def stable(self) -> bool:
+        """Whether a disturbance to either side dies out."""
+        return self.index < 0.0
+
+    @property
+    def unstable_sides(self) -> tuple[str, ...]:
+        """Sides to which the ship leaves her course by herself."""
+        return tuple(side for side, values in self.eigenvalues.items() if not values[0].real < 0.0)
+
+
+def straight_line_stability(model: ShipModel) -> StraightLineStability:
+    """Straight-line stability of a ship about straight running, rudder, speed and shaft held.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Any ship that sails; roll is taken to follow at once.
+
+    Returns
+    -------
+    StraightLineStability
+
+    Raises
+    ------
+    InputError
+        If the model has no straight course.
+
+    Notes
+    -----
+    The criterion is the determinant of the linear derivatives of force, which is that of the inertia times
+    that of the linearised accelerations; the inertia is positive, so both tell the same.
+    """
+    at = straight_running(model)
+    matrices = {name: linearise(model, at, side)[0] for name, side in SIDES.items()}
+    eigenvalues = {
+        name: tuple(sorted(np.linalg.eigvals(A).tolist(), key=lambda value: -complex(value).real))
+        for name, A in matrices.items()
+    }
+    return StraightLineStability(eigenvalues, _criterion(model, matrices))
+
+
+def _criterion(model: ShipModel, matrices: dict[str, Floats]) -> dict[str, float] | None:
+    """Determinant of the force derivatives of sway and yaw, prime system; None without sway or mass."""
+    from shipgym.ships.inertia import inertia
+
+    if "q" in model.state_names:
+        return None
+    try:
+        M = inertia(model)[1:, 1:3]
+        p = model.particulars.completed()
+        unit = 0.5 * p.require("water_density") * p.length**3
+    except InputError:
+        return None
+    length, speed = p.length, model.particulars["speed"]
+    size = unit**2 * length**2 * (speed / length) ** 2
+    return {name: float(np.linalg.det(M) * np.linalg.det(A) / size) for name, A in matrices.items()}

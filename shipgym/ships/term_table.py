@@ -1,0 +1,405 @@
+"""A structure: for each equation of motion a table of terms, linear in the coefficients.
+
+The same table serves identification (stacked over samples), simulation (compiled, one state at a time) and
+the model file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_choice, check_text, quoted
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
+
+Floats = NDArray[np.float64]
+
+FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
+#: As Zhu 2018 names the coefficients of surge, sway and yaw; roll, and the memory of yaw, go on from there.
+ACCELERATION_OF_EQUATION = {"u": "a", "v": "b", "r": "c", "p": "d", "q": "e"}
+EQUATION_NAMES = tuple(ACCELERATION_OF_EQUATION)
+ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
+NORMALISATIONS = ("prime", "service", "si")
+QUANTITIES = ("force", "acceleration")
+ALWAYS_MEASURED = frozenset(("u", "v", "r", "delta"))
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A table of terms for surge, sway, yaw and roll, or some of them.
+
+    Without an equation of surge the ship keeps the speed it has; without one of sway or of yaw it does not
+    drift or turn, and what drift or turn it is given dies out within about a ship length; without one of
+    roll it stays upright.
+
+    Yaw may have a memory q: part of its acceleration that builds up, rdot = (terms of `r`) + q and
+    qdot = (terms of `q`). It is the state that makes yaw of second order without sway.
+
+    Attributes
+    ----------
+    name : str
+        Name by which `identify` and model files know it.
+    source : str
+        Where it was published.
+    equations : dict of str to tuple of Term
+        Terms of surge (`u`), sway (`v`), yaw (`r`), roll (`p`) and of the memory of yaw (`q`), in this
+        order; roll and memory of accelerations only, and not both.
+    normalisation : {"prime", "service", "si"}
+        Units of the terms and of what they make up. "prime": divided by the instantaneous speed U and the
+        length (u/U, rL/U, nL/U; force by rho L^2 U^2 / 2, acceleration by U^2 / L). "service": the same with
+        the service speed U0 in place of U, shaft speed divided by that of service. "si": as they are.
+    quantity : {"force", "acceleration"}
+        What the terms make up (those of `q` accelerations per time). Accelerations follow from forces by
+        the inertia of the particulars (mass
+        and added mass, sway and yaw coupled).
+
+    Raises
+    ------
+    InputError
+        For a table that cannot be computed, naming equation and term.
+    """
+
+    name: str
+    source: str
+    equations: Mapping[str, tuple[Term, ...]]
+    normalisation: str = "prime"
+    quantity: str = "force"
+
+    def __post_init__(self) -> None:
+        where = f"structure '{self.name}'"
+        check_text(self.name, "structure: name")
+        check_text(self.source, f"{where}: source")
+        check_choice(self.normalisation, NORMALISATIONS, f"{where}: normalisation")
+        check_choice(self.quantity, QUANTITIES, f"{where}: quantity")
+        known = [equation for equation in EQUATION_NAMES if equation in self.equations]
+        if not known or list(self.equations) != known:
+            raise InputError(
+                f"{where}: equations {quoted(self.equations)} found, expected some of "
+                f"{quoted(EQUATION_NAMES)}, in this order"
+            )
+        for equation, terms in self.equations.items():
+            _check_terms(terms, self.normalisation, f"{where}: equations.{equation}")
+        self._check_roll_and_memory(where)
+        self._check_inertia(where)
+
+    def _check_roll_and_memory(self, where: str) -> None:
+        rolls, remembers = "p" in self.equations, "q" in self.equations
+        rolling = [symbol for symbol in self.symbols if symbol in ROLL]
+        if rolling and not rolls:
+            raise InputError(
+                f"{where}: symbol '{rolling[0]}' found, expected an equation of roll 'p' beside it; give its "
+                "terms, or leave roll out"
+            )
+        if remembers and ("r" not in self.equations or rolls):
+            raise InputError(
+                f"{where}: equations {quoted(self.equations)} found, expected the memory 'q' of yaw beside "
+                "an equation 'r' and without one of roll 'p'"
+            )
+        if (rolls or remembers) and self.quantity != "acceleration":
+            raise InputError(
+                f"{where}: forces found, expected accelerations in a table with roll 'p' or memory 'q'"
+            )
+
+    def _check_inertia(self, where: str) -> None:
+        if self.quantity != "force":
+            return
+        if self.normalisation == "si":
+            raise InputError(
+                f"{where}: forces in 'si' found, expected the 'prime' or 'service' normalisation"
+            )
+        sway, yaw = (self.equations.get(equation) for equation in ("v", "r"))
+        if sway and yaw and [term.powers for term in sway] != [term.powers for term in yaw]:
+            raise InputError(
+                f"{where}: 'v' and 'r' differ, expected the same terms in the same order, because inertia "
+                "couples the two forces; make them the same, or write accelerations"
+            )
+
+    @property
+    def prefixes(self) -> Mapping[str, str]:
+        """First letter of the coefficients of each equation: X, Y, N of forces, a to e of accelerations."""
+        return FORCE_OF_EQUATION if self.quantity == "force" else ACCELERATION_OF_EQUATION
+
+    def names(self, equation: str) -> tuple[str, ...]:
+        """Names of the coefficients of one equation."""
+        return tuple(f"{self.prefixes[equation]}_{term.name}" for term in self.terms(equation))
+
+    @cached_property
+    def coefficient_names(self) -> tuple[str, ...]:
+        """Names in the order of the equations: `X_u`, ..., `Y_v`, ..., `N_r`."""
+        return tuple(name for equation in self.equations for name in self.names(equation))
+
+    @cached_property
+    def symbols(self) -> tuple[str, ...]:
+        """Symbols that stand in its terms."""
+        used = {symbol for terms in self.equations.values() for term in terms for symbol, _ in term.powers}
+        return tuple(symbol for symbol in SYMBOLS if symbol in used)
+
+    @cached_property
+    def required_channels(self) -> tuple[str, ...]:
+        """Channels a trial needs so that the model can be identified and its envelope be known."""
+        channels = {CHANNEL[symbol] for symbol in self.symbols} | ALWAYS_MEASURED
+        channels |= {"p"} & self.equations.keys()
+        return tuple(name for name in SYMBOLS if name in channels - {"U"})
+
+    @property
+    def captive(self) -> bool:
+        """Whether it is identified from the forces of captive tests, not from free-running trials."""
+        return False
+
+    @property
+    def has_rudder(self) -> bool:
+        """Whether the rudder stands in a term."""
+        return "delta" in {CHANNEL[symbol] for symbol in self.symbols}
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Rudder, and shaft speed where it stands in a term."""
+        return ("delta", "n") if "n" in self.required_channels else ("delta",)
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the state."""
+        roll = ("p", "phi") if "p" in self.equations else ()
+        memory = ("q",) if "q" in self.equations else ()
+        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
+
+    @property
+    def regressed(self) -> tuple[str, ...]:
+        """Equations that have a regression of their own; the memory's terms belong to that of yaw."""
+        return tuple(equation for equation in self.equations if equation != "q")
+
+    def regression_names(self, equation: str) -> tuple[str, ...]:
+        """Names of the coefficients in the regression of one equation."""
+        memory = self.names("q") if equation == "r" and "q" in self.equations else ()
+        return self.names(equation) + memory
+
+    @property
+    def shallow_water(self) -> bool:
+        """Whether the depth of the water is known to it."""
+        return False
+
+    def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
+        """Source of the compiled accelerations; the coefficients are read at run time."""
+        return self._source
+
+    @cached_property
+    def _source(self) -> str:
+        """Written once, however many models share the table."""
+        from shipgym.engine.generator import accelerations_source
+
+        return accelerations_source(self)
+
+    def kernel_coefficients(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Coefficients of the SI features, in the order of the kernel's rows."""
+        matrix = self.acceleration_matrix(particulars, shaft_speed)
+        values: Floats = matrix @ np.array(list(coefficients.values()))
+        return values
+
+    def terms(self, equation: str) -> tuple[Term, ...]:
+        """Terms of one equation."""
+        return self.equations[equation]
+
+    def speed_power(self, equation: str, term: Term) -> int:
+        """Power of U in the feature: in the prime system 2 (memory: 3) less one per velocity, else none."""
+        if self.normalisation != "prime":
+            return 0
+        return self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES, *SHAFT_SPEEDS)
+
+    @staticmethod
+    def unit_speeds(equation: str) -> int:
+        """Power of the speed in the unit of what an equation makes up."""
+        return 3 if equation == "q" else 2
+
+    def feature_scale(self, equation: str, term: Term, length: float, speed: float, shaft: float) -> float:
+        """Coefficient of the SI feature that makes the term an acceleration for a coefficient of 1.
+
+        Parameters
+        ----------
+        equation : str
+            `u`, `v`, `r`, `p` or `q`.
+        term : Term
+            One of its terms.
+        length, speed, shaft : float
+            Ship length, m, service speed, m/s, and shaft speed at service speed, 1/s.
+        """
+        if self.normalisation == "si":
+            return 1.0
+        lengths = term.power(*TURN_RATES) + 1 - self.unit_speeds(equation) - (equation in ANGULAR)
+        turns = term.power(*SHAFT_SPEEDS)
+        if self.normalisation == "prime":
+            return float(length ** float(lengths + turns))
+        speeds = self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
+        return float(length ** float(lengths) * speed ** float(speeds) / (shaft**turns if turns else 1.0))
+
+    def features(
+        self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Terms of one equation on samples, in SI units.
+
+        Parameters
+        ----------
+        equation : str
+            `u`, `v`, `r`, `p` or `q`.
+        channels : mapping of str to array of shape (n_samples,)
+            At least those of its terms and u, v; SI units.
+        particulars : Particulars
+            Gives the service speed.
+        shaft_speed : float
+            At service speed, 1/s.
+
+        Returns
+        -------
+        array of shape (n_samples, n_terms)
+            Features of which the acceleration is a linear combination.
+        """
+        u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
+        offsets = {"du": particulars["speed"], "dn": shaft_speed}
+        values = {"U": np.hypot(u, v)}
+        for symbol in self.symbols:
+            if symbol != "U":
+                channel = np.asarray(channels[CHANNEL[symbol]], dtype=float)
+                shifted = channel - offsets[symbol] if symbol in offsets else channel
+                values[symbol] = np.abs(shifted) if symbol[0] == "|" else shifted
+        columns = []
+        for term in self.terms(equation):
+            column = values["U"] ** float(self.speed_power(equation, term))
+            for symbol, power in term.powers:
+                column = column * values[symbol] ** float(power)
+            columns.append(column)
+        return np.stack(columns, axis=-1)
+
+    def acceleration_matrix(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
+        """Matrix from the coefficients to those of the SI features of the accelerations.
+
+        Forces are divided by inertia: surge by m' - X_udot', sway and yaw, which must have the same terms,
+        by their 2x2 inertia [[m' - Y_vdot', m'xG' - Y_rdot'], [m'xG' - N_vdot', Iz' - N_rdot']]
+        (Chislett & Strom-Tejsen 1965), either alone by its own entry of that.
+
+        Parameters
+        ----------
+        particulars : Particulars
+            Of forces with mass, inertia and added mass (`Particulars.completed`).
+        shaft_speed : float
+            At service speed, 1/s.
+
+        Returns
+        -------
+        array of shape (n_coefficients, n_coefficients)
+            Invertible, so that identified features give coefficients.
+
+        Raises
+        ------
+        InputError
+            If the inertia is not positive, or the shaft speed is needed and not known.
+        """
+        if self.needs_shaft_speed and not shaft_speed > 0.0:
+            raise InputError(
+                f"service_shaft_speed: {shaft_speed:g} found, expected the shaft speed at service speed in "
+                f"1/s: the terms of structure '{self.name}' refer to it"
+            )
+        speed = particulars["speed"]
+        scales = [
+            self.feature_scale(equation, term, particulars["length"], speed, shaft_speed)
+            for equation, terms in self.equations.items()
+            for term in terms
+        ]
+        if self.quantity == "acceleration":
+            return np.diag(np.array(scales))
+        return np.array(scales)[:, None] * self._mobility_matrix(particulars)
+
+    @property
+    def needs_shaft_speed(self) -> bool:
+        """Whether the terms refer to the shaft speed at service speed."""
+        scaled = self.normalisation == "service" and "n" in self.command_names
+        return scaled or "dn" in self.symbols
+
+    def _mobility_matrix(self, particulars: Particulars) -> Floats:
+        """Inverse inertia, by which the coefficients of forces become those of accelerations."""
+        axes = [list(FORCE_OF_EQUATION).index(equation) for equation in self.equations]
+        mobility = np.linalg.inv(inertia(particulars)[np.ix_(axes, axes)])
+        counts = [len(terms) for terms in self.equations.values()]
+        starts = np.cumsum([0, *counts])
+        matrix = np.zeros((starts[-1],) * 2)
+        for i, j in np.argwhere(mobility != 0.0):
+            rows, columns = (slice(starts[k], starts[k + 1]) for k in (i, j))
+            matrix[rows, columns] = mobility[i, j] * np.eye(counts[i])
+        return matrix
+
+    def to_dict(self) -> dict[str, Any]:
+        """The table as it stands in a model file."""
+        table: dict[str, Any] = {"name": self.name, "source": self.source}
+        if self.normalisation != "prime":
+            table["normalisation"] = self.normalisation
+        if self.quantity != "force":
+            table["quantity"] = self.quantity
+        table["equations"] = {
+            equation: [{"name": term.name, "powers": dict(term.powers)} for term in terms]
+            for equation, terms in self.equations.items()
+        }
+        return table
+
+    @classmethod
+    def from_dict(cls, table: Mapping[str, Any]) -> Structure:
+        """The table from a model file (validated by `shipgym.ships.model_file`)."""
+        equations = {
+            equation: tuple(Term(term["name"], tuple(term["powers"].items())) for term in terms)
+            for equation, terms in table["equations"].items()
+        }
+        return cls(
+            table["name"],
+            table["source"],
+            equations,
+            table.get("normalisation", "prime"),
+            table.get("quantity", "force"),
+        )
+
+
+def inertia(particulars: Particulars) -> Floats:
+    """Mass, yaw inertia and added mass of surge, sway and yaw, prime system, shape (3, 3).
+
+    Raises
+    ------
+    InputError
+        If it is not positive.
+    """
+    p = particulars
+    m, xg = p.mass_prime, p.xg_prime
+    matrix = np.array(
+        [
+            [m - p.require("X_udot"), 0.0, 0.0],
+            [0.0, m - p.require("Y_vdot"), m * xg - p.require("Y_rdot")],
+            [0.0, m * xg - p.require("N_vdot"), p.inertia_prime - p.require("N_rdot")],
+        ]
+    )
+    if matrix[0, 0] <= 0.0 or np.linalg.det(matrix[1:, 1:]) <= 0.0:
+        raise InputError(
+            "The inertia of the ship is not positive: mass, xg, yaw_gyradius and added masses do not "
+            "belong together. Added masses are in the prime system and negative (X_udot, Y_vdot, N_rdot)."
+        )
+    return matrix
+
+
+def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> None:
+    if not terms:
+        raise InputError(f"{where}: no terms found, expected at least one")
+    for term in terms:
+        term.check(where)
+        if normalisation == "prime" and term.power("U"):
+            raise InputError(
+                f"{where}: term '{term.name}': 'U' found, which is 1 in the prime system; leave it out, or "
+                "choose the 'service' or 'si' normalisation"
+            )
+    names = [term.name for term in terms]
+    products = [frozenset(term.powers) for term in terms]
+    for i, (name, product) in enumerate(zip(names, products, strict=True)):
+        if name in names[:i] or product in products[:i]:
+            raise InputError(f"{where}: a term stands twice in one equation: '{name}'")

@@ -1,0 +1,1 @@
+"""Recorded manoeuvres: trials, their files, units and plausibility."""

@@ -1,0 +1,130 @@
+"""Which column of a file holds which channel, in which unit, and where a sample stands in the file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym.checks import check_keys, check_table, check_text, quoted
+from shipgym.errors import InputError
+from shipgym.trials.csv_reader import CsvTable
+from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
+
+
+@dataclass(frozen=True)
+class Column:
+    """Where a channel stands in a file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the column.
+    unit : str
+        Its unit, one of the channel's in :data:`shipgym.trials.units.UNITS`.
+    """
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True)
+class Source:
+    """The file behind some samples, so that a message can name line, column and unit.
+
+    Attributes
+    ----------
+    table : CsvTable
+        The file.
+    columns : dict of str to Column
+        By channel, ``t`` included.
+    rows : ndarray of shape (n_samples,) of int
+        Row of the table behind each sample.
+    """
+
+    table: CsvTable
+    columns: Mapping[str, Column]
+    rows: npt.NDArray[np.intp]
+
+    def at(self, sample: int, channel: str) -> str:
+        """Return the place of a value: ``run.csv: line 12 (data row 11), column 'yaw'``."""
+        row = int(self.rows[sample])
+        return f"{self.table.path}: {self.table.place(row)}, column '{self.columns[channel].name}'"
+
+    def declare(self, channel: str, unit: str) -> str:
+        """Return how to declare another unit: ``r = { column = "yaw", unit = "deg/s" }``."""
+        return f'{channel} = {{ column = "{self.columns[channel].name}", unit = "{unit}" }}'
+
+
+def parse_columns(columns: Mapping[str, Any], where: str = "columns") -> dict[str, Column]:
+    """Check a table of columns and fill in the SI units.
+
+    Parameters
+    ----------
+    columns : mapping of str to str or mapping
+        For each channel its column, or ``{"column": name, "unit": unit}``.
+    where : str, optional
+        Start of the messages.
+
+    Returns
+    -------
+    dict of str to Column
+        By channel.
+
+    Raises
+    ------
+    InputError
+        For an unknown channel, key or unit, or a unit of another quantity.
+    """
+    parsed: dict[str, Column] = {}
+    for channel, entry in check_table(columns, where).items():
+        check_channel(channel, where)
+        place, unit = f"{where} {channel}", si_unit(channel)
+        if isinstance(entry, Mapping):
+            check_keys(entry, ("column", "unit"), place)
+            name = entry.get("column")
+            unit = entry.get("unit", unit)
+        else:
+            name = entry
+        if not isinstance(name, str):
+            example = f'{{ column = "name", unit = "{si_unit(channel)}" }}'
+            raise InputError(f"{place}: {entry!r} found, expected the name of a column or {example}")
+        si_factor(channel, unit, place)
+        parsed[channel] = Column(check_text(name, place).strip(), unit)
+    return parsed
+
+
+def choose_columns(table: CsvTable, columns: Mapping[str, Any] | None) -> dict[str, Column]:
+    """Return the columns to read from a file, ``t`` first.
+
+    Parameters
+    ----------
+    table : CsvTable
+        The file.
+    columns : mapping, or None
+        As :func:`parse_columns` takes it, ``t`` being column "t" where it is not given. None: every column
+        that is named like a channel, in SI units.
+
+    Raises
+    ------
+    InputError
+        Where a column is missing, or none is named like a channel.
+    """
+    if columns is None:
+        named = {name: name for name in QUANTITIES if name in table.header}
+        if set(named) <= {"t"}:
+            raise InputError(
+                f"{table.path}: no column is named like a channel ({quoted(QUANTITIES)}). Columns present: "
+                f"{quoted(table.header)}. Name the column of each channel in [columns] (or columns=...)"
+            )
+        columns = named
+    chosen = parse_columns(columns, f"{table.path}: columns:")
+    time = chosen.pop("t", Column("t", "s"))
+    if not chosen:
+        raise InputError(
+            f"{table.path}: columns: no channel named besides time, expected some of {quoted(QUANTITIES)}"
+        )
+    return {"t": time, **chosen}

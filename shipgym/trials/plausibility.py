@@ -1,0 +1,293 @@
+"""Values that no ship can have, and channels that contradict each other: most often a wrong unit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym.errors import InputError
+from shipgym.trials.columns import Source
+from shipgym.trials.units import QUANTITIES, UNITS, si_factor
+
+if TYPE_CHECKING:
+    from shipgym.ships.particulars import Particulars
+    from shipgym.trials.trial import Trial
+
+Array = npt.NDArray[np.float64]
+_DEGREE = math.pi / 180.0
+
+#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
+LIMITS: dict[str, float] = {
+    "psi": 100.0,
+    "r": 60.0 * _DEGREE,
+    "p": 360.0 * _DEGREE,
+    "phi": 180.0 * _DEGREE,
+    "delta": 90.0 * _DEGREE,
+    "delta_command": 90.0 * _DEGREE,
+    "u": 50.0,
+    "v": 50.0,
+    "n": 200.0,
+    "n_command": 200.0,
+}
+
+_FASTEST_TURN = 60.0 * _DEGREE
+_MOST = 0.95  # share of the samples that count: the others may be outliers
+_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
+_FASTEST_TIP = 100.0  # m/s at the propeller's tip
+_SPEEDS = (0.2, 2.0)  # of a trial, by the service speed
+_LARGEST_JUMP = 30.0 * _DEGREE
+_WINDOWS = 30
+
+
+def check_ranges(channels: Mapping[str, Array], source: Source) -> None:
+    """Refuse values beyond :data:`LIMITS`.
+
+    Parameters
+    ----------
+    channels : mapping of str to ndarray of shape (n_samples,)
+        In SI units.
+    source : Source
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        Naming line, column, value, limit, and the unit that would make the values plausible.
+    """
+    for channel, limit in LIMITS.items():
+        if channel not in channels:
+            continue
+        size = np.abs(channels[channel])
+        if size.max() <= limit * (1.0 + 1e-9):
+            continue
+        first = int(np.argmax(size > limit * (1.0 + 1e-9)))
+        unit = source.columns[channel].unit
+        factor = si_factor(channel, unit)
+        found = _spelled(channels[channel][first] / factor, channel, unit)
+        raise InputError(
+            f"{source.at(first, channel)}: {channel} = {found} found, "
+            f"expected at most {_spelled(limit / factor, channel, unit)}; "
+            f"{_unit_remedy(channel, float(size.max()) / limit, source)}"
+        )
+
+
+def check_heading(t: Array, psi: Array, raw_psi: Array, source: Source) -> None:
+    """Refuse a heading that turns faster than any ship.
+
+    Single outliers of a noisy sensor pass; a jump of more than 30 degrees, or steps most of which are too
+    fast, do not.
+
+    Parameters
+    ----------
+    t, psi, raw_psi : ndarray of shape (n_samples,)
+        Time, s; heading without and with the jumps at north, rad.
+    source : Source
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        Naming line, values and remedy.
+    """
+    step = np.diff(psi)
+    fast = np.abs(step) > _FASTEST_TURN * np.diff(t)
+    jump = fast & (np.abs(step) > _LARGEST_JUMP)
+    several_turns = np.abs(np.diff(raw_psi)) > 2.0 * math.pi + _LARGEST_JUMP
+    unit = source.columns["psi"].unit
+    factor = si_factor("psi", unit)
+    if several_turns.any() or np.mean(fast) > 0.05:
+        k = int(np.argmax(several_turns if several_turns.any() else fast))
+        other = "deg" if unit == "rad" else "rad"
+        remedy = f"likely a wrong unit: declare {source.declare('psi', other)}"
+    elif jump.any():
+        k = int(np.argmax(jump))
+        remedy = 'empty the wrong cells and import with repair = "interpolate", or correct them'
+    else:
+        return
+    before, after = raw_psi[k : k + 2] / factor
+    raise InputError(
+        f"{source.at(k + 1, 'psi')}: heading goes from {before:g} to {after:g} {unit} "
+        f"within {t[k + 1] - t[k]:g} s, expected at most 60 deg/s; {remedy}"
+    )
+
+
+def check_consistency(t: Array, channels: Mapping[str, Array], frame: str, source: Source) -> None:
+    """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
+
+    Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
+    heading, and velocities with the change of position.
+
+    Parameters
+    ----------
+    t : ndarray of shape (n_samples,)
+        Time, s.
+    channels : mapping of str to ndarray of shape (n_samples,)
+        As recorded, in SI units; the heading without jumps.
+    frame : {"body", "earth"}
+        Declared frame of u and v.
+    source : Source
+        The file, for messages.
+
+    Raises
+    ------
+    InputError
+        Naming the channels, the factor or angle between them, and the remedy.
+    """
+    if "psi" in channels and "r" in channels:
+        _check_yaw_rate(t, channels["psi"], channels["r"], source)
+    if all(name in channels for name in ("x", "y", "psi", "u", "v")):
+        _check_velocity(t, channels, frame, source)
+
+
+def _check_yaw_rate(t: Array, psi: Array, r: Array, source: Source) -> None:
+    turned, expected = (_detrended(t, part) for part in (psi, _integral(t, r)))
+    if max(np.ptp(turned), np.ptp(expected)) < 2.0 * _DEGREE:
+        return
+    gain, misfit = _fit(np.diff(expected), np.diff(turned))
+    if misfit > 0.5 or 0.2 < gain.real < 5.0:
+        return
+    names = [source.columns[channel].name for channel in ("psi", "r")]
+    head = f"{source.table.path}: columns '{names[0]}' (heading) and '{names[1]}' (yaw rate)"
+    if gain.real < 0.0:
+        raise InputError(
+            f"{head} have opposite signs, expected both to be positive when the bow turns to starboard "
+            "(clockwise seen from above); change the sign of the column that is positive to port"
+        )
+    raise InputError(
+        f"{head} disagree: the heading changes {gain.real:.3g} times as fast as the yaw rate says, expected "
+        f"1; likely a wrong unit of one of them, {_angle_remedy(gain.real, source)}"
+    )
+
+
+def _check_velocity(t: Array, channels: Mapping[str, Array], frame: str, source: Source) -> None:
+    moved = np.diff(_at_windows(channels["x"] + 1j * channels["y"]))
+    velocity = channels["u"] + 1j * channels["v"]
+    velocities = {"body": velocity * np.exp(1j * channels["psi"]), "earth": velocity}
+    fits = {name: _fit(np.diff(_at_windows(_integral(t, part))), moved) for name, part in velocities.items()}
+    gain, misfit = fits.pop(frame)
+    ((other, (other_gain, other_misfit)),) = fits.items()
+    x, y, u, v = (source.columns[channel].name for channel in ("x", "y", "u", "v"))
+    head = f"{source.table.path}: positions and velocities disagree"
+    if misfit > 0.03 and other_misfit < 0.2 * misfit and 0.8 < other_gain.real < 1.25:
+        raise InputError(
+            f"{head}: columns '{u}' and '{v}' follow the positions as velocities in the {other} frame, "
+            f'velocity_frame = "{frame}" found; declare velocity_frame = "{other}"'
+        )
+    if misfit < 0.2 and not 0.55 < abs(gain) < 1.8:
+        raise InputError(
+            f"{head}: the position changes {abs(gain):.3g} times as fast as the velocities say, expected 1; "
+            f"likely a wrong unit of '{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
+        )
+
+
+def _integral(t: Array, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    steps = 0.5 * np.diff(t) * (values[1:] + values[:-1])
+    return np.concatenate([np.zeros(1), np.cumsum(steps)])
+
+
+def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the values at the edges of at most 30 windows."""
+    edges = np.unique(np.linspace(0, values.size - 1, _WINDOWS + 1).round().astype(int))
+    return np.asarray(values[edges])
+
+
+def _detrended(t: Array, values: Array) -> Array:
+    """Return the values at the windows' edges without their straight line: a rate sensor has a bias."""
+    time, ends = _at_windows(t - t[0]), _at_windows(values)
+    slope, level = np.polyfit(time, ends, 1)
+    return np.asarray(ends - slope * time - level)
+
+
+def _fit(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> tuple[complex, float]:
+    """Fit target = gain * regressor; return the gain and the residual's share of the target's norm."""
+    power, size = float(np.vdot(regressor, regressor).real), float(np.linalg.norm(target))
+    if power == 0.0 or size == 0.0:
+        return 1.0 + 0.0j, 1.0
+    gain = complex(np.vdot(regressor, target) / power)
+    return gain, float(np.linalg.norm(target - gain * regressor)) / size
+
+
+def _spelled(value: float, channel: str, unit: str) -> str:
+    """Spell a value in its unit, with degrees in brackets where it is in radians."""
+    text = f"{value:g} {unit}"
+    if QUANTITIES[channel] in ("angle", "angular rate") and unit.startswith("rad"):
+        return f"{text} ({math.degrees(value):g} {unit.replace('rad', 'deg')})"
+    return text
+
+
+def _unit_remedy(channel: str, excess: float, source: Source) -> str:
+    """Name the unit in which values `excess` times too large would be plausible."""
+    declared = si_factor(channel, source.columns[channel].unit)
+    fitting = [u for u, f in UNITS[QUANTITIES[channel]].items() if f < declared and excess * f <= declared]
+    if fitting:
+        return f"likely a wrong unit: declare {source.declare(channel, fitting[0])}"
+    return "check the column and its unit, or correct the value"
+
+
+def _angle_remedy(gain: float, source: Source) -> str:
+    """Name the unit of heading or yaw rate that would bring the two together."""
+    psi_unit, r_unit = source.columns["psi"].unit, source.columns["r"].unit
+    options = {
+        source.declare(channel, unit): abs(math.log(gain * change) if gain * change > 0.0 else math.inf)
+        for channel, own, sign in (("psi", psi_unit, 1.0), ("r", r_unit, -1.0))
+        for unit in UNITS[QUANTITIES[channel]]
+        if unit != own
+        for change in ((si_factor(channel, unit) / si_factor(channel, own)) ** sign,)
+    }
+    nearest = min(options.values())
+    return "declare " + " or ".join(text for text, distance in options.items() if distance < nearest + 0.01)
+
+
+def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
+    """Refuse what no ship of this size and speed does: the trial is another's, or in another unit.
+
+    Parameters
+    ----------
+    trial : Trial
+        In SI units.
+    ship : Particulars
+        Length, and service speed and propeller diameter where given.
+    where : str
+        Start of messages.
+
+    Raises
+    ------
+    InputError
+        For yaw rates and speeds of another scale, and a propeller's tip beyond 100 m/s.
+    """
+    speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
+    if speeds is not None and "r" in trial:
+        _check_turning(trial, float(speeds.max()), ship.length, where)
+    if speeds is not None and ship.speed is not None and "speed" not in ship.estimated:
+        fastest = float(np.quantile(speeds, _MOST))
+        low, high = (share * ship.speed for share in _SPEEDS)
+        if not low <= fastest <= high:
+            raise InputError(
+                f"{where}: up to {fastest:.4g} m/s found, expected {low:.4g} to {high:.4g} m/s of a ship "
+                f"with a service speed of {ship.speed:g} m/s; likely the trial of another ship or scale, "
+                "or a wrong unit of u; if it is this ship's, give its speed as sailed"
+            )
+    if "n" in trial and ship.propeller_diameter is not None:
+        fastest = float(np.quantile(np.abs(trial["n"]), _MOST))
+        limit = _FASTEST_TIP / (math.pi * ship.propeller_diameter)
+        if fastest > limit:
+            raise InputError(
+                f"{where}: shaft speed up to {fastest:.4g} rps found, expected at most {limit:.4g} rps for a "
+                f"propeller of {ship.propeller_diameter:g} m; likely a wrong unit: "
+                'declare n = { column = "...", unit = "rpm" } in [columns]'
+            )
+
+
+def _check_turning(trial: Trial, speed: float, length: float, where: str) -> None:
+    fastest, limit = float(np.quantile(np.abs(trial["r"]), _MOST)), _FASTEST_TURN_PRIME * speed / length
+    if fastest > limit:
+        raise InputError(
+            f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
+            f"expected at most {math.degrees(limit):.4g} deg/s for a length of {length:g} m; likely the "
+            "trial of another ship or scale, or a wrong unit of r, psi, u or v in [columns], or of [ship] "
+            "length"
+        )

@@ -1,0 +1,265 @@
+"""The ship file: one TOML file with a ship's particulars, its data's conventions and its trials."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shipgym.checks import check_choice, check_keys, check_table, check_text
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.trials.columns import parse_columns
+from shipgym.trials.csv_reader import check_readable, read_bytes
+from shipgym.trials.identify_table import check_options
+from shipgym.trials.plausibility import check_scale
+from shipgym.trials.trial import KINDS, USES, Trial
+from shipgym.trials.trial_import import Conventions
+
+_SECTIONS = ("ship", "steering", "columns", "conventions", "identify", "trials")
+_CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
+_TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
+
+
+@dataclass(frozen=True)
+class TrialEntry:
+    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables.
+
+    Attributes
+    ----------
+    file : str
+        As written; the trial's name.
+    path : Path
+        The CSV file.
+    kind : str or None
+        The manoeuvre.
+    use : {"fit", "validate", "skip"}
+        What the trial is for.
+    columns : mapping or None
+        Columns by channel as written; None: those named like channels.
+    conventions : Conventions
+        Signs, frame, origin and repair.
+    where : str
+        Start of messages: ``"ship.toml: [[trials]] 2"``.
+    """
+
+    file: str
+    path: Path
+    kind: str | None
+    use: str
+    columns: Mapping[str, Any] | None
+    conventions: Conventions
+    where: str
+
+
+@dataclass(frozen=True)
+class ShipFile:
+    """A ship file, read and checked; :meth:`load` makes one.
+
+    Attributes
+    ----------
+    path : Path
+        The TOML file.
+    particulars : Particulars
+        As given; ``particulars.completed()`` estimates the rest.
+    steering : SteeringGear or None
+        None where the file has no ``[steering]``.
+    identify : dict
+        Defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`.
+    entries : tuple of TrialEntry
+        The trials, not read yet.
+    """
+
+    path: Path
+    particulars: Particulars
+    steering: SteeringGear | None
+    identify: dict[str, Any]
+    entries: tuple[TrialEntry, ...]
+
+    @classmethod
+    def load(cls, path: str | Path) -> ShipFile:
+        """Read and check a ship file; the trials' CSV files must exist and are read by :meth:`trials`.
+
+        Parameters
+        ----------
+        path : str or Path
+            The TOML file. Paths in it are relative to its folder, or absolute.
+
+        Raises
+        ------
+        InputError
+            For a missing file, broken TOML, an unknown key or word, a wrong type or value, no trials, a trial
+            listed twice or a missing CSV file, naming file, field, value and remedy.
+        """
+        path = Path(path)
+        data = _read_toml(path)
+        check_keys(data, _SECTIONS, str(path))
+        if "ship" not in data:
+            raise InputError(
+                f"{path}: no table [ship] found, expected one with at least the ship's length in m"
+            )
+        ship = check_table(data["ship"], f"{path}: [ship]")
+        if "estimated" in ship:
+            raise InputError(f"{path}: [ship]: unknown key 'estimated'; leave out what is not known")
+        particulars = Particulars.from_mapping(ship, f"{path}: [ship]")
+        steering = (
+            SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
+        )
+        identify = check_options(data.get("identify", {}), f"{path}: [identify]")
+        return cls(path, particulars, steering, identify, _entries(path, data, particulars))
+
+    def completed_particulars(self) -> Particulars:
+        """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
+
+        Raises
+        ------
+        InputError
+            Naming the ship file and what is missing, where it cannot be estimated.
+        """
+        try:
+            return self.particulars.completed()
+        except InputError as error:
+            raise InputError(f"{self.path}: {error}") from None
+
+    def trials(self, use: str | None = None) -> list[Trial]:
+        """Read the trials.
+
+        Parameters
+        ----------
+        use : {"fit", "validate", "skip"}, optional
+            Only trials of this use; by default all but those to skip.
+
+        Returns
+        -------
+        list of Trial
+            In the order of the file, each named by its ``file``.
+
+        Raises
+        ------
+        InputError
+            For anything wrong with a CSV file.
+        """
+        if use is not None:
+            check_choice(use, USES, f"{self.path}: trials(use)")
+        wanted = [e for e in self.entries if (e.use == use if use is not None else e.use != "skip")]
+        return [self._read(entry) for entry in wanted]
+
+    def trial(self, file: str) -> Trial:
+        """Read one trial, whatever its use.
+
+        Parameters
+        ----------
+        file : str
+            As written in the ship file.
+
+        Raises
+        ------
+        InputError
+            If no trial has that file, and for anything wrong with it.
+        """
+        files = [entry.file for entry in self.entries]
+        check_choice(file, files, f"{self.path}: trial")
+        return self._read(self.entries[files.index(file)])
+
+    def _read(self, entry: TrialEntry) -> Trial:
+        c = entry.conventions
+        try:
+            trial = Trial.from_csv(
+                entry.path,
+                entry.columns,
+                c.rudder_positive,
+                c.velocity_frame,
+                origin=c.origin,
+                xg=c.xg,
+                repair=c.repair,
+                name=entry.file,
+                kind=entry.kind,
+                use=entry.use,
+                length=self.particulars.length,
+            )
+        except InputError as error:
+            raise InputError(f"{entry.where}: {error}") from None
+        check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
+        return trial
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    data = read_bytes(path, "a ship file (TOML)")
+    try:
+        return tomllib.loads(data.decode("utf-8-sig"))
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, expected TOML text in UTF-8"
+        ) from None
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not valid TOML: {error}; correct that line") from None
+
+
+def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> tuple[TrialEntry, ...]:
+    tables = data.get("trials", [])
+    if not isinstance(tables, list):
+        raise InputError(f"{path}: trials: a single value found, expected tables that begin with [[trials]]")
+    if not tables:
+        raise InputError(
+            f'{path}: no trials found, expected at least one [[trials]] table with file = "run.csv"'
+        )
+    conventions = check_table(data.get("conventions", {}), f"{path}: [conventions]")
+    check_keys(conventions, _CONVENTIONS, f"{path}: [conventions]")
+    _conventions(conventions, particulars, f"{path}: [conventions]")
+    columns = check_table(data.get("columns", {}), f"{path}: [columns]")
+    parse_columns(columns, f"{path}: [columns]")
+    entries = [
+        _entry(path, f"{path}: [[trials]] {k}", table, columns, conventions, particulars)
+        for k, table in enumerate(tables, start=1)
+    ]
+    for k, entry in enumerate(entries):
+        if os.path.normpath(entry.path) in {os.path.normpath(other.path) for other in entries[:k]}:
+            raise InputError(f"{entry.where} file: '{entry.file}' is listed twice, expected each file once")
+    if all(entry.use == "skip" for entry in entries):
+        raise InputError(
+            f'{path}: all trials have use = "skip", expected at least one to fit; set use = "fit"'
+        )
+    return tuple(entries)
+
+
+def _entry(
+    path: Path,
+    where: str,
+    table: Any,
+    columns: Mapping[str, Any],
+    conventions: Mapping[str, Any],
+    particulars: Particulars,
+) -> TrialEntry:
+    check_keys(check_table(table, where), _TRIAL, where)
+    if "file" not in table:
+        raise InputError(f'{where}: no file found, expected file = "run.csv"')
+    file = check_text(table["file"], f"{where} file")
+    kind = check_choice(table["kind"], KINDS, f"{where} kind") if "kind" in table else None
+    use = check_choice(table.get("use", "fit"), USES, f"{where} use")
+    own = check_table(table.get("columns", {}), f"{where} columns")
+    parse_columns(own, f"{where} columns")
+    own_conventions = {key: table[key] for key in _CONVENTIONS if key in table}
+    csv_path = path.parent / file
+    if use != "skip":
+        try:
+            check_readable(csv_path, "a CSV file")
+        except InputError as error:
+            raise InputError(f"{where} file: {error}") from None
+    return TrialEntry(
+        file=file,
+        path=csv_path,
+        kind=kind,
+        use=use,
+        columns={**columns, **own} or None,
+        conventions=_conventions({**conventions, **own_conventions}, particulars, where),
+        where=where,
+    )
+
+
+def _conventions(words: Mapping[str, Any], particulars: Particulars, where: str) -> Conventions:
+    return Conventions(**words, xg=particulars.xg, where=where)
