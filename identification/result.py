@@ -15,10 +15,9 @@ from identification.regression.samples import Samples
 from identification.search import SearchResult
 from identification.validation.diagnostics import EquationDiagnostics
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json, write_text
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

@@ -39,7 +39,7 @@ from agents.controllers.controller import Controller
 from agents.oracle import OracleSettings, fly_oracle
 from agents.rollouts.flying import episode_costs
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 ORACLE_EPISODES = 100
 

@@ -29,7 +29,7 @@ from shipgym.checks import check_choice, check_table, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
+from shipgym.files import read_json
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from agents.benchmarking.suite import N_EPISODES, BenchmarkTask, suite_file
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
+from shipgym.files import read_json
 
 REMEDY = "take another copy"
 

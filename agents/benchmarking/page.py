@@ -33,6 +33,7 @@ from agents.output import check_page
 from agents.rollouts.refly import Flight, Reflown, refly
 from shipgym.envs.episode import Episode
 from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.files import write_text
 from shipgym.pages import (
     NONE,
     Html,
@@ -46,7 +47,6 @@ from shipgym.pages import (
     section,
     table,
 )
-from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

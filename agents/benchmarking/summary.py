@@ -22,7 +22,7 @@ from agents.benchmarking.statistics import (
 )
 from agents.benchmarking.suite import N_EPISODES, BenchmarkTask, suite_file
 from shipgym.checks import check_number, check_table
-from shipgym.json_file import read_json
+from shipgym.files import read_json
 
 Floats = NDArray[np.float64]
 Flown = Mapping[tuple[str, str], Mapping[str, Any]]

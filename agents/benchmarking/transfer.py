@@ -29,7 +29,7 @@ from agents.controllers.controller import Controller, Policy
 from agents.engines.jobs import run_jobs
 from agents.rollouts.flying import fly_task
 from shipgym.checks import check_whole
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import ShipModel, load_model
 
 Floats = NDArray[np.float64]

@@ -258,7 +258,7 @@ def reproduce_command(
     from agents.cli.reproduction import missed, page, papers_of, reproduce, terminal_table
     from agents.cli.terminal import err, print_json
     from agents.cli.terminal import out as console
-    from shipgym.whole_file import write_text
+    from shipgym.files import write_text
 
     names = papers_of(paper)
     with err.status("starting") as status:

@@ -11,6 +11,7 @@ import numpy as np
 
 from agents import output
 from shipgym.errors import InputError, ManoeuvreError
+from shipgym.files import write_text
 from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
 from shipgym.manoeuvres.imo import judge_imo
 from shipgym.manoeuvres.intervals import intervals_of
@@ -18,7 +19,6 @@ from shipgym.manoeuvres.spirals import Spiral
 from shipgym.plots import graph_objects, history_figure, manoeuvre_figure, path_figure, pull_out_figure
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
     from shipgym.pages import Html

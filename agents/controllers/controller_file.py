@@ -37,7 +37,7 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 
 FORMAT = 1
 REMEDY = "design the controller again or take another copy"

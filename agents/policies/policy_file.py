@@ -51,11 +51,10 @@ from agents.policies.shield import Limits, Shielded
 from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, quoted
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_bytes, write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
 from shipgym.ships.model_file import read_envelope
-from shipgym.whole_file import write_bytes
 
 Tensors = dict[str, NDArray[Any]]
 

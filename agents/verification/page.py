@@ -17,6 +17,7 @@ from agents.verification.sections import (
 from identification.report.coefficients import coefficients_section
 from identification.report.facts import concerns_list, data_card, quality_card, remedy_section, ship_card
 from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
+from shipgym.files import write_text
 from shipgym.pages import (
     NONE,
     Html,
@@ -67,7 +68,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     """
     found = result.verification
     body = unstable_body(result) if found is None else stable_body(result, found)
-    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body, TITLES), encoding="utf-8")
+    write_text(page(f"{ship_name(result)}: autopilot report", body, TITLES), Path(path))
 
 
 def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]:

@@ -30,8 +30,7 @@ from typing import Any
 from shipgym.checks import check_keys, check_table, quoted
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
-from shipgym.whole_file import write_text
+from shipgym.files import read_json, write_text
 
 FORMAT = 1
 KIND = "episode"

@@ -11,10 +11,10 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.files import check_readable, read_bytes
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
-from shipgym.trials.csv_reader import check_readable, read_bytes
 from shipgym.trials.identify_table import check_options
 from shipgym.trials.plausibility import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
@@ -188,7 +188,7 @@ class ShipFile:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
-    data = read_bytes(path, "a ship file (TOML)")
+    data = read_bytes(path, "ship file (TOML)")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
@@ -247,7 +247,7 @@ def _entry(
     csv_path = path.parent / file
     if use != "skip":
         try:
-            check_readable(csv_path, "a CSV file")
+            check_readable(csv_path, "CSV file")
         except InputError as error:
             raise InputError(f"{where} file: {error}") from None
     return TrialEntry(

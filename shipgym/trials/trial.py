@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
 from collections.abc import Collection, Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -15,6 +13,7 @@ import numpy.typing as npt
 
 from shipgym.checks import check_choice, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import write_text
 from shipgym.trials.units import CHANNELS, check_channel
 
 Array = npt.NDArray[np.float64]
@@ -349,34 +348,14 @@ class Trial:
         InputError
             Where the file cannot be written.
         """
-        path = Path(path)
         names = ["t", *self._channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
         text = "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]) + "\n"
-        try:
-            handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        except OSError as error:
-            raise InputError(
-                f"{path}: cannot be written ({error.strerror}); choose a folder that exists"
-            ) from None
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            Path(temporary).chmod(0o666 & ~_umask())  # mkstemp makes the file private
-            Path(temporary).replace(path)
-        except OSError as error:
-            Path(temporary).unlink(missing_ok=True)
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from None
+        write_text(text, Path(path))
 
 
 def _restore(t: Array, channels: Mapping[str, Array], settings: Mapping[str, Any]) -> Trial:
     return Trial(t, channels, **settings)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def _frozen_array(values: npt.ArrayLike, where: str) -> Array:

@@ -28,7 +28,7 @@ from agents.controllers.los_autopilot import LAWS
 from agents.rollouts.flying import episode_costs
 from agents.training.bases import design_base
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 

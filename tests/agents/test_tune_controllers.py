@@ -8,7 +8,7 @@ import pytest
 
 from agents.benchmarking import direct_search
 from agents.benchmarking.suite import BenchmarkTask
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "tune_controllers.py"
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 30})
