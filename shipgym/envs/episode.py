@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.checks import check_number, check_table, check_text, quoted
+from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
+from shipgym.files import read_json, write_json
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -198,16 +200,14 @@ class Episode:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the episode as JSON: to a temporary name, then renamed.
+        """Write the episode as JSON, atomically.
 
         Raises
         ------
         InputError
             If the file cannot be written.
         """
-        from shipgym.envs.episode_file import save
-
-        save(self, Path(path))
+        write_json(to_file(vars(self)), Path(path), indent=None)
 
     @classmethod
     def load(cls, path: str | Path) -> Episode:
@@ -218,9 +218,11 @@ class Episode:
         InputError
             Naming the file and the field at fault.
         """
-        from shipgym.envs.episode_file import load
-
-        return load(Path(path))
+        content = read_json(Path(path), "episode file", "record the episode again or take another copy")
+        try:
+            return cls(**from_file(content))
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:

@@ -16,7 +16,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.identify_table import check_options
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
 from shipgym.trials.trial_import import Conventions
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from shipgym.checks import check_choice, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import write_text
+from shipgym.trials.trial_import import Conventions, import_csv
 from shipgym.trials.units import CHANNELS, check_channel
 
 Array = npt.NDArray[np.float64]
@@ -311,8 +312,6 @@ class Trial:
         InputError
             For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
-        from shipgym.trials.trial_import import Conventions, import_csv
-
         conventions = Conventions(
             rudder_positive=rudder_positive,
             velocity_frame=velocity_frame,
