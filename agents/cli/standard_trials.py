@@ -12,10 +12,11 @@ import numpy as np
 from agents import output
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.files import write_text
-from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
-from shipgym.manoeuvres.imo import judge_imo
+from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
+from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
 from shipgym.manoeuvres.spirals import Spiral
+from shipgym.manoeuvres.standard import FAMILIES, families_of
 from shipgym.plots import graph_objects, history_figure, manoeuvre_figure, path_figure, pull_out_figure
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
@@ -24,31 +25,6 @@ if TYPE_CHECKING:
     from shipgym.pages import Html
 
 HISTORIES = ("psi", "delta", "r", "speed", "drift")
-#: Sections of the page, and how the names of their manoeuvres begin.
-SECTIONS: dict[str, str | tuple[str, ...]] = {
-    "zigzags": "zigzag",
-    "circles": "turning circle",
-    "spirals": ("direct spiral", "reverse spiral"),
-    "pull-outs": "pull-out",
-    "stops": ("inertia stop", "crash stop", "acceleration"),
-}
-TITLES = {
-    "imo": "IMO criteria",
-    "zigzags": "Zigzags",
-    "circles": "Turning circles",
-    "spirals": "Spirals",
-    "pull-outs": "Pull-outs",
-    "stops": "Stopping and acceleration",
-}
-CAPTIONS = {
-    "zigzag": "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed.",
-    "turning": "Path from above, from the position and along the heading at which the rudder was ordered.",
-    "direct": "Each point a steady turn, with rudder angles there and back.",
-    "reverse": "Each point a yaw rate held by a helmsman, with the mean rudder that it took.",
-    "inertia": "The shaft stopped at service speed, the rudder amidships, until a tenth of it is left.",
-    "crash": "The shaft ordered full astern at service speed, the rudder amidships, until dead in the water.",
-    "acceleration": "From a quarter of service speed, the shaft ordered to service speed.",
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +33,8 @@ class StandardTrials:
 
     Attributes
     ----------
+    families : dict of str to dict of str to Manoeuvre
+        The manoeuvres by family and name.
     sailed : dict of str to Trial or Spiral
         By manoeuvre, as simulated with the model itself.
     indices : dict of str to dict of str to IndexInterval
@@ -71,6 +49,7 @@ class StandardTrials:
         m.
     """
 
+    families: dict[str, dict[str, Manoeuvre]]
     sailed: dict[str, Trial | Spiral]
     indices: dict[str, dict[str, IndexInterval]]
     criteria: dict[str, Criterion]
@@ -126,22 +105,23 @@ def standard_trials(
     UnstableModelError
         If the ship itself runs away.
     """
-    manoeuvres = standard_manoeuvres(model, water_depth)
+    families = families_of(model, water_depth)
+    manoeuvres = {name: one for family in families.values() for name, one in family.items()}
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
     for name, manoeuvre in manoeuvres.items():
-        own[name] = manoeuvre.nothing
+        own[name] = manoeuvre.no_indices
         try:
             sailed[name] = manoeuvre.sail(model)
             own[name] = asdict(manoeuvre.indices(sailed[name]))
         except (InputError, ManoeuvreError) as error:
             refused[name] = str(error)
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
-    judged = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
-    found = intervals_of(own, drawn, judged, progress)
-    criteria = judge_imo(model, found) if np.isinf(water_depth) else {}
-    return StandardTrials(sailed, found, criteria, refused, len(drawn), water_depth)
+    evaluated = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
+    found = intervals_of(own, drawn, evaluated, progress)
+    criteria = imo_criteria(model, found) if np.isinf(water_depth) else {}
+    return StandardTrials(families, sailed, found, criteria, refused, len(drawn), water_depth)
 
 
 def water_in_words(water_depth: float) -> str:
@@ -165,7 +145,8 @@ def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
     from shipgym.pages import page
 
-    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found), TITLES), path)
+    titles = {"imo": "IMO criteria"} | {name: family.title for name, family in FAMILIES.items()}
+    write_text(page(f"{model.name}: standard manoeuvres", _body(model, found), titles), path)
 
 
 def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
@@ -180,11 +161,10 @@ def _body(model: ShipModel, found: StandardTrials) -> dict[str, Html]:
     )
     body = {"header": header("Standard manoeuvres", model.name, lead)}
     if found.criteria:
-        body["imo"] = section("imo", TITLES["imo"], _criteria(found.criteria))
-    for name, start in SECTIONS.items():
-        chosen = [key for key in found.indices if key.startswith(start)]
-        if chosen:
-            body[name] = section(name, TITLES[name], *_section(name, chosen, found))
+        body["imo"] = section("imo", "IMO criteria", _criteria(found.criteria))
+    for name, manoeuvres in found.families.items():
+        if manoeuvres:
+            body[name] = section(name, FAMILIES[name].title, *_section(name, manoeuvres, found))
     return body
 
 
@@ -221,10 +201,11 @@ def _interval(interval: tuple[float, float] | None) -> Html:
     return Html(NONE) if interval is None else Html(f"{fixed(interval[0], 2)} to {fixed(interval[1], 2)}")
 
 
-def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
+def _section(name: str, manoeuvres: Mapping[str, Manoeuvre], found: StandardTrials) -> list[Html]:
     """Indices and figures of one family of manoeuvres."""
     from shipgym.pages import figure, note
 
+    chosen = list(manoeuvres)
     parts = [_indices(chosen, found)]
     parts += [note(f"{key}: {found.refused[key]}", "warn") for key in chosen if key in found.refused]
     shown = [key for key in chosen if key in found.sailed]
@@ -234,12 +215,13 @@ def _section(name: str, chosen: list[str], found: StandardTrials) -> list[Html]:
         if isinstance(run, Trial):
             trials[key] = run
     if name == "pull-outs" and trials:
-        caption = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a straight course."
-        parts.append(figure(pull_out_figure(trials), name, caption))
+        parts.append(figure(pull_out_figure(trials), name, manoeuvres[shown[0]].caption))
     else:
         for k, key in enumerate(shown):
-            caption = f"{key[0].upper()}{key[1:]}. {CAPTIONS[key.split()[0]]}"
-            parts.append(figure(manoeuvre_figure(found.sailed[key]), f"{name}-{k}", caption))
+            manoeuvre = manoeuvres[key]
+            draw = manoeuvre.figure or manoeuvre_figure
+            caption = f"{key[0].upper()}{key[1:]}. {manoeuvre.caption}"
+            parts.append(figure(draw(found.sailed[key]), f"{name}-{k}", caption))
     if trials and name != "pull-outs":
         parts.append(figure(path_figure(trials), f"{name}-paths", "Paths from above, north up, in metres."))
     histories = trials or {

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
 from shipgym.ships.ship_model import Seed, ShipModel

@@ -6,17 +6,22 @@ As described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.trials.trial import Trial
+
+TURN_DEG = 20.0  # of the standard pull-out, or the rudder's limit where that is less
+CAPTION = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a straight course."
 
 
 @dataclass(frozen=True)
@@ -114,3 +119,15 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     turn, rest = np.degrees(trial["r"][int(over[0]) : release]), np.degrees(trial["r"][release:])
     last = [float(part[-max(len(part) // 10, 1) :].mean()) for part in (turn, rest)]
     return PullOutIndices(*last)
+
+
+def standard_pull_outs(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Pull-outs from turns to both sides."""
+    angle = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return {
+        f"pull-out from {side}": Manoeuvre(
+            partial(pull_out, rudder_deg=sign * angle, water_depth=water_depth),
+            pull_out_indices, PullOutIndices, CAPTION,
+        )
+        for side, sign in SIDES
+    }  # fmt: skip

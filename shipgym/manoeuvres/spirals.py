@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -15,9 +16,11 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
+from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.trials.trial import Trial
 
@@ -32,6 +35,8 @@ DIRECT_RUDDER_DEG = (
 #: Yaw rates of the reverse spiral by U0 / L, from starboard to port.
 REVERSE_RATES = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
 STEADY_PART = 1.0 / 3.0  # of a measured plateau, its last part
+DIRECT_CAPTION = "Each point a steady turn, with rudder angles there and back."
+REVERSE_CAPTION = "Each point a yaw rate held by a helmsman, with the mean rudder that it took."
 SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on its way
 
 
@@ -312,3 +317,21 @@ def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
     middle = 0.5 * (highest[low] + curve[low])
     inside = fine[np.flatnonzero(np.diff(np.sign(curve - middle)))]
     return width, float(np.ptp(inside)), float(middle)
+
+
+def standard_spirals(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
+    angles = [a for a in DIRECT_RUDDER_DEG if abs(a) <= model.steering.rudder_limit_deg]
+    direct = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
+    reverse = partial(reverse_spiral, water_depth=water_depth)
+    spirals = {"direct spiral": Manoeuvre(direct, spiral_indices, SpiralIndices, DIRECT_CAPTION)}
+    if not _is_stable(model):
+        spirals["reverse spiral"] = Manoeuvre(reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION)
+    return spirals
+
+
+def _is_stable(model: ShipModel) -> bool:
+    try:
+        return is_course_stable(model)
+    except InputError:  # there is no straight course at all
+        return False

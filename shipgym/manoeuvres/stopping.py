@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, ship_length
+from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
@@ -19,6 +21,12 @@ from shipgym.trials.trial import Trial
 
 LONGEST = 300.0  # of a stopping trial, L / U0
 ACCELERATION = 40.0  # duration of an acceleration, L / U0
+
+STOP_CAPTION = "The shaft stopped at service speed, the rudder amidships, until a tenth of it is left."
+CRASH_CAPTION = (
+    "The shaft ordered full astern at service speed, the rudder amidships, until dead in the water."
+)
+ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to service speed."
 
 
 @dataclass(frozen=True)
@@ -319,3 +327,17 @@ def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
         )
     k = max(int(reached[0]), 1)
     return float(np.interp(threshold, values[k - 1 : k + 1], trial.t[k - 1 : k + 1]))
+
+
+def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
+    if "n" not in model.command_names:
+        return {}
+    stop, crash, faster = (
+        partial(sail, water_depth=water_depth) for sail in (stopping, crash_stop, acceleration)
+    )
+    found = {"inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)}
+    if goes_astern(model):
+        found["crash stop"] = Manoeuvre(crash, stopping_indices, StoppingIndices, CRASH_CAPTION)
+    found["acceleration"] = Manoeuvre(faster, acceleration_indices, AccelerationIndices, ACCELERATION_CAPTION)
+    return found

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, ship_length
-from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.manoeuvres.execution import execute_time, number_of_steps, ship_length
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
+
+TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
+CAPTION = "Path from above, from the position and along the heading at which the rudder was ordered."
 
 
 @dataclass(frozen=True)
@@ -157,3 +161,18 @@ def _steady(
     drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
     diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
     return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)
+
+
+def standard_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Turning circles with full rudder to both sides."""
+    duration, dt = standard_time(model)
+    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return {
+        f"turning circle {full:.0f} deg to {side}": Manoeuvre(
+            partial(
+                turning_circle, rudder_deg=sign * full, duration=duration, dt=dt, water_depth=water_depth
+            ),
+            turning_indices, TurningIndices, CAPTION,
+        )
+        for side, sign in SIDES
+    }  # fmt: skip

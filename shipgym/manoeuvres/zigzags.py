@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
+from shipgym.errors import ManoeuvreError
+from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import Seed, ShipModel
@@ -19,6 +21,9 @@ from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
+
+STANDARD_DEG = (10.0, 20.0)
+CAPTION = "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed."
 
 
 @dataclass(frozen=True)
@@ -122,16 +127,6 @@ def zigzag(
     return trial
 
 
-def number_of_steps(duration: float, dt: float) -> int:
-    """Steps of dt in a duration, both s, checked."""
-    check_number(dt, "dt", above=0.0)
-    check_number(duration, "duration", above=0.0)
-    steps = round(duration / dt)
-    if steps < 2:
-        raise InputError(f"duration: {duration:g} s found, expected at least two steps of dt = {dt:g} s")
-    return steps
-
-
 def zigzag_indices(
     trial: Trial, length: float | None = None, heading_deg: float | None = None
 ) -> ZigzagIndices:
@@ -231,3 +226,19 @@ def _overshoot_deg(
     if np.argmax(beyond) == len(beyond) - 1:
         return None
     return float(beyond.max())
+
+
+def standard_zigzags(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
+    duration, dt = standard_time(model)
+    return {
+        f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
+            partial(
+                zigzag, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0, duration=duration, dt=dt,
+                water_depth=water_depth, must_reverse=False,
+            ),
+            zigzag_indices, ZigzagIndices, CAPTION,
+        )
+        for angle in STANDARD_DEG
+        for side, sign in SIDES
+    }  # fmt: skip

@@ -19,8 +19,8 @@ from shipgym.trials.units import CHANNELS, check_channel
 
 Array = npt.NDArray[np.float64]
 
-#: Kinds of manoeuvre that have indices or a meaning of their own.
-KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random")
+#: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
+KINDS = ["zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"]
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
