@@ -8,6 +8,7 @@ from .envs.sb3 import ShipVecEnv as ShipVecEnv
 from .errors import InputError as InputError
 from .errors import ManoeuvreError as ManoeuvreError
 from .errors import UnstableModelError as UnstableModelError
+from .examples import example_ship as example_ship
 from .manoeuvres import towing_tank as towing_tank
 from .sea.conditions import Current as Current
 from .sea.conditions import Waves as Waves
