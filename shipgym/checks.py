@@ -113,7 +113,7 @@ def check_number(
 
 
 def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int:
-    """Return `value`, which must be a whole number of at least so much.
+    """Return `value`, which must be a whole number of at least `at_least`.
 
     Raises
     ------

@@ -54,7 +54,7 @@ class Episode:
     reward_parts : mapping of str to array-like of shape (n_steps,), optional
         Parts of the rewards, as `info` names them.
     info : mapping of str to array-like of shape (n_steps + 1,), optional
-        What else `info` told in numbers, at the beginning and after each step; true is 1.
+        What else `info` reported in numbers, at the beginning and after each step; true is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
     corridor : float, optional
@@ -66,11 +66,11 @@ class Episode:
     seed : int, optional
         With which the environment was last reset.
     number : int
-        Of the episode since then, from 0: `reset(seed=seed)` and so many times `reset()` begin it again.
+        Of the episode since then, from 0: `reset(seed=seed)` and that many times `reset()` begin it again.
     terminated, truncated : bool
         How it ended; neither where it was cut off.
     success : bool, optional
-        What the environment said about it, if it did.
+        Whether it was a success, where the environment reports that.
 
     Raises
     ------
@@ -120,7 +120,7 @@ class Episode:
     def _set_series(self) -> None:
         rewards = series(self.rewards, "rewards", None)
         if not len(rewards):
-            raise InputError("rewards: none found, expected at least one step")
+            raise InputError("rewards: no step found, expected at least one step")
         actions = _finite(self.actions, "actions")
         if actions.ndim != 2 or len(actions) != len(rewards):
             raise InputError(
@@ -176,7 +176,7 @@ class Episode:
         Returns
         -------
         Trial
-            States that are channels of trials, the orders `delta_command` and `n_command` held from each
+            States that are channels of trials, the orders `delta_command` and `n_command` constant from each
             sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
 
         Raises
@@ -187,10 +187,10 @@ class Episode:
         channels = {key: values for key, values in self.states.items() if key in CHANNELS}
         channels["psi"] = np.unwrap(channels["psi"])
         for key, values in self.commands.items():
-            held = np.append(values, values[-1])
-            channels[f"{key}_command"] = held
+            orders = np.append(values, values[-1])
+            channels[f"{key}_command"] = orders
             if key == "n":
-                channels.setdefault("n", held)
+                channels.setdefault("n", orders)
         return Trial(
             self.t,
             channels,

@@ -56,10 +56,6 @@ def prbs_rudder(
     weather : Weather or str, optional
         A weather or the name of a sea state, with the same seed; by default calm.
 
-    Returns
-    -------
-    Trial
-
     Raises
     ------
     InputError
@@ -106,16 +102,8 @@ def multi_sine_rudder(
         Of the phases.
     longest_period_s, shortest_period_s : float, optional
         The band, s; by default 20 and 2 times the time to travel one ship length.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------
@@ -173,16 +161,8 @@ def random_rudder_steps(
         Of the steps.
     shortest_s, longest_s : float, optional
         How long an angle is held, s; by default 0.5 to 4 times the time to travel one ship length.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------
@@ -226,16 +206,8 @@ def shaft_speed_steps(
         How long a speed is held, s; by default 5 to 15 times the time to travel one ship length.
     rudder_deg : float
         Rudder held meanwhile, degrees.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------

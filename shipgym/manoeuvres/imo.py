@@ -42,7 +42,7 @@ class Criterion:
     drawn : IndexInterval or None
         The value over models drawn from the covariance of an identified ship.
     note : str
-        What else is to be known.
+        Remarks.
     """
 
     value: float | None
@@ -67,7 +67,7 @@ class Criterion:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON knows it."""
-        told: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "value": self.value,
             "limit": self.limit,
             "passed": self.passed,
@@ -75,14 +75,14 @@ class Criterion:
             "source": self.source,
         }
         if self.note:
-            told["note"] = self.note
+            fields["note"] = self.note
         if self.drawn is not None and len(self.drawn.values):
             low, median, high = self.drawn.quantiles(0.05, 0.5, 0.95)
-            told |= {"probability": self.share_passed, "interval_95": self.interval}
-            told |= {"quantile_05": low, "median": median, "quantile_95": high}
-            told |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
-            told |= {"without_value": int(np.isnan(self.drawn.values).sum())}
-        return told
+            fields |= {"probability": self.share_passed, "interval_95": self.interval}
+            fields |= {"quantile_05": low, "median": median, "quantile_95": high}
+            fields |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
+            fields |= {"without_value": int(np.isnan(self.drawn.values).sum())}
+        return fields
 
 
 def imo_assessment(
@@ -99,7 +99,7 @@ def imo_assessment(
     model : ShipModel
         The ship.
     n_draws : int, optional
-        Models drawn from the covariance of an identified ship, to tell how certain each verdict is; by
+        Models drawn from the covariance of an identified ship, to show how certain each verdict is; by
         default 100, and none for a ship without covariance.
     seed : int or Generator
         Of the draw.

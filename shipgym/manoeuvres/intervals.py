@@ -159,7 +159,7 @@ def intervals_of(
     evaluations : mapping of str to callable
         From a ship to the indices, by manoeuvre.
     progress : callable, optional
-        Told the number of draws done.
+        Called with the number of draws done.
 
     Returns
     -------

@@ -26,7 +26,7 @@ CAPTION = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on
 
 @dataclass(frozen=True)
 class PullOutIndices:
-    """What a pull-out tells of a ship.
+    """Indices of a pull-out.
 
     Attributes
     ----------
@@ -60,16 +60,8 @@ def pull_out(
         Rudder of the turn, degrees; negative turns to port.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------

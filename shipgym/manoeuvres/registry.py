@@ -118,7 +118,7 @@ def families_of(model: ShipModel, water_depth: float = np.inf) -> dict[str, dict
 
 
 def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
-    """The registered manoeuvres that suit a ship, from service speed, in deep water unless told otherwise.
+    """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]
 
-#: Rudder angles of the direct spiral, degrees, from starboard to port: fine where the loop is.
+#: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps where the loop is.
 DIRECT_RUDDER_DEG = (
     20.0, 15.0, 10.0, 5.0, 4.0, 3.0, *(0.25 * k for k in range(8, -9, -1)), -3.0, -4.0, -5.0, -10.0, -15.0,
     -20.0,
@@ -62,7 +62,7 @@ class Spiral:
 
 @dataclass(frozen=True)
 class SpiralIndices:
-    """What a spiral tells of a ship.
+    """Indices of a spiral.
 
     Attributes
     ----------
@@ -99,16 +99,8 @@ def direct_spiral(
         known to within their steps.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Spiral
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -149,12 +141,8 @@ def reverse_spiral(
         From one side to the other, degrees per second; by default from 0.2 to -0.2 times U0 / L.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Returns
     -------
@@ -213,10 +201,6 @@ def spiral_from_trial(
     tolerance_deg : float
         Degrees.
 
-    Returns
-    -------
-    Spiral
-
     Raises
     ------
     InputError
@@ -256,10 +240,6 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
     ----------
     spiral : Spiral
         Simulated, or measured (`spiral_from_trial`).
-
-    Returns
-    -------
-    SpiralIndices
 
     Raises
     ------
@@ -307,15 +287,15 @@ def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
     from scipy.interpolate import Akima1DInterpolator
 
     order = np.argsort(rates)
-    fine = np.linspace(rates.min(), rates.max(), 4001)
-    curve = np.asarray(Akima1DInterpolator(rates[order], angles[order])(fine))
+    grid = np.linspace(rates.min(), rates.max(), 4001)
+    curve = np.asarray(Akima1DInterpolator(rates[order], angles[order])(grid))
     highest = np.maximum.accumulate(curve)
     low = int(np.argmax(highest - curve))
     width = float(highest[low] - curve[low])
     if width == 0.0:
-        return 0.0, 0.0, float(np.interp(0.0, fine, curve))
+        return 0.0, 0.0, float(np.interp(0.0, grid, curve))
     middle = 0.5 * (highest[low] + curve[low])
-    inside = fine[np.flatnonzero(np.diff(np.sign(curve - middle)))]
+    inside = grid[np.flatnonzero(np.diff(np.sign(curve - middle)))]
     return width, float(np.ptp(inside)), float(middle)
 
 

@@ -31,7 +31,7 @@ ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to se
 
 @dataclass(frozen=True)
 class StoppingIndices:
-    """What a stopping trial tells of a ship.
+    """Indices of a stopping trial.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class StoppingIndices:
 
 @dataclass(frozen=True)
 class AccelerationIndices:
-    """What an acceleration tells of a ship.
+    """Indices of an acceleration.
 
     Attributes
     ----------
@@ -98,16 +98,8 @@ def stopping(
         shaft astern brings about.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -194,10 +186,6 @@ def stopping_indices(
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
 
-    Returns
-    -------
-    StoppingIndices
-
     Raises
     ------
     InputError
@@ -250,16 +238,8 @@ def acceleration(
         s; by default 40 times the time to travel one ship length.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -292,10 +272,6 @@ def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None =
         Of the change of surge speed from the first sample to the last.
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
-
-    Returns
-    -------
-    AccelerationIndices
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """A virtual towing tank: captive tests of any ship model, its motion prescribed and its forces measured.
 
-The tests are those of the planar motion mechanism (Gertler 1967, The DTMB
-planar-motion-mechanism system; ITTC 7.5-02-06-02, Captive model test).
+Each test returns a Trial with the motion and the forces X, Y (N) and N (N m). The tests are those
+of the planar motion mechanism (Gertler 1967, The DTMB planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
 from __future__ import annotations
@@ -159,11 +159,6 @@ def pure_surge(
     tank : Tank, optional
         Speed, rudder, shaft, noise, ...
 
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
     Raises
     ------
     InputError
@@ -189,11 +184,6 @@ def pure_sway(
     period_s, tank
         As in `pure_surge`.
 
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
     Raises
     ------
     InputError
@@ -218,11 +208,6 @@ def pure_yaw(
         Of the yaw rate, degrees per second.
     period_s, tank
         As in `pure_surge`.
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
 
     Raises
     ------
@@ -251,11 +236,6 @@ def yaw_with_drift(
         Drift angle at midship, degrees: v = -U sin(drift).
     period_s, tank
         As in `pure_surge`.
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
 
     Raises
     ------

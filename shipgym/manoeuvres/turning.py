@@ -25,7 +25,7 @@ CAPTION = "Path from above, from the position and along the heading at which the
 
 @dataclass(frozen=True)
 class TurningIndices:
-    """What a turning circle tells of a ship; None where the ship did not turn so far.
+    """Indices of a turning circle; None where the ship did not turn so far.
 
     Lengths are measured from the position and along the heading at which the rudder was ordered.
 
@@ -70,16 +70,8 @@ def turning_circle(
         Rudder ordered at the start, degrees; negative turns to port.
     duration, dt : float
         s. The samples are dt apart.
-    water_depth : float
-        m.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -106,10 +98,6 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
         With x, y, psi, u, v, r and delta (or delta_command).
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
-
-    Returns
-    -------
-    TurningIndices
 
     Raises
     ------

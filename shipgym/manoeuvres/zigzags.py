@@ -28,7 +28,7 @@ CAPTION = "Heading change and rudder in degrees; dotted: the heading at which th
 
 @dataclass(frozen=True)
 class ZigzagIndices:
-    """What a zigzag tells of a ship; None where the manoeuvre did not get so far.
+    """Indices of a zigzag; None where the manoeuvre ended before.
 
     Attributes
     ----------
@@ -140,10 +140,6 @@ def zigzag_indices(
         Ship length between perpendiculars, m; by default the trial's own.
     heading_deg : float, optional
         Heading change at which the rudder had to be reversed, degrees; by default `switch_heading_deg`.
-
-    Returns
-    -------
-    ZigzagIndices
 
     Raises
     ------

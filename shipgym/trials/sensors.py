@@ -1,4 +1,4 @@
-"""What the sensors of a ship make of her motion: noise, resolution, outliers, gaps, delay and drift."""
+"""Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Sensor:
     outlier_size : float
         Standard deviation of what an outlier adds.
     latency_s : float
-        Age of the signal at the time its reading is written down, s.
+        Age of the signal at the time its reading is logged, s.
 
     Raises
     ------
@@ -190,7 +190,7 @@ class Sensors:
                 t, trial.t, values, np.random.default_rng([seed, CHANNELS.index(name)])
             )
             if name not in ORDERS
-            else held(t, trial.t, values)
+            else orders_at(t, trial.t, values)
             for name, values in on_board(trial).items()
         }
         kept = self._logged(len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])]))
@@ -247,7 +247,7 @@ def on_board(trial: Trial) -> dict[str, Floats]:
     }
 
 
-def held(times: Floats, t: Floats, orders: Floats) -> Floats:
+def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
     """Orders, each given at a time t and held until the next, at other times; all in s."""
     given: Floats = orders[np.searchsorted(t, times + 1e-9, side="right") - 1]
     return given

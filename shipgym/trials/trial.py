@@ -53,7 +53,7 @@ class Trial:
     derived : collection of str, optional
         Names of the channels that were not measured but computed from others.
     length : float, optional
-        Length of the ship between perpendiculars, m; indices of manoeuvres are told in it.
+        Length of the ship between perpendiculars, m; indices of manoeuvres are given in it.
     repaired : mapping of str to int, optional
         How many values of a channel were filled in, because they were missing or outliers.
     raw : Trial, optional

@@ -102,7 +102,7 @@ def test_an_episode_cannot_be_changed():
         (("commands", "delta"), 0.1, "commands.delta: 0.1 found, expected a list"),
         (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
         (("actions",), [[0.1], [0.2, 0.3], [0.1], [0.1]], "actions: expected an array of numbers"),
-        (("rewards",), [], "rewards: none found"),
+        (("rewards",), [], "rewards: no step found"),
         (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards: nan found at 1, expected finite numbers"),
         (("outcome", "success"), "yes", "success: 'yes' found, expected true or false"),
         (("states",), {"x": [0.0] * 5}, "states: 'y', 'psi', 'delta' missing"),
