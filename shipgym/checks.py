@@ -26,13 +26,7 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
 
 
 def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str) -> None:
-    """Refuse a key that is not among `allowed`.
-
-    Raises
-    ------
-    InputError
-        Naming the first unknown key, the nearest known one, and all that are known.
-    """
+    """Refuse a key that is not among `allowed`, and name the nearest one that is."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -113,13 +107,7 @@ def check_number(
 
 
 def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int:
-    """Return `value`, which must be a whole number of at least `at_least`.
-
-    Raises
-    ------
-    InputError
-        Naming the place, the value and what is expected.
-    """
+    """Return `value`, which must be a whole number of at least `at_least`."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value < at_least:
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
         raise InputError(f"{where}: {value!r} found, expected {expected}")

@@ -59,13 +59,7 @@ def _expect(condition: bool, promise: str) -> None:
 
 
 def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
-    """How an environment says that it begins the next episode.
-
-    Raises
-    ------
-    InputError
-        If it does not say.
-    """
+    """How an environment says that it begins the next episode; InputError where it does not say."""
     mode = env.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
         raise InputError(

@@ -200,13 +200,7 @@ class Episode:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the episode as JSON, atomically.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
+        """Write the episode as JSON, atomically; InputError where that fails."""
         write_json(to_file(vars(self)), Path(path), indent=None)
 
     @classmethod

@@ -231,13 +231,7 @@ def shaft_speed_steps(
 
 
 def shaft_of(model: ShipModel) -> float:
-    """Shaft speed at service speed, 1/s, of a ship that has a shaft.
-
-    Raises
-    ------
-    InputError
-        If its thrust is part of the hull's coefficients.
-    """
+    """Shaft speed at service speed, 1/s; InputError where the thrust is part of the hull's coefficients."""
     if "n" not in model.command_names:
         raise InputError(
             f"model {model.name!r}: no shaft speed among its commands ({', '.join(model.command_names)}), "

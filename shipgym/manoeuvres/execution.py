@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +22,13 @@ def rudder(trial: Trial) -> Floats:
         if name in trial.channels:
             return trial[name]
     raise InputError(f"trial {trial.name!r}: channel 'delta' is missing, it shows when the rudder moved")
+
+
+def require(trial: Trial, names: Sequence[str], what: str) -> None:
+    """Refuse a trial that lacks a channel that `what` needs."""
+    for name in names:
+        if name not in trial.channels:
+            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, {what} needs it")
 
 
 def execute_time(trial: Trial) -> float:

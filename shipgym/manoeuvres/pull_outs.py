@@ -12,7 +12,7 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.execution import require, rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -98,8 +98,7 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     InputError
         If a channel is missing, or the rudder was never put amidships.
     """
-    if "r" not in trial.channels:
-        raise InputError(f"trial {trial.name!r}: channel 'r' is missing, a pull-out needs the yaw rate")
+    require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))
     over = np.flatnonzero(delta > 0.5 * delta.max())
     release = int(over[-1]) + 1 if len(over) else 0

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.execution import require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -206,8 +206,7 @@ def spiral_from_trial(
     InputError
         If a channel is missing, or there are fewer than four steady turns.
     """
-    if "r" not in trial.channels:
-        raise InputError(f"trial {trial.name!r}: channel 'r' is missing, a spiral needs the yaw rate")
+    require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
     delta, rate = np.degrees(rudder(trial)), np.degrees(trial["r"])
     allowed = 1e-9 if "delta_command" in trial.channels else tolerance

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, number_of_steps, ship_length
+from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import Seed, ShipModel
@@ -104,9 +104,7 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     InputError
         If a channel or the length is missing.
     """
-    for name in ("x", "y", "psi"):
-        if name not in trial.channels:
-            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, a turning circle needs it")
+    require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
     start = execute_time(trial)
     x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))

@@ -61,6 +61,8 @@ def zigzag(
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
+    The trial has the rudder ordered from each sample on in `delta_command`.
+
     Parameters
     ----------
     model : ShipModel
@@ -84,11 +86,6 @@ def zigzag(
     seed : int or Generator
         Of the weather.
 
-    Returns
-    -------
-    Trial
-        With the rudder ordered from each sample on in `delta_command`.
-
     Raises
     ------
     InputError
@@ -102,20 +99,9 @@ def zigzag(
     threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
-    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
-    commands = np.empty(n_steps + 1)
+    conditions = Conditions(water_depth, weather, seed)
     first = -angle if port_first else angle
-    reached, turns = passage.kernel("zigzag").zigzag(
-        states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside",
-        passage.sky, passage.words, passage.ship,
-    )  # fmt: skip
-    times = dt * np.arange(n_steps + 1, dtype=float)
-    if reached < n_steps:
-        raise unstable(model, times[reached], states[reached])
-    orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
-    orders[:, 0] = commands
-    trial = as_trial(model, times, states, orders, kind="zigzag")
+    trial, turns = _sail(model, conditions, first, threshold, n_steps, dt, switch == "inside")
     if must_reverse and turns == 0:
         gained = np.degrees(np.sign(first) * (trial["psi"] - trial["psi"][0])).max()
         raise ManoeuvreError(
@@ -125,6 +111,26 @@ def zigzag(
             trial,
         )
     return trial
+
+
+def _sail(
+    model: ShipModel, conditions: Conditions, first: float, threshold: float, n_steps: int, dt: float, inside: bool
+    inside: bool,
+) -> tuple[Trial, int]:
+    """The trial with a first order and a heading to reverse at, rad, and how often it was reversed."""
+    passage = Passage(model, conditions, dt)
+    states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
+    commands = np.empty(n_steps + 1)
+    reached, turns = passage.kernel("zigzag").zigzag(
+        states, commands, first, threshold, model.service_shaft_speed, dt, inside,
+        passage.sky, passage.words, passage.ship,
+    )  # fmt: skip
+    times = dt * np.arange(n_steps + 1, dtype=float)
+    if reached < n_steps:
+        raise unstable(model, times[reached], states[reached])
+    orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
+    orders[:, 0] = commands
+    return as_trial(model, times, states, orders, kind="zigzag"), int(turns)
 
 
 def zigzag_indices(

@@ -196,13 +196,7 @@ class Particulars(Mapping[str, Any]):
         return {**{name: getattr(self, name) for name in FIELDS}, "estimated": sorted(self.estimated)}
 
     def require(self, name: str) -> float:
-        """Return a value that must be known.
-
-        Raises
-        ------
-        InputError
-            Where it is None.
-        """
+        """Return a value that must be known; InputError where it is None."""
         value = self[name]
         if value is None:
             raise InputError(f"particulars of {self.name}: {name} is needed and not known; give it in [ship]")
@@ -253,21 +247,10 @@ FIELDS: tuple[str, ...] = tuple(field.name for field in fields(Particulars) if f
 def clarke_added_masses(
     length: float, beam: float, draught: float, block_coefficient: float
 ) -> dict[str, float]:
-    """Estimate added masses in sway and yaw from a hull's proportions.
+    """Added masses in sway and yaw from a hull's proportions, in the prime system, about midship.
 
-    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2 in the prime system, about midship.
-
-    Parameters
-    ----------
-    length, beam, draught : float
-        m.
-    block_coefficient : float
-        Displaced volume by length * beam * draught.
-
-    Returns
-    -------
-    dict of str to float
-        ``Y_vdot``, ``Y_rdot``, ``N_vdot``, ``N_rdot``, prime system.
+    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the block coefficient is
+    the displaced volume by length * beam * draught.
     """
     scale = -math.pi * (draught / length) ** 2
     fullness = block_coefficient * beam / draught

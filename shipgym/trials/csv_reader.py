@@ -51,17 +51,7 @@ class CsvTable:
         return f"line {self.line_numbers[row]} (data row {row + 1})"
 
     def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
-        """Return some columns as numbers.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Columns, each of which must be in the header.
-
-        Returns
-        -------
-        ndarray of shape (n_rows, n_names)
-            The values; nan where a cell is empty or says nan or NA.
+        """Some columns as numbers, shape (n_rows, n_names); nan where a cell is empty or says nan or NA.
 
         Raises
         ------
@@ -126,18 +116,13 @@ class CsvTable:
 
 
 def read_table(path: str | Path) -> CsvTable:
-    """Read a CSV file with one header line; delimiter comma, semicolon or tab.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file, in UTF-8.
+    """Read a CSV file in UTF-8 with one header line; delimiter comma, semicolon or tab.
 
     Raises
     ------
     InputError
-        For a missing file, a folder, an empty or binary file, and a header without names or with a
-        name twice.
+        For a missing file, a folder, an empty or binary file, and a header without names or with a name
+        twice.
     """
     path = Path(path)
     lines = _read_lines(path)

@@ -36,19 +36,9 @@ _WINDOWS = 30
 
 
 def check_ranges(channels: Mapping[str, Array], source: Source) -> None:
-    """Refuse values beyond :data:`LIMITS`.
+    """Refuse values beyond :data:`LIMITS`, and name the unit that would make them plausible.
 
-    Parameters
-    ----------
-    channels : mapping of str to ndarray of shape (n_samples,)
-        In SI units.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming line, column, value, limit, and the unit that would make the values plausible.
+    The channels are in SI units, of shape (n_samples,); the source is the file, for messages.
     """
     for channel, limit in LIMITS.items():
         if channel not in channels:
@@ -71,19 +61,7 @@ def check_heading(t: Array, psi: Array, raw_psi: Array, source: Source) -> None:
     """Refuse a heading that turns faster than any ship.
 
     Single outliers of a noisy sensor pass; a jump of more than 30 degrees, or steps most of which are too
-    fast, do not.
-
-    Parameters
-    ----------
-    t, psi, raw_psi : ndarray of shape (n_samples,)
-        Time, s; heading without and with the jumps at north, rad.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming line, values and remedy.
+    fast, do not. Time in s; heading without and with the jumps at north, rad; each of shape (n_samples,).
     """
     step = np.diff(psi)
     fast = np.abs(step) > _FASTEST_TURN * np.diff(t)
@@ -111,23 +89,8 @@ def check_consistency(t: Array, channels: Mapping[str, Array], frame: str, sourc
     """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
 
     Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
-    heading, and velocities with the change of position.
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    channels : mapping of str to ndarray of shape (n_samples,)
-        As recorded, in SI units; the heading without jumps.
-    frame : {"body", "earth"}
-        Declared frame of u and v.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming the channels, the factor or angle between them, and the remedy.
+    heading, and velocities with the change of position. The channels are as recorded, in SI units, the
+    heading without jumps; `frame`, "body" or "earth", is the declared one of u and v.
     """
     if "psi" in channels and "r" in channels:
         _check_yaw_rate(t, channels["psi"], channels["r"], source)

@@ -17,21 +17,10 @@ _SPEEDS = (0.2, 2.0)  # of a trial, by the service speed
 
 
 def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
-    """Refuse what no ship of this size and speed does: the trial is another's, or in another unit.
+    """Refuse what no ship of this size and speed does: the trial is another ship's, or in another unit.
 
-    Parameters
-    ----------
-    trial : Trial
-        In SI units.
-    ship : Particulars
-        Length, and service speed and propeller diameter where given.
-    where : str
-        Start of messages.
-
-    Raises
-    ------
-    InputError
-        For yaw rates and speeds of another scale, and a propeller's tip beyond 100 m/s.
+    These are yaw rates and speeds of another scale, and a propeller's tip beyond 100 m/s. Service speed and
+    propeller diameter count where they are given; `where` begins the messages.
     """
     speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
     if speeds is not None and "r" in trial:

@@ -77,22 +77,10 @@ class Sensor:
 
 
 def gauss_markov(t: Floats, correlation_time_s: float, rng: np.random.Generator) -> Floats:
-    """First-order Gauss-Markov process of unit variance, stationary from the first sample on.
+    """First-order Gauss-Markov process of unit variance at times in s, stationary from the first sample on.
 
     Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb 1974, Applied Optimal
     Estimation, 3.8).
-
-    Parameters
-    ----------
-    t : array of shape (n_samples,)
-        s, increasing.
-    correlation_time_s : float
-        s.
-    rng : Generator
-
-    Returns
-    -------
-    array of shape (n_samples,)
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     shocks = rng.standard_normal(len(t))

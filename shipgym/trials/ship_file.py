@@ -35,10 +35,8 @@ class TrialEntry:
         As written; the trial's name.
     path : Path
         The CSV file.
-    kind : str or None
-        The manoeuvre.
-    use : {"fit", "validate", "skip"}
-        What the trial is for.
+    kind, use
+        As in :class:`Trial`.
     columns : mapping or None
         Columns by channel as written; None: those named like channels.
     conventions : Conventions
@@ -113,30 +111,19 @@ class ShipFile:
         return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:
-        """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
-
-        Raises
-        ------
-        InputError
-            Naming the ship file and what is missing, where it cannot be estimated.
-        """
+        """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
         try:
             return self.particulars.completed()
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
-        """Read the trials.
+        """Read the trials, in the order of the file, each named by its ``file``.
 
         Parameters
         ----------
         use : {"fit", "validate", "skip"}, optional
             Only trials of this use; by default all but those to skip.
-
-        Returns
-        -------
-        list of Trial
-            In the order of the file, each named by its ``file``.
 
         Raises
         ------
@@ -149,18 +136,7 @@ class ShipFile:
         return [self._read(entry) for entry in wanted]
 
     def trial(self, file: str) -> Trial:
-        """Read one trial, whatever its use.
-
-        Parameters
-        ----------
-        file : str
-            As written in the ship file.
-
-        Raises
-        ------
-        InputError
-            If no trial has that file, and for anything wrong with it.
-        """
+        """Read one trial by its ``file``, whatever its use; as :meth:`trials`."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
         return self._read(self.entries[files.index(file)])

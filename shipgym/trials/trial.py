@@ -217,9 +217,8 @@ class Trial:
     ) -> Trial:
         """Read a trial from a CSV file and convert it to SI units and the project's signs.
 
-        Channels that are absent and follow from others are derived and listed in :attr:`derived`: ``r`` from
-        ``psi``; ``u`` and ``v`` from ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position
-        (heading relative to the start).
+        Channels that follow from others are derived where they are absent: ``r`` from ``psi``; ``u`` and ``v``
+        from ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position (relative to the start).
 
         Parameters
         ----------
@@ -247,25 +246,11 @@ class Trial:
         InputError
             For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
-        conventions = Conventions(
-            rudder_positive=rudder_positive,
-            velocity_frame=velocity_frame,
-            origin=origin,
-            xg=xg,
-            repair=repair,
-            where=f"{path}:",
-        )
+        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, where=f"{path}:")
         t, channels, derived, repaired = import_csv(Path(path), columns, conventions)
-        return cls(
-            t,
-            channels,
-            name=Path(path).name if name is None else name,
-            kind=kind,
-            use=use,
-            derived=derived,
-            length=length,
-            repaired=repaired,
-        )
+        name = Path(path).name if name is None else name
+        facts: dict[str, Any] = {"derived": derived, "repaired": repaired, "length": length}
+        return cls(t, channels, name=name, kind=kind, use=use, **facts)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
