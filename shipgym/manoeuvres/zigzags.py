@@ -103,18 +103,28 @@ def zigzag(
     first = -angle if port_first else angle
     trial, turns = _sail(model, conditions, first, threshold, n_steps, dt, switch == "inside")
     if must_reverse and turns == 0:
-        gained = np.degrees(np.sign(first) * (trial["psi"] - trial["psi"][0])).max()
-        raise ManoeuvreError(
-            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by at most "
-            f"{gained:.3g} deg to the side of the rudder in {duration:g} s, expected {heading_deg:g} deg, "
-            "where the rudder is reversed; sail longer, or order more rudder or less heading",
-            trial,
-        )
+        raise _never_reversed(f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}", trial, heading_deg)
     return trial
 
 
+def _never_reversed(what: str, trial: Trial, heading_deg: float) -> ManoeuvreError:
+    side = np.sign(trial["delta_command"][0])
+    gained = np.degrees(side * (trial["psi"] - trial["psi"][0])).max()
+    return ManoeuvreError(
+        f"{what}: the heading changed by at most {gained:.3g} deg to the side of the rudder in "
+        f"{trial.duration:g} s, expected {heading_deg:g} deg, where the rudder is reversed; sail longer, or "
+        "order more rudder or less heading",
+        trial,
+    )
+
+
 def _sail(
-    model: ShipModel, conditions: Conditions, first: float, threshold: float, n_steps: int, dt: float, inside: bool
+    model: ShipModel,
+    conditions: Conditions,
+    first: float,
+    threshold: float,
+    n_steps: int,
+    dt: float,
     inside: bool,
 ) -> tuple[Trial, int]:
     """The trial with a first order and a heading to reverse at, rad, and how often it was reversed."""

@@ -217,8 +217,8 @@ class Trial:
     ) -> Trial:
         """Read a trial from a CSV file and convert it to SI units and the project's signs.
 
-        Channels that follow from others are derived where they are absent: ``r`` from ``psi``; ``u`` and ``v``
-        from ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position (relative to the start).
+        Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
+        ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position (relative to the start).
 
         Parameters
         ----------
