@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,7 +28,7 @@ REWARD_DECIMALS = 4
 
 
 def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Names of those who flew a task and could do it at sea, as they are ranked."""
+    """Names of those who ran a task and are usable at sea, as they are ranked."""
     return [name for name in result.ranking if name in result.summary["tasks"][task] and name != ORACLE]
 
 
@@ -63,7 +62,7 @@ def hardest_of(result: BenchmarkResult, task: str) -> int:
 
 
 def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[Flight]]]:
-    """What may be replayed of a task: for whom, and the flights to lay over each other, the first chosen.
+    """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
 
     At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
     each, beside the task's best contestant in the same.
@@ -79,7 +78,7 @@ def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str
 
 
 def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[Flight]]:
-    """How many of the worst episodes of each contestant a page has room for, and all flights it shows.
+    """How many of the worst episodes of each contestant a page has room for, and all that it shows.
 
     Parameters
     ----------
@@ -132,7 +131,13 @@ def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[s
                 }
             )
     page = player("Replay", MARK)
-    return {"page": page, "mark": MARK, "quantities": quantities(whole), "runs": runs, "entries": entries}
+    return {
+        "page": page,
+        "mark": f'"{MARK}"',
+        "quantities": quantities(whole),
+        "runs": runs,
+        "entries": entries,
+    }
 
 
 def _called(result: BenchmarkResult, flight: Flight) -> str:
@@ -156,8 +161,3 @@ def differences(values: Sequence[float], decimals: int) -> list[int]:
     """The decimals, and the differences of values in units of the last of them."""
     units = np.round(np.asarray(values) * 10.0**decimals).astype(np.int64)
     return [decimals, *np.diff(units, prepend=0).tolist()]
-
-
-def as_json(data: Any) -> str:
-    """JSON without needless spaces."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":"))

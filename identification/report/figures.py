@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import TruncatedLSSVM
+from identification.fit import Fit
 from identification.report.predictions import legend_above, overview_figure, prediction_figure
 from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
@@ -30,7 +31,6 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-    from identification.result import IdentificationResult
 
 Floats = NDArray[np.float64]
 
@@ -42,27 +42,32 @@ NORMAL_95 = 1.96
 SHOWN = (-1.5, 3.5)  # of an interval, by the size of the coefficient
 
 
-def all_figures(result: IdentificationResult) -> dict[str, Figure]:
-    """Every figure of a result by its name; see `IdentificationResult.plots`."""
-    fitted = [trial for trial in result.trials if trial.use == "fit"]
-    found = {"fit": fit_figure(result), "residuals": residual_figure(result)}
-    if truncated(result):
-        found["l-curve"] = l_curve_figure(result)
-    if result.searches:
-        found["search"] = search_figure(result)
-    found["coefficients"] = coefficients_figure(result)
+def all_figures(fit: Fit) -> dict[str, Figure]:
+    """Every figure of a fit by its name; see `IdentificationResult.plots`."""
+    fitted = [trial for trial in fit.trials if trial.use == "fit"]
+    found = regression_figures(fit) | {"coefficients": coefficients_figure(fit)}
     if all("psi" in trial and "delta" in trial for trial in fitted):
-        found["trials"] = overview_figure(fitted, result.predictions)
+        found["trials"] = overview_figure(fitted, fit.predictions)
     return found | {
-        f"prediction: {trial.name}": prediction_figure(trial, result.predictions[trial.name])
-        for trial in result.trials
+        f"prediction: {trial.name}": prediction_figure(trial, fit.predictions[trial.name])
+        for trial in fit.trials
         if trial.use == "validate"
     }
 
 
-def fit_figure(result: IdentificationResult) -> Figure:
+def regression_figures(fit: Fit) -> dict[str, Figure]:
+    """Figures of the regression by name; "l-curve" and "search" only where a method has one."""
+    found = {"fit": fit_figure(fit), "residuals": residual_figure(fit)}
+    if truncated(fit):
+        found["l-curve"] = l_curve_figure(fit)
+    if fit.searches:
+        found["search"] = search_figure(fit)
+    return found
+
+
+def fit_figure(fit: Fit) -> Figure:
     """Mean acceleration over each window, as the trials have it and as the regression explains it."""
-    samples, equations = result.samples, list(result.machines)
+    samples, equations = fit.samples, list(fit.machines)
     figure = subplots(
         len(equations), 2, column_widths=[0.7, 0.3], horizontal_spacing=0.1,
         vertical_spacing=0.24 / len(equations),
@@ -72,7 +77,7 @@ def fit_figure(result: IdentificationResult) -> Figure:
     for row, q in enumerate(equations, start=1):
         factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
         seen = (samples.targets[q] * factor)[drawn]
-        told = (result.machines[q].predict(samples.features[q]) * factor)[drawn]
+        told = (fit.machines[q].predict(samples.features[q]) * factor)[drawn]
         for values, name, colour, width in (
             (seen, "trials", MEASURED, 1.2),
             (told, "regression", MODEL, 1.7),
@@ -99,11 +104,11 @@ def fit_figure(result: IdentificationResult) -> Figure:
     return figure
 
 
-def residual_figure(result: IdentificationResult) -> Figure:
+def residual_figure(fit: Fit) -> Figure:
     """Autocorrelation of the residuals and their cross-correlation with the rudder, with 95 % bounds."""
-    errors, equations = residuals(result.machines, result.samples), list(result.machines)
-    rows = without_overlap(result.samples)
-    rudder = rudder_at_windows(result)
+    errors, equations = residuals(fit.machines, fit.samples), list(fit.machines)
+    rows = without_overlap(fit.samples)
+    rudder = rudder_at_windows(fit)
     figure = subplots(
         len(equations), 2, horizontal_spacing=0.1, vertical_spacing=0.24 / len(equations),
         titles=["with themselves", "with the rudder" if rudder is not None else ""],
@@ -146,10 +151,10 @@ def _bars(lags: NDArray[Any], values: Any) -> Any:
     )  # fmt: skip
 
 
-def rudder_at_windows(result: IdentificationResult) -> Floats | None:
+def rudder_at_windows(fit: Fit) -> Floats | None:
     """Rudder in the middle of each row's window, rad; None where a trial has none."""
-    samples = result.samples
-    used = [trial for trial in result.trials if trial.use == "fit"]
+    samples = fit.samples
+    used = [trial for trial in fit.trials if trial.use == "fit"]
     if not all("delta" in trial for trial in used):
         return None
     middle, angles = samples.start + 0.5 * samples.duration, np.empty(len(samples))
@@ -159,18 +164,18 @@ def rudder_at_windows(result: IdentificationResult) -> Floats | None:
     return angles
 
 
-def truncated(result: IdentificationResult) -> dict[str, TruncatedLSSVM]:
+def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
     """The machines, by equation, that chose or were given a rank."""
     return {
         q: machine
-        for q, machine in result.machines.items()
+        for q, machine in fit.machines.items()
         if isinstance(machine, TruncatedLSSVM) and (machine.selection != "full" or machine.rank is not None)
     }
 
 
-def l_curve_figure(result: IdentificationResult) -> Figure:
+def l_curve_figure(fit: Fit) -> Figure:
     """Size of residuals and of solution for every rank, one panel for each equation."""
-    curves = truncated(result)
+    curves = truncated(fit)
     titles = [f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}" for q, m in curves.items()]
     figure = subplots(1, len(curves), titles=titles, horizontal_spacing=0.09)
     go = graph_objects()
@@ -206,9 +211,9 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
     return axis(title, type="log", dtick="D2" if few else 1, tickformat="~g")
 
 
-def search_figure(result: IdentificationResult) -> Figure:
+def search_figure(fit: Fit) -> Figure:
     """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
-    searches = {EQUATIONS.get(q, q): search for q, search in result.searches.items()}
+    searches = {EQUATIONS.get(q, q): search for q, search in fit.searches.items()}
     logarithmic = all(search.variable == LOG_C for search in searches.values())
     titles = ["best objective, by its last", "best C" if logarithmic else f"best {BAND}"]
     figure = subplots(1, 2, titles=titles, horizontal_spacing=0.1)
@@ -230,12 +235,12 @@ def search_figure(result: IdentificationResult) -> Figure:
     return figure
 
 
-def coefficients_figure(result: IdentificationResult) -> Figure:
-    """95 % interval of each coefficient by its size: those that reach 0 are not told from it."""
+def coefficients_figure(fit: Fit) -> Figure:
+    """95 % interval of each coefficient by its size; one that reaches 0 is not significant."""
     go = graph_objects()
-    names = list(result.coefficients)
-    values = np.array(list(result.coefficients.values()))
-    errors = np.array(list(result.standard_errors.values()))
+    names = list(fit.coefficients)
+    values = np.array(list(fit.coefficients.values()))
+    errors = np.array(list(fit.standard_errors.values()))
     size = np.where(values == 0.0, 1.0, np.abs(values))
     half = NORMAL_95 * np.nan_to_num(errors) / size
     columns = 1 if len(names) < 12 else 2
@@ -243,7 +248,7 @@ def coefficients_figure(result: IdentificationResult) -> Figure:
     figure = subplots(1, columns, horizontal_spacing=0.16)
     for column in range(columns):
         part = slice(column * rows, (column + 1) * rows)
-        for sure, name, colour in ((True, "told from 0", MODEL), (False, "not told from 0", "#b3bcc7")):
+        for sure, name, colour in ((True, "significant", MODEL), (False, "not significant", "#b3bcc7")):
             own = np.flatnonzero(((half < 1.0) & (values != 0.0))[part] == sure)
             centre = np.sign(values[part][own]) ** 2
             low, high = (np.clip(centre + side * half[part][own], *SHOWN) for side in (-1.0, 1.0))

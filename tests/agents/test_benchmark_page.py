@@ -290,7 +290,7 @@ def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
 
 def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
     opened.run("document.querySelector('#ranking-table thead button').focus()")
-    opened.press(" ", "Space")
+    opened.press("Space")
     names = column(opened, "ranking-table", 0)
     assert names == sorted(names)
     table = "document.querySelector('#improvement-table')"
@@ -318,7 +318,7 @@ def test_tabs_show_one_task_at_a_time(opened):
     shown = "[...document.querySelectorAll('[role=tabpanel]')].filter((p) => !p.hidden).map((p) => p.id)"
     assert opened.run(shown) == ["task-mariner-calm"]
     opened.run("document.querySelector('[role=tab]').focus()")
-    opened.press("ArrowRight", "ArrowRight")
+    opened.press("ArrowRight")
     assert opened.run(shown) == ["task-mariner-current"]
     opened.run("document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()")
     opened.wait(f"{shown}[0] === 'task-mariner-calm'")
