@@ -8,6 +8,9 @@ from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shipgym.errors import InputError
 
 
@@ -112,3 +115,26 @@ def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
         raise InputError(f"{where}: {value!r} found, expected {expected}")
     return int(value)
+
+
+def check_flag(value: Any, where: str) -> bool:
+    """Return `value`, which must be true or false."""
+    if not isinstance(value, bool):
+        raise InputError(f"{where}: {value!r} found, expected true or false")
+    return value
+
+
+def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]:
+    """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: expected an array of numbers") from None
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = tuple(wrong[0].tolist())
+        sample = place[0] if len(place) == 1 else place
+        remedy = f"; {hint}" if hint else ""
+        raise InputError(f"{where}: {array[place]} found at sample {sample}, expected finite numbers{remedy}")
+    array.setflags(write=False)
+    return array

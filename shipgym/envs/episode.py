@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.checks import check_number, check_table, check_text, quoted
+from shipgym.checks import (
+    check_finite,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    check_whole,
+    quoted,
+)
 from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
@@ -110,10 +117,12 @@ class Episode:
         if self.corridor is not None:
             check_number(self.corridor, "corridor", above=0.0)
         check_table(self.arguments, "arguments")
-        for name in ("seed", "number"):
-            _check_count(getattr(self, name), name)
+        if self.seed is not None:
+            check_whole(self.seed, "seed", at_least=0)
+        check_whole(self.number, "number", at_least=0)
         for name in ("terminated", "truncated", "success"):
-            _check_flag(getattr(self, name), name)
+            if getattr(self, name) is not None or name != "success":
+                check_flag(getattr(self, name), name)
         self._set_series()
         self._set_waypoints()
 
@@ -121,7 +130,7 @@ class Episode:
         rewards = series(self.rewards, "rewards", None)
         if not len(rewards):
             raise InputError("rewards: no step found, expected at least one step")
-        actions = _finite(self.actions, "actions")
+        actions = check_finite(self.actions, "actions")
         if actions.ndim != 2 or len(actions) != len(rewards):
             raise InputError(
                 f"actions: shape {actions.shape} found, expected ({len(rewards)}, n_actions), a row for "
@@ -143,7 +152,7 @@ class Episode:
     def _set_waypoints(self) -> None:
         if self.waypoints is None:
             return
-        points = _finite(self.waypoints, "waypoints")
+        points = check_finite(self.waypoints, "waypoints")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
             raise InputError(
                 f"waypoints: shape {points.shape} found, expected (n, 2), north and east of two or more"
@@ -220,44 +229,10 @@ class Episode:
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:
-    """Finite numbers over time, of shape (count,), as a read-only array.
-
-    Raises
-    ------
-    InputError
-        Naming the first value that is not finite, or the length found.
-    """
-    array = _finite(values, where)
+    """Finite numbers over time, of shape (count,), as a read-only array; InputError for others."""
+    array = check_finite(values, where)
     if array.ndim != 1 or (count is not None and len(array) != count):
         raise InputError(
             f"{where}: shape {array.shape} found, expected ({'n_steps' if count is None else count},)"
         )
     return array
-
-
-def _finite(values: Any, where: str) -> Floats:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: expected an array of numbers") from None
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        place = tuple(wrong[0].tolist())
-        index = place[0] if len(place) == 1 else place
-        raise InputError(f"{where}: {array[place]} found at {index}, expected finite numbers")
-    array.setflags(write=False)
-    return array
-
-
-def _check_count(value: Any, where: str) -> None:
-    if value is None and where == "seed":
-        return
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
-        raise InputError(f"{where}: {value!r} found, expected a whole number from 0 on")
-
-
-def _check_flag(value: Any, where: str) -> None:
-    if value is None and where == "success":
-        return
-    if not isinstance(value, bool):
-        raise InputError(f"{where}: {value!r} found, expected true or false")

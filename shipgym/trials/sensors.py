@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.kernels.weather_rows import CHANNEL_NAMES
 from shipgym.trials.trial import Trial
@@ -170,8 +170,7 @@ class Sensors:
         InputError
             If the seed is not a whole number >= 0, or sampling and gaps leave fewer than three samples.
         """
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InputError(f"seed: {seed!r} found, expected a whole number >= 0")
+        check_whole(seed, "seed", at_least=0)
         t = self._sampled(trial)
         readings = {
             name: self.by_channel.get(name, PERFECT).read(

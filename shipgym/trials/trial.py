@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.checks import check_choice, check_number, check_text, did_you_mean, quoted
+from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.trials.trial_import import Conventions, import_csv
@@ -292,20 +292,10 @@ def _frozen_channels(
 
 def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
     """Return `values` as a read-only copy of shape (n_samples,), all finite."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: expected an array of numbers") from None
+    hint = 'leave such samples out, or import the file with repair = "interpolate"'
+    array = check_finite(values, where, hint)
     if array.ndim != 1:
         raise InputError(f"{where}: array of shape {array.shape} found, expected (n_samples,)")
-    bad = ~np.isfinite(array)
-    if bad.any():
-        index = int(np.argmax(bad))
-        raise InputError(
-            f"{where}: {array[index]} found at sample {index}, expected finite numbers; leave such samples "
-            'out, or import the file with repair = "interpolate"'
-        )
-    array.setflags(write=False)
     return array
 
 
