@@ -69,7 +69,7 @@ def write_page(
     result : BenchmarkResult
         Of `benchmark` or `load_results`.
     path : str or Path
-        The HTML file; one that exists is replaced. It loads nothing, from nowhere.
+        The HTML file; one that exists is replaced. It loads nothing.
     controllers : optional
         As `benchmark` was given them; needed to replay contestants that were given as objects.
     worst : int
@@ -77,7 +77,7 @@ def write_page(
     workers : int or None
         Processes that run them; None for as many as there are cores.
     progress : callable, optional
-        Told what is done, how many of it, and the total.
+        Called with the stage of the work, the number done and the total.
 
     Raises
     ------
@@ -89,13 +89,18 @@ def write_page(
     plotly_script()  # a missing extra shall be told before the work
     count, flights = replayable(result, worst)
     reflown = refly(result, flights, controllers, workers, progress)
+    write_text(_page(result, reflown, count), target)
+
+
+def _page(result: BenchmarkResult, reflown: Reflown, count: int) -> str:
+    """The text of the page, with so many of the worst episodes of each contestant to replay."""
     wins = [name for task in result.tasks for name in bests_of(result, task)]
-    page = render(
+    return render(
         "agents.benchmarking/page.html",
         about=result.summary,
         names=result.ranking,
         oracle=ORACLE,
-        looks=styles(result.ranking),
+        styles=styles(result.ranking),
         wins={name: wins.count(name) for name in result.ranking},
         failures=_failures(result),
         figures={
@@ -114,7 +119,6 @@ def write_page(
         results_file=RESULTS,
         packed=packed,
     )
-    write_text(page, target)
 
 
 def packed(text: str) -> str:
@@ -124,15 +128,15 @@ def packed(text: str) -> str:
 
 def _failures(result: BenchmarkResult) -> list[str]:
     """Who failed or could not take part."""
-    told = []
+    failures = []
     for name, one in result.summary["contestants"].items():
-        told += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
-        told += [
+        failures += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
+        failures += [
             f"{name} failed in {found[name]['failed']} episodes of {task}: {found[name]['failure']}"
             for task, found in result.summary["tasks"].items()
             if name in found and found[name]["failed"]
         ]
-    return told
+    return failures
 
 
 def _task(result: BenchmarkResult, reflown: Reflown, task: str) -> dict[str, Any]:
