@@ -20,10 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from agents.oracle import OracleSettings, fly_oracle
 
 from agents.agent_file import find_agent, load_agent
 from agents.benchmarking.contestants import file_hash
-from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
     CLASSICAL,
     EPISODES,
@@ -34,10 +34,10 @@ from agents.benchmarking.direct_search import (
     tune,
     tuned_file,
 )
-from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.controllers.controller import Controller
-from agents.oracle import OracleSettings, fly_oracle
+from agents.controllers.designs import design
 from agents.rollouts.flying import episode_costs
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 

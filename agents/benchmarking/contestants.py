@@ -27,16 +27,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.controller_file import controller_content
+from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.los_autopilot import LAWS
+from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 
-CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 ORACLE = "oracle"
@@ -274,8 +273,6 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
         on_path = isinstance(task.task, PathFollowingTask)
         return [design("lq" if source in LAWS and not on_path else source, task)]
     if source.startswith(TUNED):
-        from agents.benchmarking.direct_search import tuned
-
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)

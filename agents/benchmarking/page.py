@@ -28,9 +28,9 @@ from agents.benchmarking.page_tables import (
     scores_table,
 )
 from agents.benchmarking.results import EPISODES, RESULTS, BenchmarkResult
-from agents.benchmarking.suite import N_EPISODES, load_suite
 from agents.output import check_page
 from agents.rollouts.refly import Flight, Reflown, refly
+from agents.suites.suite import N_EPISODES, load_suite
 from shipgym.envs.episode import Episode
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.pages import (

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
-from agents.benchmarking.oracle_costs import oracle_costs
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
-from agents.benchmarking.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
 from agents.engines.jobs import check_engine, run_jobs
 from agents.rollouts.flying import fly_task
+from agents.suites.reference import oracle_costs
+from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 

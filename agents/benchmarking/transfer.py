@@ -21,13 +21,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import tune
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
-from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controllers.controller import Controller, Policy
+from agents.controllers.designs import design
 from agents.engines.jobs import run_jobs
 from agents.rollouts.flying import fly_task
+from agents.suites.suite import BenchmarkTask, load_suite
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
 from shipgym.ships import ShipModel, load_model

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from agents.benchmarking.contestants import CLASSICAL, Contestant, file_hash
+from agents.benchmarking.contestants import Contestant, file_hash
 from agents.benchmarking.results import BenchmarkResult, load_results, versions
 from agents.benchmarking.run import fly_job, fly_job_of
-from agents.benchmarking.suite import load_suite, suite_hash
+from agents.controllers.designs import CLASSICAL
 from agents.engines.jobs import run_jobs
+from agents.suites.suite import load_suite, suite_hash
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 

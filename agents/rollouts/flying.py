@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Policy
 from agents.policies.shield import ShieldState, interventions
 from agents.rollouts.metrics import Recording, metrics
+from agents.suites.suite import BenchmarkTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.kernels import layout

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import Contestant, contestants
 from agents.benchmarking.results import BenchmarkResult
-from agents.benchmarking.suite import BenchmarkTask, load_suite
 from agents.controllers.controller import Policy
 from agents.engines.jobs import run_jobs
 from agents.rollouts.flying import commands
+from agents.suites.suite import BenchmarkTask, load_suite
 from shipgym.envs.episode import Episode
 from shipgym.envs.recording import SUCCESS, plain
 from shipgym.envs.screen import STEP_OUTCOME

@@ -19,7 +19,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar, get_type_hints
 
-from agents.benchmarking.suite import ENVIRONMENTS, load_suite
+from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
@@ -28,7 +28,7 @@ SCHEDULES = ("constant", "linear")
 RUNNING, LEARNED, AUTO = "running", "learned", "auto"
 ACTIVATIONS = ("relu", "tanh")
 #: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
-#: task (but `direct_search.NO_BASES`), and a path that ends in .json is a controller's file.
+#: task (but `designs.NO_BASES`), and a path that ends in .json is a controller's file.
 BASES = (
     "none", "tuned", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos",
     "alos",

@@ -7,11 +7,11 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
 from agents.benchmarking.contestants import contestants
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
+from agents.controllers.designs import design
+from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
@@ -171,13 +171,7 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     }
     for name, content in kept.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
-    monkeypatch.setattr("agents.benchmarking.direct_search.tuned_file", lambda suite: tmp_path / "tuned.json")
-    monkeypatch.setattr(
-        "agents.benchmarking.oracle_costs.suite_file", lambda suite, what: tmp_path / f"{what}.json"
-    )
-    monkeypatch.setattr(
-        "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
-    )
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
     look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
     assert look.summary["reference"] == {}  # costs of all episodes say nothing of the first two
     monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)

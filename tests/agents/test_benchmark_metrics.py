@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, fly
-from agents.benchmarking.suite import BenchmarkTask
 from agents.rollouts.flying import fly_task
 from agents.rollouts.metrics import reversals, step_figures, worst_step_cost
+from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
 
 KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})

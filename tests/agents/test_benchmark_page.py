@@ -22,9 +22,9 @@ from agents.benchmarking.page_replays import (
     replayable,
     worst_of,
 )
-from agents.benchmarking.suite import load_suite
 from agents.cli import app
 from agents.rollouts.refly import Flight, recorded, refly
+from agents.suites.suite import load_suite
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
 

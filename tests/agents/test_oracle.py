@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from agents.oracle import OracleSettings, fly_oracle
 
 from agents import LQ, PID
-from agents.oracle import OracleSettings, fly_oracle
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask

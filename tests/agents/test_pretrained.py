@@ -5,10 +5,10 @@ import pytest
 
 from agents import load_agent
 from agents.benchmarking.contestants import check_fits, pretrained
-from agents.benchmarking.suite import load_suite
 from agents.controllers.controller import model_hash
 from agents.policies.policy import LearnedPolicy
 from agents.rollouts.flying import episode_costs
+from agents.suites.suite import load_suite
 from agents.training.plan import Given, make_plan
 
 SUITE = load_suite()

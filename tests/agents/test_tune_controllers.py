@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from agents.benchmarking import direct_search
-from agents.benchmarking.suite import BenchmarkTask
+from agents.suites.suite import BenchmarkTask
 from shipgym.json_file import read_json, write_json
 
 SCRIPT = Path(__file__).parents[2] / "scripts" / "tune_controllers.py"

@@ -9,15 +9,22 @@ from functools import lru_cache
 from importlib import import_module
 from typing import Any
 
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Controller, model_hash
 from agents.controllers.controller_file import HOMES
 from agents.controllers.los_autopilot import LAWS
+from agents.suites.reference import load_tuned
+from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 
+#: Controllers by name, in an order in which those come first that others build on.
+CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
+#: Of these, no bases for policies unless asked for by name, being slow: MPC, which needs an extra too, solves
+#: for one ship after another, and adaptive LQ estimates while the policy learns; an action takes them 64 and
+#: 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
+NO_BASES = ("mpc", "lq-adaptive")
 INNER = "lq_"  # before settings of the LQ that a guidance law leads
 
 
@@ -50,6 +57,35 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     law: Any = getattr(import_module(home), name)
     guide: Controller = law.from_model(task.ship, autopilot=design("lq", task, inner), task=task.task, **own)
     return guide
+
+
+def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
+    """A classical controller with the settings found for a task of a suite.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`.
+    task : BenchmarkTask
+    suite : str
+        Its name.
+
+    Raises
+    ------
+    InputError
+        If there are no such settings.
+    """
+    found = load_tuned(suite).get(task.name, {})
+    without = {"best": (), "base": NO_BASES}.get(kind)
+    if without is not None:
+        costs = {name: float(one["cost"]) for name, one in found.items() if name not in without}
+        kind = min(costs, key=costs.__getitem__, default=kind)
+    if kind not in found:
+        raise InputError(
+            f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
+            f"{', '.join(found) or 'none'}"
+        )
+    return design(kind, task, found[kind]["settings"])
 
 
 def no_path(kind: str, task: BenchmarkTask) -> InputError:
