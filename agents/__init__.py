@@ -1,4 +1,4 @@
-"""Autopilots for the ships of shipgym: classical designs, their flights, and the command line.
+"""Autopilots for the ships of shipgym: classical designs, learning, the benchmark, and the command line.
 
 Everything is imported when it is first used.
 """
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     from agents.controllers.scheduled_lq import ScheduledLQ
     from agents.policies.policy import LearnedPolicy
     from agents.policies.shield import Shielded, interventions
-    from agents.rollouts.flight import Flights, StepResponses, fly, step_response
+    from agents.rollouts.course_keeping import Episodes, Flights, StepResponses, fly, sail, step_response
+    from agents.rollouts.rollout import Rollout, rollout
 
 _HOME = {
     "AdaptiveLineOfSight": "agents.controllers.los_autopilot",
@@ -41,19 +42,23 @@ _HOME = {
     "BenchmarkResult": "agents.benchmarking.results",
     "Controller": "agents.controllers.controller",
     "FilteredPID": "agents.controllers.filtered_pid",
-    "Flights": "agents.rollouts.flight",
+    "Episodes": "agents.rollouts.course_keeping",
+    "Flights": "agents.rollouts.course_keeping",
     "Policy": "agents.controllers.controller",
+    "Rollout": "agents.rollouts.rollout",
     "ScheduledLQ": "agents.controllers.scheduled_lq",
     "Shielded": "agents.policies.shield",
-    "StepResponses": "agents.rollouts.flight",
+    "StepResponses": "agents.rollouts.course_keeping",
     "benchmark": "agents.benchmarking.run",
     "check_controller": "agents.controllers.checker",
-    "fly": "agents.rollouts.flight",
+    "fly": "agents.rollouts.course_keeping",
     "interventions": "agents.policies.shield",
     "load_agent": "agents.agent_file",
     "load_results": "agents.benchmarking.results",
     "margin_spread": "agents.controllers.robustness",
-    "step_response": "agents.rollouts.flight",
+    "rollout": "agents.rollouts.rollout",
+    "sail": "agents.rollouts.course_keeping",
+    "step_response": "agents.rollouts.course_keeping",
 }
 
 __all__ = [
@@ -65,6 +70,7 @@ __all__ = [
     "AdaptiveLineOfSight",
     "BenchmarkResult",
     "Controller",
+    "Episodes",
     "FilteredPID",
     "Flights",
     "IntegralLineOfSight",
@@ -72,6 +78,7 @@ __all__ = [
     "LineOfSight",
     "MarginSpread",
     "Policy",
+    "Rollout",
     "ScheduledLQ",
     "Shielded",
     "StepResponses",
@@ -82,6 +89,8 @@ __all__ = [
     "load_agent",
     "load_results",
     "margin_spread",
+    "rollout",
+    "sail",
     "step_response",
 ]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from agents import load_agent
 from agents.controllers.designs import design
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
 

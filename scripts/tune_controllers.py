@@ -36,7 +36,7 @@ from agents.benchmarking.direct_search import (
 )
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json

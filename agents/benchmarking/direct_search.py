@@ -20,7 +20,7 @@ from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL, LAWS
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask

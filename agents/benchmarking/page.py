@@ -27,9 +27,11 @@ from agents.benchmarking.page_tables import (
     ranking_table,
     scores_table,
 )
+from agents.benchmarking.replays import EpisodeId as Flight
+from agents.benchmarking.replays import Rerun as Reflown
+from agents.benchmarking.replays import rerun as refly
 from agents.benchmarking.results import EPISODES, RESULTS, BenchmarkResult
 from agents.output import check_page
-from agents.rollouts.refly import Flight, Reflown, refly
 from agents.suites.suite import N_EPISODES, load_suite
 from shipgym.envs.episode import Episode
 from shipgym.envs.path_following_task import PathFollowingTask

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE
 from agents.benchmarking.page_figures import styles
+from agents.benchmarking.replays import SAME_COST, cost_of
+from agents.benchmarking.replays import EpisodeId as Flight
+from agents.benchmarking.replays import Rerun as Reflown
 from agents.benchmarking.results import BenchmarkResult
-from agents.rollouts.refly import SAME_COST, Flight, Reflown, cost_of
 from agents.rollouts.replay_page import player
 from agents.rollouts.replay_series import quantities, run
 

@@ -26,7 +26,7 @@ from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import design
 from agents.engines.jobs import run_jobs
-from agents.rollouts.flying import fly_task
+from agents.rollouts.metrics import evaluate
 from agents.suites.suite import BenchmarkTask, load_suite
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
@@ -226,7 +226,7 @@ def _case(job: Mapping[str, Any]) -> TransferCase:
 def _flown(policies: Sequence[Policy], case: TransferCase) -> dict[str, Floats]:
     """Costs of the scored episodes on every ship, each of shape (n_runs, n_episodes)."""
     return {
-        ship: np.stack([fly_task(policy, case.task, model=model).episodes["cost"] for policy in policies])
+        ship: np.stack([evaluate(policy, case.task, model=model).figures["cost"] for policy in policies])
         for ship, model in case.ships.items()
     }
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
 from agents.controllers.designs import design
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError

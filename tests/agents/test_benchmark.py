@@ -81,22 +81,22 @@ def test_workers_find_the_same_bit_for_bit(folder, tmp_path):
         np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
 
 
-def test_what_was_flown_is_kept_and_not_flown_again(folder, copy, monkeypatch):
+def test_what_was_done_is_kept_and_not_done_again(folder, copy, monkeypatch):
     parts = copy / "parts"
     parts.mkdir()
     for path in (folder / "parts").iterdir():
         (parts / path.name).write_bytes(path.read_bytes())
     with pytest.raises(InputError, match=r"holds results already.*--resume"):
         benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
-    flown = []
+    asked = []
     monkeypatch.setattr(
-        "agents.benchmarking.run.fly_task",
-        lambda policy, *rest: flown.append(policy.name) or original(policy, *rest),
+        "agents.benchmarking.run.evaluate",
+        lambda policy, *rest: asked.append(policy.name) or original(policy, *rest),
     )
-    from agents.rollouts.flying import fly_task as original
+    from agents.rollouts.metrics import evaluate as original
 
     result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
-    assert flown == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
+    assert asked == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
     np.testing.assert_array_equal(result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm"))
     assert load_results(copy).summary["contestants"].keys() == {"pid", "lq", "los"}
 
@@ -226,7 +226,7 @@ def test_wrong_task_and_suite():
         benchmark("pid", suite="shipgym-v2")
 
 
-def test_what_was_flown_is_true(folder):
+def test_what_the_results_say_is_true(folder):
     checks = verify(folder)
     assert [check.exact for check in checks] == [True, True]
     assert {check.episodes for check in checks} == {N}

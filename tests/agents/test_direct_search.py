@@ -21,7 +21,7 @@ from agents.benchmarking.direct_search import (
 )
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.los_autopilot import LAWS
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
 from agents.training.bases import design_base
