@@ -77,7 +77,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         terminated, failed : control lost, the ship ran away or aground; no command.
         duration_s : time sailed.
     """
-    shielded = (run.shielded & run.sailing).astype(np.float64)
+    shielded = run.shielded & run.sailing
     return {
         **costs(run),
         **steering(run),
@@ -86,7 +86,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         "fuel": fuel_per_distance(run),
         "extrapolating": mean(run, run.infos["extrapolating"]),
         "shielded": ratio(total(shielded), run.steps),
-        "interventions": (np.diff(shielded, axis=0, prepend=0.0) > 0.0).sum(axis=0).astype(np.float64),
+        "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
         "terminated": lost(run).astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,
@@ -240,15 +240,16 @@ def path_following(run: Rollout) -> dict[str, Floats]:
         kept = ~(run.terminated | run.failed)
         return {**dict.fromkeys(names, none), "success": kept.astype(np.float64)}
     outside = (run.infos["in_corridor"][1:] == 0.0) & run.sailing
-    ever: dict[str, Floats] = {
-        name: ((run.infos[name][1:] > 0.0) & run.sailing).any(axis=0).astype(np.float64)
-        for name in ("grounded", "success")
-    }
+
+    def ever(name: str) -> Floats:
+        return np.minimum(total((run.infos[name][1:] > 0.0) & run.sailing), 1.0)
+
     return {
         "cross_track_rmse_m": np.sqrt(mean(run, run.infos["cross_track"] ** 2)),
-        "outside_corridor": ratio(total(outside.astype(np.float64)), run.steps),
+        "outside_corridor": ratio(total(outside), run.steps),
         "left_corridor": outside.any(axis=0).astype(np.float64),
-        **ever,
+        "grounded": ever("grounded"),
+        "success": ever("success"),
     }
 
 
@@ -257,9 +258,9 @@ def mean(run: Rollout, values: Floats) -> Floats:
     return ratio(total(np.where(run.sailing, values[1:], 0.0)), run.steps)
 
 
-def total(values: Floats) -> Floats:
+def total(values: Floats | Flags) -> Floats:
     """Sum over the first axis, always in its order: it does not depend on how many episodes there are."""
-    sums: Floats = np.cumsum(values, axis=0)
+    sums: Floats = np.cumsum(values, axis=0, dtype=np.float64)
     return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
 

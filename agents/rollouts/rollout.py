@@ -70,7 +70,8 @@ class Rollout:
     @property
     def steps(self) -> Floats:
         """Intervals of each episode, shape (n,)."""
-        return self.sailing.sum(axis=0, dtype=np.float64)
+        steps: Floats = self.sailing.sum(axis=0, dtype=np.float64)
+        return steps
 
 
 def rollout(
