@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.engines.serialisation import pack, unpack
 from agents.engines.jobs import JobError, WorkerDiedError, run_jobs
 from agents.engines.ray_engine import check_answers
+from agents.engines.serialisation import pack, unpack
 from shipgym.errors import InputError
 
 JOBS = """
@@ -216,7 +216,7 @@ def test_web_server_is_not_taken_for_ray():
 
     with HTTPServer(("127.0.0.1", 0), Page) as server:
         threading.Thread(target=server.handle_request, daemon=True).start()
-        with pytest.raises(InputError, match="no ray cluster answers .* Is it the right port"):
+        with pytest.raises(InputError, match=r"no ray cluster answers .* Is it the right port"):
             check_answers(f"127.0.0.1:{server.server_port}", ray_patience_s=3.0)
 
 
