@@ -23,7 +23,7 @@ from agents.benchmarking.designs import INNER, design, no_path
 from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
-from agents.controllers.los_autopilot import CRITICAL, LAWS
+from agents.controllers.los_autopilot import CRITICAL
 from agents.rollouts.flying import episode_costs
 from shipgym.checks import check_choice, check_table, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask
@@ -41,6 +41,7 @@ CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adap
 NO_BASES = ("mpc", "lq-adaptive")
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
+LAWS = ("los", "ilos", "alos")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
@@ -66,6 +67,13 @@ def died_too_often(text: str, retries: int) -> WorkerDiedError:
         f"job {shortened(text)}: its worker died {retries + 1} times. It was killed, perhaps for want of "
         f"memory (try fewer workers), or the job crashes"
     )
+
+
+def with_modules(function: JobFunction, modules: Sequence[str], job: dict[str, Any]) -> Any:
+    """Do a job after importing modules: in another process nobody else has."""
+    for module in modules:
+        import_module(module)
+    return function(job)
 
 
 @contextmanager

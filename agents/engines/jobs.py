@@ -7,12 +7,23 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from joblib import cpu_count
 
-from agents.engines.job import Job, JobError, JobFunction, Outcome, WorkerDiedError, check_outcome, do_job
+from agents.controllers.registry import registered_modules
+from agents.engines.job import (
+    Job,
+    JobError,
+    JobFunction,
+    Outcome,
+    WorkerDiedError,
+    check_outcome,
+    do_job,
+    with_modules,
+)
 from agents.engines.local import in_processes
 from agents.engines.ray_engine import on_ray
 from agents.engines.serialisation import KeptResults, serialised, shortened, unpack
@@ -111,10 +122,12 @@ def _outcomes(
     """Outcomes of the jobs as they come."""
     if not texts:
         return iter(())
+    if engine == "local" and workers == 1:
+        return (do_job(function, text) for text in texts)
+    if modules := registered_modules():
+        function = partial(with_modules, function, modules)
     if engine == "ray":
         return on_ray(function, texts, workers, address, retries)
-    if workers == 1:
-        return (do_job(function, text) for text in texts)
     return in_processes(function, texts, workers or cpu_count(), retries)
 
 

@@ -13,6 +13,7 @@ from agents.benchmarking import direct_search
 from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
     CLASSICAL,
+    LAWS,
     REFUSED,
     Setting,
     is_sane,
@@ -24,7 +25,6 @@ from agents.benchmarking.direct_search import (
     tuned,
 )
 from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.controllers.los_autopilot import LAWS
 from agents.rollouts.flying import episode_costs
 from agents.training.bases import design_base
 from shipgym.errors import InputError
