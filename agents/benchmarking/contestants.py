@@ -11,6 +11,7 @@ A contestant is named on the command line as
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
     a.json+b.json              training runs, one by one
     my_module:factory          a function of one's own: given a `BenchmarkTask`, it returns a controller
+    my_module:Mine             a class of one's own, a subclass of `agents.Controller`
     name=...                   any of these under a name of one's own
 """
 
@@ -28,9 +29,8 @@ from pathlib import Path
 from typing import Any
 
 from agents.controllers.controller import Controller, Policy
-from agents.controllers.controller_file import controller_content
 from agents.controllers.designs import CLASSICAL, design, tuned
-from agents.controllers.los_autopilot import LAWS
+from agents.controllers.registry import controller_class, controller_kinds, register_controller
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
@@ -183,7 +183,7 @@ def _check_object(source: Any, name: str) -> None:
 
 def _check_text(text: str) -> None:
     """Refuse what is neither a name, nor a file, nor a function."""
-    known = (*CLASSICAL, *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+    known = (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
     if text in known:
         return
     if _is_factory(text):
@@ -225,8 +225,14 @@ def _factory(text: str) -> Any:
         raise InputError(
             f"controllers: '{text}' cannot be imported ({error}); expected module:function"
         ) from None
+    if _is_controller_class(found):
+        return register_controller(found)
     _check_object(found, text)
     return found
+
+
+def _is_controller_class(found: Any) -> bool:
+    return isinstance(found, type) and issubclass(found, Controller)
 
 
 def _matches(pattern: str) -> list[Path]:
@@ -240,7 +246,7 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
     if _is_factory(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
-    if text in CLASSICAL or text == ORACLE or text.startswith(TUNED):
+    if text in controller_kinds() or text == ORACLE or text.startswith(TUNED):
         return []
     return [path for one in text.split("+") for path in _matches(one.replace("{task}", task.name))]
 
@@ -256,13 +262,15 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not isinstance(source, str):
         runs = source if isinstance(source, Sequence) else [source]
         return [run if hasattr(run, "predict") else _from_factory(run, task) for run in runs]
-    if source in CLASSICAL:
-        on_path = isinstance(task.task, PathFollowingTask)
-        return [design("lq" if source in LAWS and not on_path else source, task)]
+    if source in controller_kinds():
+        led = controller_class(source).has_autopilot and not isinstance(task.task, PathFollowingTask)
+        return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)
+        if _is_controller_class(found):
+            return [design(found.kind, task)]
         return [found if hasattr(found, "predict") else _from_factory(found, task)]
     from agents.agent_file import load_agent
 
@@ -302,7 +310,7 @@ def policy_hash(policy: Policy) -> str | None:
     if not isinstance(policy, Controller):
         return None
     try:
-        content = controller_content(policy)
+        content = policy.to_dict()
     except (AttributeError, InputError):  # guidance over a user's own autopilot
         return None
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

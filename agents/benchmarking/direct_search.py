@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
-from agents.controllers.los_autopilot import CRITICAL, LAWS
+from agents.controllers.los_autopilot import CRITICAL
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
@@ -31,6 +31,7 @@ Floats = NDArray[np.float64]
 
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
+LAWS = ("los", "ilos", "alos")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 

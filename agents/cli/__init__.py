@@ -302,7 +302,3 @@ def doctor_command(as_json: Json = False) -> None:
 def main() -> None:
     """Run the command line."""
     app(prog_name="shipgym")
-
-
-if __name__ == "__main__":
-    main()

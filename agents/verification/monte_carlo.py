@@ -155,11 +155,9 @@ def draw_jobs(
     controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
-    from agents.controllers.controller_file import controller_content
-
     common = {
         "model": model_fields(replace(model, covariance=None)),
-        "controllers": [controller_content(controller) for controller in controllers],
+        "controllers": [controller.to_dict() for controller in controllers],
     }
     return [
         {

@@ -11,6 +11,7 @@ import pytest
 from agents import PID
 from agents.benchmarking.direct_search import (
     FIRST_SEED,
+    LAWS,
     REFUSED,
     Setting,
     is_sane,
@@ -20,7 +21,6 @@ from agents.benchmarking.direct_search import (
     tune,
 )
 from agents.controllers.designs import CLASSICAL, design, tuned
-from agents.controllers.los_autopilot import LAWS
 from agents.rollouts.rollout import episode_costs
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
