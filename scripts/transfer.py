@@ -11,11 +11,11 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
+from real_ships.data import Data
+from real_ships.recipe import fitted
 
 from agents.benchmarking.transfer import CASES, N_RUNS, Transfer, save_transfer, transfer, transfer_case
 from agents.cli.terminal import progress_bars
-from identification.real_ships.data import Data
-from identification.real_ships.recipe import fitted
 from shipgym import InputError, ShipModel, load_model
 from shipgym.ships.scaling import scale_model
 

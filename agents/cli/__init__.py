@@ -38,6 +38,7 @@ from agents.cli.command import (
 )
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
+from agents.cli.reproduction import reproduce_command
 from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
 
@@ -78,6 +79,7 @@ app.command("export")(export_command)
 app.command("train")(train_command)
 app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)
+app.command("reproduce")(reproduce_command)
 
 
 @app.command("trials")
@@ -235,47 +237,6 @@ def replay_command(
 
     write_replay(episodes, out)
     console.print(f"written: {out}", soft_wrap=True)
-
-
-@app.command("reproduce")
-@answered
-def reproduce_command(
-    paper: Annotated[
-        str,
-        typer.Argument(
-            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
-        ),
-    ],
-    markdown: Annotated[
-        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
-
-    Exits with 1 if an aim is missed.
-    """
-    from agents.cli.reproduction import missed, page, papers_of, reproduce, terminal_table
-    from agents.cli.terminal import err, print_json
-    from agents.cli.terminal import out as console
-    from shipgym.whole_file import write_text
-
-    names = papers_of(paper)
-    with err.status("starting") as status:
-        results = reproduce(names, tell=status.update)
-    if markdown is not None:
-        write_text(page(results), markdown)
-    if as_json:
-        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
-    else:
-        for name, rows in results.items():
-            console.print(terminal_table(name, rows))
-            console.print()
-        if markdown is not None:
-            console.print(f"written: {markdown}", soft_wrap=True)
-    late = missed(results)
-    if late:
-        fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
 
 
 @app.command("doctor")

@@ -143,7 +143,9 @@ def backward_elimination(
     while len(kept) > 1:
         errors = path[-1].relative_errors
         uncertain = {i for i in kept if errors[labels[i]] > threshold} | _collinear(features, kept)
-        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -errors[labels[i]])):
+        # rounded, so that of two terms that say the same every machine drops the first
+        error = {i: float(f"{errors[labels[i]]:.6g}") for i in uncertain}
+        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -error[i], i)):
             fewer = [i for i in kept if i != term]
             step = _step(features, targets, labels, fewer, labels[term], path[-1].r_squared)
             if step.held_out >= best - tolerance:

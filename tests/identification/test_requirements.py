@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from papers import get_paper, requirements
+from papers.requirements import MEANINGS, REQUIREMENTS, duality_gap
 
-from identification.papers import get_paper, requirements
-from identification.papers.requirements import MEANINGS, REQUIREMENTS, duality_gap
 from shipgym.ships.structures import STRUCTURES
 
 ROOT = Path(__file__).parents[2]

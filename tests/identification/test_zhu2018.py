@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-
-from identification.papers.zhu2018 import (
+from papers.zhu2018 import (
     container_ship,
     recursive_start,
     response_models,
@@ -9,7 +8,8 @@ from identification.papers.zhu2018 import (
     small_vessel,
     steering_forms,
 )
-from identification.papers.zhu2018.fits import SEARCHES
+from papers.zhu2018.fits import SEARCHES
+
 from identification.validation.prediction import predict
 
 

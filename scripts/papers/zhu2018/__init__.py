@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from identification.papers.row import Paper, Row
-from identification.papers.zhu2018 import (
+from papers.row import Paper, Row
+from papers.zhu2018 import (
     container_ship,
     recursive_start,
     response_models,

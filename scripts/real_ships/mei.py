@@ -6,9 +6,10 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from identification.pipeline import identify
-from identification.real_ships.data import Data, MeasuredShip
-from identification.real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
-from identification.real_ships.measures import (
+from identification.validation.prediction import predict, trial_metrics
+from real_ships.data import Data, MeasuredShip
+from real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
+from real_ships.measures import (
     MEASURES,
     Floats,
     error_cells,
@@ -17,8 +18,7 @@ from identification.real_ships.measures import (
     turns,
     zigzag_errors,
 )
-from identification.real_ships.section import Section, number, table
-from identification.validation.prediction import predict, trial_metrics
+from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 
 EVERY = 2  # about 1 Hz, as in the paper

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.papers.row import Row
 from identification.pipeline import identify
 from identification.search import TunedLSSVM
+from papers.row import Row
 from shipgym.kernels import container as own
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from shipgym.ships import load_model

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
-from identification.papers.row import Row
 from identification.pipeline import identify
 from identification.search import TunedLSSVM
+from papers.row import Row
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
 from shipgym.ships.conversions import nomoto1_ship

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import FOLDS, Reduction, backward_elimination
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.real_ships.data import Data
-from identification.real_ships.section import Section, number, table
+from real_ships.data import Data
+from real_ships.section import Section, number, table
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]

@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.recursive import RecursiveLeastSquares
-from identification.papers.row import Row
-from identification.papers.zhu2018.fits import every
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.fits import every
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.particulars import Particulars

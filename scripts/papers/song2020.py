@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from identification.estimators.coefficient_history import follow
 from identification.estimators.recursive import MultiInnovationLeastSquares
-from identification.papers.row import Paper, Row
-from identification.papers.song2020_container import container_rows
 from identification.pipeline import identify
+from papers.row import Paper, Row
+from papers.song2020_container import container_rows
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import Particulars

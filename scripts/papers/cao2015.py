@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
-from identification.papers.row import Paper, Row
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
+from papers.row import Paper, Row
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import ShipModel, load_model
 from shipgym.trials.trial import Trial

@@ -77,7 +77,7 @@ class Paper:
     Attributes
     ----------
     name : str
-        Short name, as `shipgym reproduce` knows it.
+        Short name: the argument of `scripts/reproduce.py`.
     citation : str
         Authors, year, title.
     what : str

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from importlib import import_module
 
-from identification.papers.row import Paper, Requirement, Row
+from papers.row import Paper, Requirement, Row
 from shipgym.checks import check_choice
 
 __all__ = ["CASES", "PAPERS", "Paper", "Requirement", "Row", "get_paper"]
@@ -25,5 +25,5 @@ def get_paper(name: str) -> Paper:
     InputError
         If there is none of that name.
     """
-    paper: Paper = import_module(f"identification.papers.{check_choice(name, CASES, 'paper')}").PAPER
+    paper: Paper = import_module(f"papers.{check_choice(name, CASES, 'paper')}").PAPER
     return paper

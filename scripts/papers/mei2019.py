@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from identification.papers.mei2019_targets import (
+from identification.simulation_error.similarity import correlations, select_reference
+from papers.mei2019_targets import (
     SHOWN,
     TANKER,
     Target,
@@ -25,8 +26,7 @@ from identification.papers.mei2019_targets import (
     usual_way,
     virtual,
 )
-from identification.papers.row import Paper, Row
-from identification.simulation_error.similarity import correlations, select_reference
+from papers.row import Paper, Row
 from shipgym.ships import ShipModel, load_model
 
 Pair = tuple[float | None, float | None]  # their way, at best

@@ -53,7 +53,7 @@ def put(document: str, case: str, section: Section) -> str:
     first, last = marks(case)
     before, rest = document.split(first)
     _, after = rest.split(last)
-    command = f"`python scripts/real_ships.py {case}`"
+    command = f"`python scripts/predict_real_ships.py {case}`"
     body = f"{first}\n## ({case}) {section.title}\n\nCommand: {command}\n\n{section.text.strip()}\n{last}"
     return before + body + after
 

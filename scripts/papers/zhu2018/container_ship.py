@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
-from identification.papers.row import Row
-from identification.papers.zhu2018.fits import (
+from identification.search import TunedLSSVM
+from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.fits import (
     MOST_C,
     PREFIX,
     RAN_AWAY,
@@ -29,8 +31,6 @@ from identification.papers.zhu2018.fits import (
     steering_fit,
     steering_terms,
 )
-from identification.search import TunedLSSVM
-from identification.validation.prediction import predict
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
 from shipgym.ships.container import container

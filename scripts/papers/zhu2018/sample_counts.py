@@ -13,8 +13,10 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.papers.row import Row
-from identification.papers.zhu2018.container_ship import (
+from identification.search import TunedLSSVM
+from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.container_ship import (
     EQUATIONS,
     FAST,
     FOUR_WITH_SPEED,
@@ -27,7 +29,7 @@ from identification.papers.zhu2018.container_ship import (
     surge_fit,
     zigzag_trial,
 )
-from identification.papers.zhu2018.fits import (
+from papers.zhu2018.fits import (
     SEARCHES,
     Difference,
     first_samples,
@@ -39,9 +41,7 @@ from identification.papers.zhu2018.fits import (
     steering_terms,
     term_columns,
 )
-from identification.papers.zhu2018.steering_forms import CHOSEN, MOST_C, structure_of
-from identification.search import TunedLSSVM
-from identification.validation.prediction import predict
+from papers.zhu2018.steering_forms import CHOSEN, MOST_C, structure_of
 
 Floats = NDArray[np.float64]
 

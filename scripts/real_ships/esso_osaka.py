@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from identification.pipeline import identify
-from identification.real_ships.data import Data, MeasuredShip
-from identification.real_ships.measures import Floats
-from identification.real_ships.section import Section, number, table
 from identification.validation.prediction import predict
+from real_ships.data import Data, MeasuredShip
+from real_ships.measures import Floats
+from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 

@@ -13,8 +13,9 @@ from functools import cache
 import numpy as np
 
 from identification.estimators.lssvm import LSSVM
-from identification.papers.row import Row
-from identification.papers.zhu2018.container_ship import (
+from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.container_ship import (
     INTERVAL,
     SURGE_IN_TURNS,
     best_errors,
@@ -22,7 +23,7 @@ from identification.papers.zhu2018.container_ship import (
     ship,
     zigzag_trial,
 )
-from identification.papers.zhu2018.fits import (
+from papers.zhu2018.fits import (
     PREFIX,
     Difference,
     mean_square,
@@ -32,7 +33,6 @@ from identification.papers.zhu2018.fits import (
     steering_fit,
     term_columns,
 )
-from identification.validation.prediction import predict
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from identification.pipeline import identify
-from identification.real_ships.data import Data, MeasuredShip
-from identification.real_ships.hsva import OURS
-from identification.real_ships.hsva import RUNS as HSVA_RUNS
-from identification.real_ships.hsva import SHIP as HSVA
-from identification.real_ships.measures import (
+from identification.validation.prediction import predict
+from real_ships.data import Data, MeasuredShip
+from real_ships.hsva import OURS
+from real_ships.hsva import RUNS as HSVA_RUNS
+from real_ships.hsva import SHIP as HSVA
+from real_ships.measures import (
     MEASURES,
     error_cells,
     mean_errors,
@@ -21,7 +22,7 @@ from identification.real_ships.measures import (
     turns,
     zigzag_errors,
 )
-from identification.real_ships.recipe import (
+from real_ships.recipe import (
     REFERENCE,
     STRENGTHS,
     STRUCTURE,
@@ -30,8 +31,7 @@ from identification.real_ships.recipe import (
     pulled,
     refined,
 )
-from identification.real_ships.section import Section, number, table
-from identification.validation.prediction import predict
+from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 from shipgym.ships.scaling import scale_model
 from shipgym.trials.trial import Trial

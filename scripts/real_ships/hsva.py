@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from identification.pipeline import identify
-from identification.real_ships.data import Data, MeasuredShip
-from identification.real_ships.measures import (
+from identification.validation.guard import reasons_unstable
+from identification.validation.prediction import predict
+from real_ships.data import Data, MeasuredShip
+from real_ships.measures import (
     MEASURES,
     Floats,
     error_cells,
@@ -19,7 +21,7 @@ from identification.real_ships.measures import (
     turns,
     zigzag_errors,
 )
-from identification.real_ships.recipe import (
+from real_ships.recipe import (
     REFERENCE,
     STRUCTURE,
     fitted,
@@ -27,9 +29,7 @@ from identification.real_ships.recipe import (
     known,
     with_fixed_pull,
 )
-from identification.real_ships.section import Section, table
-from identification.validation.guard import reasons_unstable
-from identification.validation.prediction import predict
+from real_ships.section import Section, table
 from shipgym.manoeuvres import TurningIndices
 from shipgym.ships import ShipModel
 

@@ -1,7 +1,7 @@
 """Measured ships: what identification predicts of runs it has not seen, one file a case.
 
-Each case is a function of a `Data` that gives a `Section` of `docs/real_ships.md`; `scripts/real_ships.py`
-runs them. The measurements lie beside the checkout and are no part of the project.
+Each case is a function of a `Data` that gives a `Section` of `docs/real_ships.md`;
+`scripts/predict_real_ships.py` runs them. The measurements lie beside the checkout, not in the project.
 """
 
 from __future__ import annotations
@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
-from identification.real_ships.data import Data
-from identification.real_ships.section import Section
+from real_ships.data import Data
+from real_ships.section import Section
 
 #: Module of each case, in the order of the document.
 CASES = {"a": "hsva", "b": "marin", "c": "mei", "d": "esso_osaka", "e": "captive"}

@@ -14,11 +14,11 @@ from functools import cache
 import numpy as np
 from scipy.ndimage import median_filter
 
-from identification.papers.row import Row
-from identification.papers.zhu2018.fits import Difference, every, mean_square, search, steer, steering_fit
-from identification.papers.zhu2018.steering_forms import MOST_C
 from identification.pipeline import identify
 from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.fits import Difference, every, mean_square, search, steer, steering_fit
+from papers.zhu2018.steering_forms import MOST_C
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import Particulars

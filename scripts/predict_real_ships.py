@@ -1,4 +1,4 @@
-"""Predict measured ships and write `docs/real_ships.md`: `python scripts/real_ships.py [a] [b] [c] [d] [e]`.
+"""Predict measured ships and write `docs/real_ships.md`: `python scripts/predict_real_ships.py [a] ... [e]`.
 
 Takes about ten minutes in all, most of it for case a. The measurements lie beside the checkout.
 """
@@ -8,8 +8,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from identification.real_ships import CASES, Data, get_case
-from identification.real_ships.section import draw, put
+from real_ships import CASES, Data, get_case
+from real_ships.section import draw, put
 
 ROOT = Path(__file__).parents[1]
 

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from identification.design.reduction import Reduction
 from identification.estimators.dense_dual import dense_dual_multipliers
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.papers.row import Paper, Row
-from identification.papers.xu2020_tank import (
+from identification.regression.forces import FORCES, ForceRegression, fit_forces, force_variances
+from papers.row import Paper, Row
+from papers.xu2020_tank import (
     NOISE,
     SEED,
     STEPS,
@@ -30,7 +31,6 @@ from identification.papers.xu2020_tank import (
     noise_sizes,
     step_by_step,
 )
-from identification.regression.forces import FORCES, ForceRegression, fit_forces, force_variances
 from shipgym.ships.pmm import TABLE_11
 
 Floats = NDArray[np.float64]

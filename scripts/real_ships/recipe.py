@@ -14,13 +14,13 @@ import numpy as np
 
 from identification.estimators.methods import FitTask, get_method
 from identification.pipeline import identify
-from identification.real_ships.data import MeasuredShip
-from identification.real_ships.measures import zigzag_errors
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
 from identification.simulation_error.prior import Prior, fit_toward, reference_prior
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import with_coefficients
+from real_ships.data import MeasuredShip
+from real_ships.measures import zigzag_errors
 from shipgym.ships import ShipModel, get_structure, register_structure
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import prime_terms
