@@ -85,8 +85,8 @@ def as_printed(samples: str, excitation: float = 0.0) -> ShipModel:
             series = excitation * np.ptp(trial[q]) * random.standard_normal(len(target))
             state = trial[q][:-1] - trial[q][0]
             features, target = np.column_stack([features, state + series]), state + target + series
-        machine = LSSVM(C=C[q], scale=False).fit(features, target)
-        theta.append(machine.coef_[: len(lengths)] * lengths)
+        estimator = LSSVM(C=C[q], scale=False).fit(features, target)
+        theta.append(estimator.coef_[: len(lengths)] * lengths)
     values = np.linalg.solve(table.acceleration_matrix(ship.particulars), np.concatenate(theta))
     return replace(ship, coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True)))
 

@@ -193,7 +193,7 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
     samples = structure_samples(
         [*target.trials, *turns], blank.table, ship, gear=gear, shaft_speed=blank.service_shaft_speed
     )
-    return with_coefficients(blank, fit_all(get_method("ls").machine, samples))
+    return with_coefficients(blank, fit_all(get_method("ls").estimator, samples))
 
 
 def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, float]:

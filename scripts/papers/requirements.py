@@ -271,8 +271,8 @@ def robustness_rows() -> Iterator[Row]:
     struck = y.copy()
     signs = np.random.default_rng(SEED).choice([-1.0, 1.0], len(y[::OUTLIERS]))
     struck[::OUTLIERS] += SIZE * np.std(y) * signs
-    machines = (LSSVM(C=C, fit_intercept=False, robust=robust).fit(X, struck) for robust in (False, True))
-    plain, robust = (100.0 * float(np.max(np.abs(machine.coef_ / clean - 1.0))) for machine in machines)
+    estimators = (LSSVM(C=C, fit_intercept=False, robust=robust).fit(X, struck) for robust in (False, True))
+    plain, robust = (100.0 * float(np.max(np.abs(estimator.coef_ / clean - 1.0))) for estimator in estimators)
     yield Row(
         "R5", f"largest change of a coefficient by {100 / OUTLIERS:g} % outliers of {SIZE:g} deviations, %",
         None, plain, robust, "below 1", robust < 1.0, "as the paper: LS-SVR; at best: weighted LS-SVM",
@@ -295,9 +295,9 @@ def start_rows() -> Iterator[Row]:
 
 def duality_gap(X: Floats, y: Floats, weight: float) -> float:
     """Primal less dual value at the solution, by the primal one: 0 only at the global minimum."""
-    machine = LSSVM(C=weight, scale=False).fit(X, y)
-    error = y - machine.predict(X)
-    primal = 0.5 * float(machine.coef_ @ machine.coef_) + 0.5 * weight * float(error @ error)
+    estimator = LSSVM(C=weight, scale=False).fit(X, y)
+    error = y - estimator.predict(X)
+    primal = 0.5 * float(estimator.coef_ @ estimator.coef_) + 0.5 * weight * float(error @ error)
     alpha = weight * error
     dual = float(alpha @ y) - 0.5 * float(np.sum((X.T @ alpha) ** 2) + alpha @ alpha / weight)
     return (primal - dual) / primal
@@ -313,8 +313,8 @@ def optimum_rows() -> Iterator[Row]:
     error = held_out_error(X, y, True, False, time_blocks(len(y)))
     grid = np.linspace(-2.0, 10.0, 12001)
     least = float(np.min(error(grid[:, None])))
-    machine = TunedLSSVM("abc", fit_intercept=False, bounds=(1e-2, 1e10)).fit(X, y)
-    excess = float(error(np.log10([[machine.C_]]))[0]) / least - 1.0
+    estimator = TunedLSSVM("abc", fit_intercept=False, bounds=(1e-2, 1e10)).fit(X, y)
+    excess = float(error(np.log10([[estimator.C_]]))[0]) / least - 1.0
     yield Row(
         "R7", "held-out error of the colony's C above the least of 12,001 on a grid, relative", None, None,
         excess, "below 1e-6", excess < 1e-6,

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.coefficient_history import follow
+from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.pipeline import identify
 from papers.row import Paper, Row
@@ -134,7 +134,7 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
     run = trial(structure, noisy)
     if noisy:
         return dict(identify([run], structure, "output-error", particulars=PARTICULARS).coefficients)
-    return follow(run, structure, PARTICULARS, MultiInnovationLeastSquares(omega=OMEGA)).last
+    return coefficient_history(run, structure, PARTICULARS, MultiInnovationLeastSquares(omega=OMEGA)).last
 
 
 def indices(coefficients: Mapping[str, float]) -> dict[str, float]:

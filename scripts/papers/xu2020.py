@@ -95,8 +95,8 @@ def fit(sizes: Floats, seed: int = SEED) -> Fit:
     for step, reduction, known in step_by_step(forces):  # noqa: B007
         reductions[step.table] = reduction
     stepwise = {name: known[name] for name in final_terms(reductions)}
-    machine = TruncatedLSSVM(selection="full", fit_intercept=False)
-    coefficients, covariance = fit_forces(reduced_regression(forces), machine)
+    estimator = TruncatedLSSVM(selection="full", fit_intercept=False)
+    coefficients, covariance = fit_forces(reduced_regression(forces), estimator)
     joint = dict(zip(TABLE_11, coefficients.tolist(), strict=True))
     errors = dict(zip(TABLE_11, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     return Fit(forces, reductions, stepwise, joint, errors)
@@ -120,7 +120,7 @@ class Moments:
     classical, truncated : dict of str to float
         Coefficients.
     training, validation : dict of str to float
-        R^2: `classical`, `truncated`, and `primal` for the classical machine solved in primal form. In
+        R^2: `classical`, `truncated`, and `primal` for the classical estimator solved in primal form. In
         training the classical one's by its own multipliers (errors alpha / C).
     """
 
@@ -145,16 +145,18 @@ def yaw_moments(n_samples: int = N_SAMPLES) -> Moments:
     X, y = features[picked], moment[picked]
     multipliers, intercept = dense_dual_multipliers(X, y, HUGE)
     classical = X.T @ multipliers
-    machines: dict[str, LSSVM | TruncatedLSSVM]
-    machines = {"truncated": TruncatedLSSVM().fit(X, y), "primal": LSSVM(C=HUGE, scale=False).fit(X, y)}
+    estimators: dict[str, LSSVM | TruncatedLSSVM]
+    estimators = {"truncated": TruncatedLSSVM().fit(X, y), "primal": LSSVM(C=HUGE, scale=False).fit(X, y)}
     others, targets = features[~seen], moment[~seen]
-    training = {name: _r_squared(y, machine.predict(X)) for name, machine in machines.items()}
-    validation = {name: _r_squared(targets, machine.predict(others)) for name, machine in machines.items()}
+    training = {name: _r_squared(y, estimator.predict(X)) for name, estimator in estimators.items()}
+    validation = {
+        name: _r_squared(targets, estimator.predict(others)) for name, estimator in estimators.items()
+    }
     training["classical"] = _r_squared(y, y - multipliers / HUGE)
     validation["classical"] = _r_squared(targets, others @ classical + intercept)
     return Moments(
         dict(zip(LSSVM_TABLE_2, classical.tolist(), strict=True)),
-        dict(zip(LSSVM_TABLE_2, machines["truncated"].coef_.tolist(), strict=True)),
+        dict(zip(LSSVM_TABLE_2, estimators["truncated"].coef_.tolist(), strict=True)),
         training,
         validation,
     )
@@ -166,7 +168,7 @@ def _r_squared(targets: Floats, predicted: Floats) -> float:
 
 
 def table_2_rows() -> Iterator[Row]:
-    """The classical machine fits and fails, the truncated one does neither."""
+    """The classical estimator fits and fails, the truncated one does neither."""
     found = yaw_moments()
     for name, printed in LSSVM_TABLE_2.items():
         off = 100.0 * abs(found.truncated[name] / TABLE_11[name] - 1.0)
@@ -178,7 +180,7 @@ def table_2_rows() -> Iterator[Row]:
     yield Row(
         "Table 2", "R2 in training", 0.9938, found.training["classical"], found.training["truncated"],
         "above 0.99", min(found.training["classical"], found.training["truncated"]) > 0.99,
-        "the classical machine's errors are its multipliers by C",
+        "the classical estimator's errors are its multipliers by C",
     )  # fmt: skip
     yield Row(
         "Table 2", "R2 in validation", -9.24e19, found.validation["classical"], found.validation["truncated"],
@@ -299,8 +301,8 @@ def coverage(draws: int = DRAWS) -> float:
     reduced = reduced_regression(regression.targets)
     scales = reduced.scales()
     features = reduced.features / scales[:, None]
-    machine = TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, reduced.targets / scales)
-    half = features @ machine.inverse_moment_
+    estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, reduced.targets / scales)
+    half = features @ estimator.inverse_moment_
     leverages = np.sum(half * features, axis=1)
     parts = np.array([np.sum(half[reduced.equation == i] ** 2, axis=0) for i in range(len(FORCES))])
     size = (NOISE * noise_sizes())[reduced.equation] / scales
@@ -338,8 +340,8 @@ def _noisy_errors() -> tuple[Floats, Floats]:
         np.sqrt(1.0 - printed) * regression.targets[regression.equation == i].std()
         for i, printed in enumerate(TABLE_12.values())
     ])  # fmt: skip
-    machine = TruncatedLSSVM(selection="full", fit_intercept=False)
-    covariance = fit_forces(reduced_regression(measured(sizes)), machine)[1]
+    estimator = TruncatedLSSVM(selection="full", fit_intercept=False)
+    covariance = fit_forces(reduced_regression(measured(sizes)), estimator)[1]
     return np.sqrt(np.diag(covariance)), np.array(list(TABLE_11.values()))
 
 

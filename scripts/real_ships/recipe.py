@@ -83,8 +83,8 @@ def pulled(
     runs = [ship.runs[name] for name in names]
     samples = build_samples(runs, blank.table, blank.particulars, gear=blank.steering)
     method = get_method("ls")
-    machines = fit_toward(method.machine, method, prior, strength, FitTask(samples, blank, runs))
-    return with_coefficients(blank, machines)
+    estimators = fit_toward(method.estimator, method, prior, strength, FitTask(samples, blank, runs))
+    return with_coefficients(blank, estimators)
 
 
 def held_out_error(

@@ -16,9 +16,9 @@ from identification.validation.prediction import predict
 def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():
     for method in ("PSO", "ABC"):
         for q, printed in container_ship.PRINTED_C[method].items():
-            machine = container_ship.as_printed(method)[q].machine
-            bound = machine.bounds[1]
-            assert pytest.approx(bound, rel=1e-3) == machine.C_
+            estimator = container_ship.as_printed(method)[q].estimator
+            bound = estimator.bounds[1]
+            assert pytest.approx(bound, rel=1e-3) == estimator.C_
             assert 0.3 < printed / bound < 1.0
 
 

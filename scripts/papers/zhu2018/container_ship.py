@@ -127,9 +127,9 @@ def surge_terms(trial: Trial) -> Floats:
     return np.column_stack([faster, faster**3, trial["n_command"] / RPM - SHAFT_RPM])
 
 
-def surge_fit(trial: Trial, machine: LSSVM | TunedLSSVM) -> Difference:
+def surge_fit(trial: Trial, estimator: LSSVM | TunedLSSVM) -> Difference:
     """Fit the difference equation of surge."""
-    fitted = machine.fit(surge_terms(trial)[:-1], trial["u"][1:] - SPEED)
+    fitted = estimator.fit(surge_terms(trial)[:-1], trial["u"][1:] - SPEED)
     return Difference(fitted.coef_.tolist(), fitted.intercept_, 0.0, fitted)
 
 
@@ -145,11 +145,11 @@ def surge(fit: Difference, trial: Trial) -> dict[str, Floats]:
     return {"u": SPEED + faster}
 
 
-def fit_equation(equation: str, machine: LSSVM | TunedLSSVM) -> Difference:
+def fit_equation(equation: str, estimator: LSSVM | TunedLSSVM) -> Difference:
     """One equation as the thesis identifies it."""
     if equation == "u":
-        return surge_fit(straight_line("learned"), machine)
-    return steering_fit(zigzag_trial(10), equation, machine)
+        return surge_fit(straight_line("learned"), estimator)
+    return steering_fit(zigzag_trial(10), equation, estimator)
 
 
 @cache
@@ -192,7 +192,7 @@ def best_errors() -> dict[str, float]:
 def seconds() -> dict[tuple[str, str], float]:
     """Processor time of each search with its fit by method and equation, s.
 
-    The least of several, taken in turns, so that other work on the machine does not count.
+    The least of several, taken in turns, so that other work on the estimator does not count.
     """
     searches = [(method, q) for method in PRINTED_TIME for q in EQUATIONS]
     least = dict.fromkeys(searches, np.inf)
@@ -225,14 +225,14 @@ def weight_rows() -> Iterator[Row]:
     """Table 7.4.4: C."""
     for method, by_equation in PRINTED_C.items():
         for q, printed in by_equation.items():
-            machine = as_printed(method)[q].machine
-            assert isinstance(machine, TunedLSSVM)
+            estimator = as_printed(method)[q].estimator
+            assert isinstance(estimator, TunedLSSVM)
             note = f"{BOUND}{MOST_C[q]:g}"
             if method == "ABC":
                 note += "; Table 7.4.4 has this row shifted, the value is that of Table 7.4.2"
             if method == "CV":
                 note = "folds are not printed: 5 blocks of time here"
-            yield Row("Table 7.4.4", f"{method}, {EQUATIONS[q]}: C", printed, machine.C_, None, note=note)
+            yield Row("Table 7.4.4", f"{method}, {EQUATIONS[q]}: C", printed, estimator.C_, None, note=note)
 
 
 def condition() -> float:
@@ -299,7 +299,7 @@ def time_rows() -> Iterator[Row]:
                 best,
                 f"below {FAST:g}",
                 best < FAST,
-                f"the same search, by one decomposition; least of {REPEATS} on this machine",
+                f"the same search, by one decomposition; least of {REPEATS} on this estimator",
             )
 
 

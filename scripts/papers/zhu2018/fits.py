@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.regression.coefficients import with_accelerations
 from identification.regression.samples import Samples, build_samples
@@ -89,14 +89,14 @@ class Difference:
         The intercept b of LS-SVR.
     kept : float
         0 where x(k) is among the terms, as printed; 1 where the change of x was regressed.
-    machine : LSSVM or TunedLSSVM
+    estimator : LSSVM or TunedLSSVM
         What was fitted.
     """
 
     gains: list[float]
     constant: float
     kept: float
-    machine: Machine
+    estimator: Estimator
 
     def step(self, x: float, terms: Sequence[float]) -> float:
         """The next value."""
@@ -105,7 +105,11 @@ class Difference:
 
 
 def steering_fit(
-    trial: Trial, equation: str, machine: LSSVM | TunedLSSVM, structure: str = STEERING, change: bool = False
+    trial: Trial,
+    equation: str,
+    estimator: LSSVM | TunedLSSVM,
+    structure: str = STEERING,
+    change: bool = False,
 ) -> Difference:
     """Fit the difference equation of sway or yaw.
 
@@ -114,7 +118,7 @@ def steering_fit(
     trial : Trial
         Evenly sampled.
     equation : {"v", "r"}
-    machine : LSSVM or TunedLSSVM
+    estimator : LSSVM or TunedLSSVM
         Not fitted.
     structure : str
         `steering7`, or one with some of its terms.
@@ -128,7 +132,7 @@ def steering_fit(
     columns = term_columns(structure, equation)
     terms = steering_terms(trial)[:-1, columns]
     x = trial[equation]
-    fitted = machine.fit(terms, np.diff(x) if change else x[1:])
+    fitted = estimator.fit(terms, np.diff(x) if change else x[1:])
     gains = np.zeros(len(get_structure(STEERING).names(equation)))
     gains[columns] = fitted.coef_
     return Difference(gains.tolist(), fitted.intercept_, float(change), fitted)
@@ -190,8 +194,8 @@ def spline_fit(trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int
     samples = spline_samples(trial, ship)
     accelerations = {q: np.zeros(len(WITH_SPEED.terms(q))) for q in WITH_SPEED.regressed}
     for q, chosen in columns.items():
-        machine = LSSVM(C=np.inf, fit_intercept=False)
-        accelerations[q][list(chosen)] = machine.fit(
+        estimator = LSSVM(C=np.inf, fit_intercept=False)
+        accelerations[q][list(chosen)] = estimator.fit(
             samples.features[q][:, list(chosen)], samples.targets[q]
         ).coef_
     return with_accelerations(blank, accelerations)

@@ -107,10 +107,10 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
     """
     r, step = trial["r"], float(trial.t[1] - trial.t[0])
     terms = [r, trial["delta"]] if form == "linear" else [r, trial["delta"], r**3]
-    machine = LSSVM(C=np.inf, fit_intercept=False) if method == "LS" else TunedLSSVM()
-    machine.fit(np.column_stack(terms)[:-1], np.diff(r) / step)
-    damping, gain, *bend = machine.coef_.tolist()
-    return Form(-gain / damping, -1.0 / damping, bend[0] / damping if bend else 0.0, machine.intercept_)
+    estimator = LSSVM(C=np.inf, fit_intercept=False) if method == "LS" else TunedLSSVM()
+    estimator.fit(np.column_stack(terms)[:-1], np.diff(r) / step)
+    damping, gain, *bend = estimator.coef_.tolist()
+    return Form(-gain / damping, -1.0 / damping, bend[0] / damping if bend else 0.0, estimator.intercept_)
 
 
 def at_best(trial: Trial, form: str) -> Form:

@@ -122,10 +122,10 @@ def seconds(count: int, method: str, objective: str | None = None, repeats: int 
     y = np.diff(trial["r"])[rows]
     times = []
     for _ in range(repeats):
-        machine: TunedLSSVM = search(method, "r", MOST_C["r"])
-        machine.set_params(objective=objective or machine.objective)
+        estimator: TunedLSSVM = search(method, "r", MOST_C["r"])
+        estimator.set_params(objective=objective or estimator.objective)
         start = process_time()
-        machine.fit(X, y)
+        estimator.fit(X, y)
         times.append(process_time() - start)
     return min(times)
 
@@ -142,7 +142,7 @@ def time_rows() -> Iterator[Row]:
             found,
             f"below {FAST:g}",
             found < FAST,
-            f"the thesis shows a picture; least of {FINE_REPEATS} on this machine",
+            f"the thesis shows a picture; least of {FINE_REPEATS} on this estimator",
         )
     for method in SEARCHES:
         few, many = (seconds(count, method) for count in TIMED)

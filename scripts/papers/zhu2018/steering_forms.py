@@ -132,19 +132,19 @@ def sailed_errors(model: ShipModel, trial: Trial) -> dict[str, float]:
 
 
 @cache
-def nomoto(cubic: bool, machine: str) -> NomotoFit:
+def nomoto(cubic: bool, estimator: str) -> NomotoFit:
     """Nomoto's first-order form from the changes of the yaw rate.
 
     Parameters
     ----------
     cubic : bool
         Whether it has n3.
-    machine : {"ABC", "least squares"}
+    estimator : {"ABC", "least squares"}
     """
     trial, turns = zigzag_trial(10), zigzag_trial(20)
     r = trial["r"]
     terms = np.column_stack([r, r**3, trial["delta"]] if cubic else [r, trial["delta"]])[:-1]
-    fit = search("ABC", "r", MOST_C["r"]) if machine == "ABC" else LSSVM(C=np.inf)
+    fit = search("ABC", "r", MOST_C["r"]) if estimator == "ABC" else LSSVM(C=np.inf)
     fit.fit(terms, np.diff(r))
     damping, *bend, gain = fit.coef_.tolist()
     cube = bend[0] if cubic else 0.0
@@ -163,7 +163,7 @@ def nomoto_rows() -> Iterator[Row]:
     least = best_errors()["r"]
     printed = {"linear": (0.031, 30.2487, 0.0548), "nonlinear": (0.031, 30.2487, 0.0548)}
     for name, (gain, lag, error) in printed.items():
-        ours, best = (nomoto(name == "nonlinear", machine) for machine in ("ABC", "least squares"))
+        ours, best = (nomoto(name == "nonlinear", estimator) for estimator in ("ABC", "least squares"))
         yield Row("Table 7.4.8", f"{name} Nomoto: K, 1/s", gain, ours.K, best.K)
         yield Row("Table 7.4.8", f"{name} Nomoto: T, s", lag, ours.T, best.T)
         if name == "nonlinear":
