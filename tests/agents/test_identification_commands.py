@@ -7,7 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.identifying import identification_settings, identify_ship, parsed_options
+from agents.cli.identify_options import parsed_options
+from agents.identifying import identification_settings, identify_ship
 from identification.estimators.methods import METHODS
 from shipgym import InputError, ShipFile, load_model
 from shipgym.trials.identify_table import OPTIONS
@@ -84,7 +85,15 @@ def test_options_of_identify_come_from_the_ship_file(ship, demo):
 def test_the_options_tested_and_the_rest_are_all_there_are():
     known = {line.split(" = ")[0] for lines in (GENERAL, *SETTINGS.values()) for line in lines}
     of_grey_box = {"reference_model", "regression", "free_constant", "constant"}
-    of_refinement = {"segment_lengths", "staggered", "segment_start", "pull", "rudder_offsets"}
+    of_refinement = {
+        "segment_lengths",
+        "staggered",
+        "segment_start",
+        "pull",
+        "rudder_offsets",
+        "anchor",
+        "anchor_weight",
+    }
     extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method"}
     assert known | of_grey_box | of_refinement | extra == OPTIONS.keys()
 
