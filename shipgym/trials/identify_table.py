@@ -172,7 +172,7 @@ class Options:
     )
     innovations: int | None = _recursive(WHOLE, "samples that a multi-innovation step uses", at_least=1)
     omega: float | None = _recursive(
-        NUMBER, "of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear", at_least=0.0
+        NUMBER, "slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear", at_least=0.0
     )
     inverse_free: bool | None = _recursive(FLAG, "whether multi-innovation steps avoid a matrix inverse")
     start_samples: int | None = _recursive(

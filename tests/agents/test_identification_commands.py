@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import document_options
 import pytest
 from typer.testing import CliRunner
 
@@ -252,6 +253,11 @@ def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
     assert len(load_model(tmp_path / "out" / "model.json").coefficients) == told["terms"]["reduced"]
     assert (tmp_path / "out" / "report.html").exists()
     assert shipgym("reduce", path, "--out", tmp_path / "x", "--direction", "sideways").exit_code == 2
+
+
+def test_the_tables_of_options_are_those_of_the_dataclass():
+    page = document_options.PAGE.read_text(encoding="utf-8")
+    assert document_options.page(page) == page, "run python scripts/document_options.py"
 
 
 def test_every_option_and_method_is_documented():
