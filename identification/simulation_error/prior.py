@@ -333,26 +333,15 @@ def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:
     samples = task.samples
     if folds == LARGEST_RUDDER:
         largest = of_largest_rudder(task.trials, "prior_folds")
-        fit = _rows(samples, ~largest[samples.trial])
-        yield from ((fit, _rows(samples, samples.trial == held)) for held in np.flatnonzero(largest))
+        fit = samples.select(~largest[samples.trial])
+        yield from ((fit, samples.select(samples.trial == held)) for held in np.flatnonzero(largest))
         return
     if samples.trial.max() > samples.trial.min():
         groups = samples.trial
     else:
         groups = np.minimum(np.arange(len(samples)) * BLOCKS // len(samples), BLOCKS - 1)
     for group in np.unique(groups):
-        yield _rows(samples, groups != group), _rows(samples, groups == group)
-
-
-def _rows(samples: Samples, rows: NDArray[np.bool_]) -> Samples:
-    return replace(
-        samples,
-        features={q: X[rows] for q, X in samples.features.items()},
-        targets={q: y[rows] for q, y in samples.targets.items()},
-        start=samples.start[rows],
-        duration=samples.duration[rows],
-        trial=samples.trial[rows],
-    )
+        yield samples.select(groups != group), samples.select(groups == group)
 
 
 def _error(estimators: Mapping[str, Estimator], held: Samples) -> float:
