@@ -25,6 +25,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from real_ships.data import Data
+from real_ships.recipe import fitted
 
 from agents.agent_file import load_agent
 from agents.benchmarking.direct_search import tune
@@ -38,8 +40,6 @@ from agents.suites.suite import BenchmarkTask, load_suite
 from agents.training.plan import Plan
 from agents.training.settings import load_settings
 from agents.training.training import train
-from identification.real_ships.data import Data
-from identification.real_ships.recipe import fitted
 from shipgym import InputError, ShipModel, load_model
 from shipgym.checks import check_whole
 from shipgym.json_file import write_json
