@@ -111,106 +111,25 @@ def rollout(
     InputError
         If the policy gives no finite command for each ship, unless `tolerant`.
     """
-    log, n = _Log(engine, record), engine.num_envs
-    sailing, terminated, truncated, failed = (np.full(n, begun) for begun in (True, False, False, False))
-    seen, memory, starts = engine.reset(seeds), None, sailing
-    costs, spent, asked, failure = np.zeros(n), 0.0, 0, ""
+    log = _Log(engine, record, tolerant)
+    seen, memory, starts = engine.reset(seeds), None, log.sailing
     log.look()
-    while sailing.any():
-        shown, error = seen if show is None else show(seen), ""
-        began = time.process_time()
-        try:
-            actions, memory = policy.predict(shown, memory, starts, True)
-        except Exception as raised:  # whatever a user's policy raises is its own failure
-            if not tolerant:
-                raise
-            actions, error = None, f"{type(raised).__name__}: {raised} (at step {len(log.sailing)})"
-        spent, asked = spent + time.process_time() - began, asked + int(sailing.sum())
-        command, bad, why = commands(actions, engine, sailing, len(log.sailing))
-        if bad.any():
-            if not tolerant:
-                raise InputError(f"{type(policy).__name__}.predict: {why}")
-            failure, failed, sailing = failure or error or why, failed | bad, sailing & ~bad
-            if not sailing.any():
-                break
-        seen, rewards, lost, over = engine.step(command)
-        costs -= np.where(sailing, rewards, 0.0)
-        log.note(sailing, command, rewards, memory)
-        terminated, truncated = terminated | sailing & lost, truncated | sailing & over
-        sailing, starts = sailing & ~(lost | over), np.zeros(n, dtype=np.bool_)
-    return Rollout(
-        task=engine.task,
-        model=engine.model,
-        dt=engine.dt,
-        seeds=np.asarray(seeds),
-        costs=costs,
-        sailing=np.array(log.sailing, dtype=np.bool_).reshape(-1, n),
-        terminated=terminated,
-        truncated=truncated,
-        failed=failed,
-        failure=failure,
-        seconds_per_action=spent / max(asked, 1),
-        **log.arrays(),
-    )
+    while True:
+        actions, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
+        command = log.checked(actions, type(policy).__name__)
+        if not log.sailing.any():
+            break
+        seen, rewards, terminated, truncated = engine.step(command)
+        log.note(command, rewards, memory, terminated, truncated)
+        if not log.sailing.any():
+            break
+        starts = np.zeros(engine.num_envs, dtype=np.bool_)
+    return log.rollout(np.asarray(seeds))
 
 
 def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
-    """Cost of each episode: minus the sum of its rewards (see `rollout`).
-
-    Returns
-    -------
-    array of shape (n,)
-
-    Raises
-    ------
-    InputError
-        If the policy answers with something that is not a finite command for each ship.
-    """
+    """Cost of each episode, minus the sum of its rewards, shape (n,); see `rollout`."""
     return rollout(policy, engine, seeds).costs
-
-
-def commands(
-    actions: Any, engine: Engine, sailing: Flags, step: int
-) -> tuple[NDArray[np.float32], Flags, str]:
-    """What is commanded, of which of the ships that sail it is no command, and why.
-
-    Parameters
-    ----------
-    actions
-        What the policy handed back.
-    engine : Engine
-        Tells the shape that is expected.
-    sailing : bool array of shape (n,)
-        Ships whose episode is not over; the command of the others is 0.
-    step : int
-        For the message.
-    """
-    expected = (engine.num_envs, len(engine.command))
-    nothing = np.zeros(expected, dtype=np.float32)
-    try:
-        with np.errstate(over="ignore"):
-            found = np.array(actions, dtype=np.float32)
-    except (TypeError, ValueError):
-        said = f"actions of type {type(actions).__name__} found at step {step}, expected numbers"
-        return nothing, sailing.copy(), said
-    if found.shape != expected:
-        said = (
-            f"actions of shape {found.shape} found at step {step}, expected {expected} "
-            f"for observations of shape {engine.observations.shape}"
-        )
-        return nothing, sailing.copy(), said
-    bad = sailing & ~np.isfinite(found).all(axis=1)
-    said = ""
-    if bad.any():
-        first = int(np.flatnonzero(bad)[0])
-        number = found[first][~np.isfinite(found[first])][0]
-        said = (
-            f"action {number} found at step {step} for ship {first}: no finite number for {int(bad.sum())} "
-            f"of {int(sailing.sum())} ships, expected numbers in [-1, 1], the command over its limit; look "
-            f"for a division by zero in the controller"
-        )
-    found[bad | ~sailing] = 0.0
-    return found, bad, said
 
 
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
@@ -237,12 +156,16 @@ def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
 
 
 class _Log:
-    """Gathers what is recorded of an engine's ships."""
+    """What has become of the episodes so far."""
 
-    def __init__(self, engine: Engine, record: bool | Collection[str]) -> None:
-        self.engine, self.record = engine, record
+    def __init__(self, engine: Engine, record: bool | Collection[str], tolerant: bool) -> None:
+        self.engine, self.record, self.tolerant = engine, record, tolerant
         self.names = [name for name in engine.task.info_names if self._keeps(name)]
-        self.sailing: list[Flags] = []
+        self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
+        self.terminated = self.truncated = self.failed = ~self.sailing
+        self.costs = np.zeros(engine.num_envs)
+        self.failure, self.error, self.seconds, self.asked = "", "", 0.0, 0
+        self.sailed: list[Flags] = []
         self.actions: list[NDArray[np.float32]] = []
         self.rewards: list[Floats] = []
         self.shielded: list[Flags] = []
@@ -253,31 +176,97 @@ class _Log:
         return self.record if isinstance(self.record, bool) else name in self.record
 
     def look(self) -> None:
-        """Note where the ships are."""
+        """Record where the ships are."""
         if self.record:
             state = self.engine.physical_state()
             self.states.append({name: values for name, values in state.items() if self._keeps(name)})
             self.infos.append([self.engine.info(name).copy() for name in self.names])
 
-    def note(self, sailing: Flags, action: NDArray[np.float32], rewards: Floats, memory: Any) -> None:
-        """Note what came of an interval."""
-        self.sailing.append(sailing)
-        if self.record:
-            steers = (
-                interventions(memory).steering if isinstance(memory, ShieldState) else np.zeros_like(sailing)
-            )
-            self.actions.append(action)
-            self.rewards.append(rewards)
-            self.shielded.append(steers)
-        self.look()
+    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[Any, Any]:
+        """A policy's answer; what goes wrong is its own failure."""
+        began = time.process_time()
+        self.error = ""
+        try:
+            actions, memory = policy.predict(shown, memory, starts, True)
+        except Exception as error:  # whatever a user's policy raises
+            if not self.tolerant:
+                raise
+            actions, self.error = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
+        self.seconds += time.process_time() - began
+        self.asked += int(self.sailing.sum())
+        return actions, memory
 
-    def arrays(self) -> dict[str, Any]:
-        """All that was gathered, by the names of `Rollout`."""
-        n, states = self.engine.num_envs, self.states
-        return {
-            "actions": np.array(self.actions, dtype=np.float32).reshape(-1, n, len(self.engine.command)),
-            "rewards": np.array(self.rewards).reshape(-1, n),
-            "shielded": np.array(self.shielded, dtype=np.bool_).reshape(-1, n),
-            "states": {name: np.array([one[name] for one in states]) for name in (states or [{}])[0]},
-            "infos": {name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
-        }
+    def checked(self, actions: Any, who: str) -> NDArray[np.float32]:
+        """The commands, 0 for ships that do not sail any more; episodes without a command have failed."""
+        command, bad, why = self._commands(actions)
+        if bad.any():
+            if not self.tolerant:
+                raise InputError(f"{who}.predict: {why}")
+            self.failure = self.failure or self.error or why
+            self.failed, self.sailing = self.failed | bad, self.sailing & ~bad
+        command[~self.sailing] = 0.0
+        return command
+
+    def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
+        """Commands, of which ships that sail there is none, and why."""
+        expected, at = (self.engine.num_envs, len(self.engine.command)), f"found at step {len(self.sailed)}"
+        nothing = np.zeros(expected, dtype=np.float32)
+        try:
+            with np.errstate(over="ignore"):
+                found = np.array(actions, dtype=np.float32)
+        except (TypeError, ValueError):
+            return nothing, self.sailing, f"actions of type {type(actions).__name__} {at}, expected numbers"
+        if found.shape != expected:
+            seen = self.engine.observations.shape
+            said = (
+                f"actions of shape {found.shape} {at}, expected {expected} for observations of shape {seen}"
+            )
+            return nothing, self.sailing, said
+        wrong = self.sailing[:, None] & ~np.isfinite(found)
+        bad: Flags = np.any(wrong, axis=1)
+        if not bad.any():
+            return found, bad, ""
+        said = (
+            f"action {found[wrong][0]} {at} for ship {np.argmax(bad)}: no finite number for {bad.sum()} of "
+            f"{self.sailing.sum()} ships, expected numbers in [-1, 1], the command over its limit; look for "
+            f"a division by zero in the controller"
+        )
+        return found, bad, said
+
+    def note(
+        self, command: NDArray[np.float32], rewards: Floats, memory: Any, terminated: Flags, truncated: Flags
+    ) -> None:
+        """Note what came of an interval."""
+        self.sailed.append(self.sailing)
+        self.costs -= np.where(self.sailing, rewards, 0.0)
+        self.terminated = self.terminated | self.sailing & terminated
+        self.truncated = self.truncated | self.sailing & truncated
+        if self.record:
+            shield = isinstance(memory, ShieldState)
+            self.actions.append(command)
+            self.rewards.append(rewards)
+            self.shielded.append(interventions(memory).steering if shield else np.zeros_like(terminated))
+        self.look()
+        self.sailing = self.sailing & ~(terminated | truncated)
+
+    def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
+        """All that was noted."""
+        engine, n = self.engine, self.engine.num_envs
+        return Rollout(
+            task=engine.task,
+            model=engine.model,
+            dt=engine.dt,
+            seeds=seeds,
+            costs=self.costs,
+            sailing=np.array(self.sailed, dtype=np.bool_).reshape(-1, n),
+            terminated=self.terminated,
+            truncated=self.truncated,
+            failed=self.failed,
+            failure=self.failure,
+            seconds_per_action=self.seconds / max(self.asked, 1),
+            actions=np.array(self.actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
+            rewards=np.array(self.rewards).reshape(-1, n),
+            shielded=np.array(self.shielded, dtype=np.bool_).reshape(-1, n),
+            states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
+            infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
+        )
