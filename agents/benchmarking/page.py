@@ -19,10 +19,10 @@ from agents.benchmarking.page_figures import (
     tracks_figure,
 )
 from agents.benchmarking.page_replays import bests_of, contestants_of, hardest_of, replay_data, replayable
+from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
-from agents.benchmarking.suite import N_EPISODES, load_suite
 from agents.output import check_page
-from agents.rollouts.refly import Flight, Reflown, refly
+from agents.suites.suite import N_EPISODES, load_suite
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.files import write_text
 from shipgym.pages import plotly_script, render
@@ -69,7 +69,7 @@ def write_page(
     result : BenchmarkResult
         Of `benchmark` or `load_results`.
     path : str or Path
-        The HTML file; one that exists is replaced. It loads nothing, from nowhere.
+        The HTML file; one that exists is replaced. It loads nothing.
     controllers : optional
         As `benchmark` was given them; needed to replay contestants that were given as objects.
     worst : int
@@ -77,7 +77,7 @@ def write_page(
     workers : int or None
         Processes that run them; None for as many as there are cores.
     progress : callable, optional
-        Told what is done, how many of it, and the total.
+        Called with the stage of the work, the number done and the total.
 
     Raises
     ------
@@ -87,34 +87,38 @@ def write_page(
     target = Path(path)
     check_page(target)
     plotly_script()  # a missing extra shall be told before the work
-    count, flights = replayable(result, worst)
-    reflown = refly(result, flights, controllers, workers, progress)
+    count, episodes = replayable(result, worst)
+    replays = rerun(result, episodes, controllers, workers, progress)
+    write_text(_page(result, replays, count), target)
+
+
+def _page(result: BenchmarkResult, replays: Rerun, count: int) -> str:
+    """The text of the page, with so many of the worst episodes of each contestant to replay."""
     wins = [name for task in result.tasks for name in bests_of(result, task)]
-    page = render(
+    return render(
         "agents.benchmarking/page.html",
         about=result.summary,
         names=result.ranking,
         oracle=ORACLE,
-        looks=styles(result.ranking),
+        styles=styles(result.ranking),
         wins={name: wins.count(name) for name in result.ranking},
         failures=_failures(result),
         figures={
             "scores": scores_figure(result),
             "profile": profile_figure(result.summary["profile"], result.ranking),
         },
-        tasks=[_task(result, reflown, task) for task in result.tasks],
+        tasks=[_task(result, replays, task) for task in result.tasks],
         replays={
             "count": count,
-            "episodes": len(reflown.episodes),
-            "different": reflown.different,
-            "refused": dict.fromkeys((name, why) for (name, _), why in reflown.refused.items()),
-            "data": replay_data(result, reflown, count),
+            "episodes": len(replays.episodes),
+            "different": replays.different,
+            "refused": dict.fromkeys((name, why) for (name, _), why in replays.refused.items()),
+            "data": replay_data(result, replays, count),
         },
         command=command(result),
         results_file=RESULTS,
         packed=packed,
     )
-    write_text(page, target)
 
 
 def packed(text: str) -> str:
@@ -124,18 +128,18 @@ def packed(text: str) -> str:
 
 def _failures(result: BenchmarkResult) -> list[str]:
     """Who failed or could not take part."""
-    told = []
+    failures = []
     for name, one in result.summary["contestants"].items():
-        told += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
-        told += [
+        failures += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
+        failures += [
             f"{name} failed in {found[name]['failed']} episodes of {task}: {found[name]['failure']}"
             for task, found in result.summary["tasks"].items()
             if name in found and found[name]["failed"]
         ]
-    return told
+    return failures
 
 
-def _task(result: BenchmarkResult, reflown: Reflown, task: str) -> dict[str, Any]:
+def _task(result: BenchmarkResult, replays: Rerun, task: str) -> dict[str, Any]:
     """What the page shows of a task."""
     found = result.summary["tasks"][task]
     return {
@@ -146,7 +150,7 @@ def _task(result: BenchmarkResult, reflown: Reflown, task: str) -> dict[str, Any
         "metrics": [(name, *METRICS[name]) for name in METRICS if _is_shown(name, found)],
         "costs": costs_figure(result, task),
         "seed": hardest_of(result, task),
-        "hardest": _hardest(result, reflown, task),
+        "hardest": _hardest(result, replays, task),
     }
 
 
@@ -156,12 +160,11 @@ def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
     return any(means) if metric in RARE else any(mean is not None for mean in means)
 
 
-def _hardest(result: BenchmarkResult, reflown: Reflown, task: str) -> dict[str, Any]:
+def _hardest(result: BenchmarkResult, replays: Rerun, task: str) -> dict[str, Any]:
     """Figures of all contestants in the hardest episode; none where none of them can be replayed."""
-    flights = {name: Flight(name, task, 0, hardest_of(result, task)) for name in contestants_of(result, task)}
-    episodes = {
-        name: reflown.episodes[flight] for name, flight in flights.items() if flight in reflown.episodes
-    }
+    seed = hardest_of(result, task)
+    wanted = {name: EpisodeId(name, task, 0, seed) for name in contestants_of(result, task)}
+    episodes = {name: replays.episodes[key] for name, key in wanted.items() if key in replays.episodes}
     if not episodes:
         return {}
     found = {"histories": histories_figure(episodes, result.ranking)}

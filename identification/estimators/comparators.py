@@ -1,4 +1,4 @@
-"""Scikit-learn's estimators as machines of `identify`, to compare with."""
+"""Scikit-learn's estimators in the form that `identify` fits, to compare with."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         centre, scale = centre_and_scale(X, True, self.fit_intercept)
         mean = float(y.mean()) if self.fit_intercept else 0.0
         size = float(np.sqrt(np.mean((y - mean) ** 2))) or 1.0
-        machine = LinearSVR(
+        estimator = LinearSVR(
             C=self.C,
             epsilon=self.epsilon,
             fit_intercept=self.fit_intercept,
@@ -81,10 +81,10 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         scaled = (X - centre) / scale
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ConvergenceWarning)
-            machine.fit(scaled, (y - mean) / size)
+            estimator.fit(scaled, (y - mean) / size)
         self.converged_ = not caught
-        self.coef_ = machine.coef_ * size / scale
-        self.intercept_ = mean + size * float(np.sum(machine.intercept_)) - float(centre @ self.coef_)
+        self.coef_ = estimator.coef_ * size / scale
+        self.intercept_ = mean + size * float(np.sum(estimator.intercept_)) - float(centre @ self.coef_)
         self._spread(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
         return self
 

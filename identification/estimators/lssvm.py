@@ -1,6 +1,6 @@
 """Least-squares support vector machines for regression, the linear kernel in primal form.
 
-With a linear kernel the machine is ridge regression with a free intercept. One singular value
+With a linear kernel this is ridge regression with a free intercept. One singular value
 decomposition of the centred and scaled features, X = U S V', gives the coefficients for every C:
 V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system, which
 `dense_dual` keeps as printed.
@@ -313,7 +313,7 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 def take(
     estimator: Any, problem: Decomposition, filters: Floats, X: Floats, y: Floats, weights: Floats | None
 ) -> Floats:
-    """Set the attributes of a linear machine from its filtered decomposition; returns the residuals."""
+    """Set the attributes of a linear estimator from its filtered decomposition; returns the residuals."""
     scaled = problem.directions.T @ (filters * problem.projections)
     shrink = problem.singular_values * filters
     root = (problem.directions.T * filters) / problem.scale[:, None]

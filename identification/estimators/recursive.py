@@ -72,10 +72,10 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         -------
         self
         """
-        self.follow(X, y)
+        self.fit_history(X, y)
         return self
 
-    def follow(self, X: ArrayLike, y: ArrayLike) -> Floats:
+    def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
         """Fit, and return the estimate after each sample.
 
         Parameters
@@ -96,7 +96,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
-        course = np.concatenate(
+        history = np.concatenate(
             [
                 np.tile(self.coef_, (gathered, 1)),
                 self._run(features[gathered:, None], targets[gathered:, None])[:, 0],
@@ -106,7 +106,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         multiplicity[picked] = 1.0
         multiplicity[gathered:] = 1.0
         self._summarise(features, targets, multiplicity)
-        return course
+        return history
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -204,23 +204,23 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def _start_from(self, features: Floats, targets: Floats) -> None:
         """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
-        machine = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
-        self._theta[0] = machine.coef_ * self.scale_ / self._unit[0]
-        self.coef_ = machine.coef_
+        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
+        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
+        self.coef_ = estimator.coef_
         if hasattr(self, "_P"):
-            self._P[0] = machine.inverse_moment_ * np.outer(self.scale_, self.scale_)
+            self._P[0] = estimator.inverse_moment_ * np.outer(self.scale_, self.scale_)
         else:
             self._r += np.sum((features / self.scale_) ** 2)
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
         """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
         scaled: Floats = np.ascontiguousarray(features / self.scale_)
-        course: Floats = np.empty(features.shape)
-        self._advance(scaled, np.ascontiguousarray(targets / self._unit), course)
-        course *= self._unit[:, None] / self.scale_
-        if len(course):
-            self.coef_ = course[-1, 0].copy() if course.shape[1] == 1 else course[-1].copy()
-        return course
+        history: Floats = np.empty(features.shape)
+        self._advance(scaled, np.ascontiguousarray(targets / self._unit), history)
+        history *= self._unit[:, None] / self.scale_
+        if len(history):
+            self.coef_ = history[-1, 0].copy() if history.shape[1] == 1 else history[-1].copy()
+        return history
 
     def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
         """Weights and covariance of what the recursion tends to."""
@@ -242,7 +242,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def _begin_memory(self, features: Floats) -> None: ...
 
     @abstractmethod
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None: ...
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
 
 
 class MultiInnovationLeastSquares(Recursion):
@@ -304,7 +304,7 @@ class MultiInnovationLeastSquares(Recursion):
         self._P = np.tile(self.C * np.eye(m), (signals, 1, 1))
         self._ceiling = np.full((signals, m), float(self.C))
 
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         from identification.estimators.recursive_kernels import matrix_updates, scalar_updates
 
         first = len(self._past[1])
@@ -312,7 +312,7 @@ class MultiInnovationLeastSquares(Recursion):
         kernel = scalar_updates if self.inverse_free else matrix_updates
         kernel(
             phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
-            float(self.omega), course,
+            float(self.omega), history,
         )  # fmt: skip
         kept = min(self.innovations - 1, len(y))
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
@@ -396,10 +396,10 @@ class StochasticGradient(Recursion):
     def _begin_memory(self, features: Floats) -> None:
         self._r = np.zeros(len(self._theta))
 
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         from identification.estimators.recursive_kernels import gradient_updates
 
-        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), course)
+        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history)
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

@@ -2,7 +2,7 @@
 
 Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
 minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitive band and solver are those of
-the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression machines).
+the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression estimators).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 from sklearn.utils.validation import check_is_fitted, validate_data
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.regression.samples import Samples
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
@@ -33,7 +33,7 @@ from shipgym.ships import GreyBox, ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Machines = dict[str, Machine]
+Estimators = dict[str, Estimator]
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
@@ -175,8 +175,8 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             return np.asarray(ridge.coef_, dtype=float), float(ridge.intercept_)
         if not has_offset:
             return _through_zero(Z, e, weight / len(e), band), 0.0
-        machine = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
-        return np.asarray(machine.coef_, dtype=float).ravel(), float(machine.intercept_[0])
+        estimator = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
+        return np.asarray(estimator.coef_, dtype=float).ravel(), float(estimator.intercept_[0])
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets of samples.
@@ -216,13 +216,13 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
 
 def fit_rm_svm(
     make: Callable[[], RMSVM], samples: Samples, blank: ShipModel, trials: Sequence[Trial]
-) -> Machines:
+) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
     Parameters
     ----------
     make : callable
-        Makes an unfitted machine with the settings asked for.
+        Makes an unfitted estimator with the settings asked for.
     samples : Samples
         The regression (`grey_box.structure_samples`).
     blank : ShipModel
@@ -251,14 +251,14 @@ def fit_rm_svm(
     tuner = _Tuner(asked, samples, blank, trials)
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
-    machines: Machines = {}
+    estimators: Estimators = {}
     for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
-        machine = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
-        machine.chosen_ = {"C": weight, "epsilon": band}
+        estimator = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
+        estimator.chosen_ = {"C": weight, "epsilon": band}
         if search is not None:
-            machine.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
-        machines[q] = machine
-    return machines
+            estimator.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
+        estimators[q] = estimator
+    return estimators
 
 
 class _Tuner:
@@ -271,7 +271,7 @@ class _Tuner:
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
-        """The machine of one equation for some of the rows."""
+        """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
             names = [term.name for term in self.blank.table.terms(equation)]

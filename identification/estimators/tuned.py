@@ -109,7 +109,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             )
         optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
         X, y = validated(self, X, y)
-        objective = self._objective(X, y, groups, self._machine(10.0 ** bounds[1]))
+        objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
         search = optimiser.minimise(objective, [bounds], self.seed)
         return self.settle(X, y, 10.0 ** float(search.x[0]), search)
 
@@ -131,9 +131,9 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def settle(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
-        machine = self._machine(C).fit(X, y)
+        estimator = self._estimator(C).fit(X, y)
         for name in LINEAR:
-            setattr(self, name, getattr(machine, name))
+            setattr(self, name, getattr(estimator, name))
         self.C_, self.search_ = C, search
         self.chosen_ = {
             "C": C,
@@ -143,7 +143,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         }
         return self
 
-    def _machine(self, C: float) -> LSSVM:
+    def _estimator(self, C: float) -> LSSVM:
         return LSSVM(C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust)
 
     def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM) -> ErrorOfC:

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.estimators.threads import on_one_thread
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -183,14 +183,14 @@ def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
     return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
 
 
-def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, Floats]:
+def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
     """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
 
     Parameters
     ----------
     regression : ForceRegression
         Of captive tests.
-    machine : Machine
+    estimator : Estimator
         Without intercept; it is fitted.
 
     Returns
@@ -201,13 +201,13 @@ def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, F
     """
     scales = regression.scales()
     features, targets = regression.features / scales[:, None], regression.targets / scales
-    machine.fit(features, targets)
-    half = features @ machine.inverse_moment_
+    estimator.fit(features, targets)
+    half = features @ estimator.inverse_moment_
     variances = force_variances(
-        regression.equation, targets - machine.predict(features), np.sum(half * features, axis=1)
+        regression.equation, targets - estimator.predict(features), np.sum(half * features, axis=1)
     )
     covariance = (half.T * variances[regression.equation]) @ half
-    return machine.coef_, 0.5 * (covariance + covariance.T)
+    return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
 def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
@@ -289,8 +289,8 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, table, particulars, model_inertia)
-    machine = get_method(method).machine(**({} if rank is None else {"rank": rank}))
-    coefficients, covariance = fit_forces(regression, machine)
+    estimator = get_method(method).estimator(**({} if rank is None else {"rank": rank}))
+    coefficients, covariance = fit_forces(regression, estimator)
     return ShipModel(
         name=particulars.name if name is None else name,
         structure=structure,
@@ -301,7 +301,7 @@ def identify_forces(
         provenance={
             "structure": structure,
             "method": method,
-            "rank": int(getattr(machine, "rank_", len(coefficients))),
+            "rank": int(getattr(estimator, "rank_", len(coefficients))),
             "r_squared": regression.r_squared(coefficients),
             "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
         },

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.report.predictions import legend_above
 from identification.validation.ranking import Ranking
 from shipgym.pages import render
-from shipgym.plots import PALETTE, axis, graph_objects, layout, line, subplots
+from shipgym.plots import PALETTE, axis, graph_objects, label, layout, line, subplots
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -38,6 +37,7 @@ def comparison_page(comparison: Ranking) -> str:
         comparison=comparison,
         errors=errors_figure(comparison),
         largest=f"{LARGEST:g}",
+        beyond=any((error or 0.0) > LARGEST for one in comparison.standings for error in one.errors.values()),
         headings=None if comparison.in_turn else headings_figure(comparison),
     )
 
@@ -65,10 +65,9 @@ def errors_figure(comparison: Ranking) -> Figure:
             )
         )  # fmt: skip
     height = 34 * len(names) + 130
-    margin = {"l": 96, "r": 18, "t": 40, "b": 48}
-    figure.update_layout(layout(height, margin=margin, legend=legend_above(height, 8), hovermode="closest"))
-    figure.update_xaxes(axis("error, in standard deviations of the measurement", rangemode="tozero"))
-    figure.update_yaxes(axis("", autorange="reversed"))
+    figure.update_layout(layout(height, left=96, hovermode="closest"))
+    errors_axis = axis("error, in standard deviations of the measurement", rangemode="tozero")
+    label(figure, errors_axis, axis(autorange="reversed"))
     return figure
 
 
@@ -88,15 +87,13 @@ def headings_figure(comparison: Ranking) -> Figure:
                 error = _smoothed(np.degrees(prediction["psi"] - trial["psi"]))
                 time = _smoothed(trial.t)
                 figure.add_trace(line(time, error, method, colour, 1.5, showlegend=k == 0), **place)
-        figure.update_xaxes(axis("time, s" if place["row"] == rows else ""), **place)
-        figure.update_yaxes(axis("deg" if place["col"] == 1 else "", zeroline=True), **place)
-    height = 230 * rows + 80
-    margin = {"l": 62, "r": 18, "t": 60, "b": 44}
-    figure.update_layout(layout(height, margin=margin, legend=legend_above(height)))
+        below, beside = "time, s" if place["row"] == rows else "", "deg" if place["col"] == 1 else ""
+        label(figure, below, axis(beside, zero=True), **place)
+    figure.update_layout(layout(230 * rows + 80, titled=True))
     return figure
 
 
 def _smoothed(values: Floats) -> Floats:
-    """Running means over a hundredth of the samples: the noise of the compass would hide the rest."""
+    """Running means over a hundredth of the samples: compass noise would hide the rest."""
     width = max(len(values) // 100, 1)
     return np.convolve(values, np.full(width, 1.0 / width), "valid")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -21,6 +20,7 @@ from identification.validation.ranking import Ranking, Standing
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
 from shipgym.ships.grey_box import GREY_BOX
+from shipgym.trials.identify_table import OPTIONS
 from shipgym.trials.trial import Trial
 
 #: Compared where none are named; for a grey box also RM-SVM.
@@ -50,7 +50,7 @@ class Comparison(Ranking):
 
 
 def compare_methods(
-    trials: Sequence[Trial], methods: Sequence[str] | None = None, **arguments: Any
+    trials: Sequence[Trial], methods: Sequence[Any] | None = None, **arguments: Any
 ) -> Comparison:
     """Identify by several methods and rank them on trials held out.
 
@@ -61,8 +61,8 @@ def compare_methods(
     ----------
     trials : sequence of Trial
         As for `identify`.
-    methods : sequence of str, optional
-        By default `USUAL`, and `rm-svm` for a grey box.
+    methods : sequence of str or estimator, optional
+        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box.
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not know.
 
@@ -77,7 +77,8 @@ def compare_methods(
         where no method can be fitted.
     """
     names = list(methods) if methods is not None else _usual(arguments.get("structure"))
-    chosen = {name: get_method(name) for name in names}
+    given = {get_method(method).name: method for method in names}
+    chosen = {name: get_method(method) for name, method in given.items()}
     if not chosen:
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
     held = {trial.name for trial in trials if trial.use == "validate"} | _named(arguments)
@@ -94,8 +95,8 @@ def compare_methods(
     for name in chosen:
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
         try:
-            result = identify(trials, method=name, **own)
-            seen[name] = _in_turn(fitted, name, own) if not held else _seen(result)
+            result = identify(trials, method=given[name], **own)
+            seen[name] = _in_turn(fitted, given[name], own) if not held else _seen(result)
             results[name] = result
         except InputError as error:
             refused[name] = str(error)
@@ -118,8 +119,7 @@ def _usual(structure: str | None) -> list[str]:
 
 def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Settings that each method does not know, which some other one does."""
-    own = inspect.signature(identify).parameters
-    settings = [name for name in arguments if name not in own]
+    settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
 
     def known(method: Method, setting: str) -> bool:
@@ -139,7 +139,7 @@ def _seen(result: IdentificationResult) -> dict[str, Any]:
     return {name: m for name, m in result.metrics["trials"].items() if m["use"] == "validate"}
 
 
-def _in_turn(trials: Sequence[Trial], method: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def _in_turn(trials: Sequence[Trial], method: Any, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Metrics of each trial, predicted by a model identified from the others."""
     own = {key: value for key, value in arguments.items() if key not in ("hold_out", "uncertainty")}
     return cross_validate(trials, method=method, **own)

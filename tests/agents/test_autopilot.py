@@ -87,7 +87,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
         )
     else:
         random_policy(load_model("kvlcc2")).save(path)
-    said = "cross_track.*paths are flown by" if made_for == "paths" else "the scale of '.*' is"
+    said = "cross_track.*for paths there is" if made_for == "paths" else "the scale of '.*' is"
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
@@ -109,7 +109,7 @@ def test_the_same_seed_gives_the_same_numbers(chain):
     result = chain[1]
     again = verify(result.model, 24, 1)
     for first, second in zip(result.verification.pilots, again.pilots, strict=True):
-        assert np.array_equal(first.flights.cost, second.flights.cost)
+        assert np.array_equal(first.episodes.cost, second.episodes.cost)
 
 
 def test_every_autopilot_ends_on_the_new_course(chain):

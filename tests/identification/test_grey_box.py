@@ -123,8 +123,8 @@ def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
 def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
     rng = np.random.default_rng(0)
     X = np.column_stack([rng.standard_normal((200, 2)) * [1.0, 1e-3], np.ones(200)])
-    machine = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(X, X @ [2.0, -500.0, 0.3])
-    assert machine.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
+    estimator = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(X, X @ [2.0, -500.0, 0.3])
+    assert estimator.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
     free = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(X[:, :2], X[:, :2] @ [2.0, -500.0])
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 

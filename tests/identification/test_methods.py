@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.linear_model import Ridge
+from sklearn.neighbors import KNeighborsRegressor
 
-from identification import ArtificialBeeColony, cross_validate, identify
+from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
 from identification.estimators.methods import METHODS
 from identification.search.free_running import free_running_error
 from shipgym import InputError, ShipModel, Trial
@@ -170,3 +172,33 @@ def test_wrong_settings_are_named(
 def test_methods_are_registered_by_their_names() -> None:
     assert all(name == method.name for name, method in METHODS.items())
     assert {"ls", "ridge", "ls-svm", "tls-svm", "svr", *SEARCHES} <= set(METHODS)
+
+
+def test_an_estimator_object_is_a_method(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    """Scikit-learn's ridge regression, whose constant the equations do not have, and our own estimator."""
+    ship = {"particulars": mariner.particulars, "steering": mariner.steering}
+    named = identify(noisy_trials, method="ridge", alpha=1e-9, **ship)
+    own = identify(noisy_trials, method=Ridge(alpha=1e-9, solver="svd"), **ship)
+    assert own.stable
+    for name, value in named.coefficients.items():
+        assert own.coefficients[name] == pytest.approx(value, rel=1e-3), name
+    for name, error in identify(noisy_trials, method="ls", **ship).standard_errors.items():
+        assert own.standard_errors[name] == pytest.approx(error, rel=1e-3), name
+    assert own.settings["method"]["kind"] == (own.model.provenance or {})["method"] == "Ridge"
+    ours = identify(noisy_trials, method=LSSVM(C=1e4), **ship)
+    assert ours.coefficients == identify(noisy_trials, method="ls-svm", C=1e4, **ship).coefficients
+
+
+@pytest.mark.parametrize(
+    ("method", "settings", "told"),
+    [
+        (KNeighborsRegressor(), {}, "sets no finite coefficient for each of the"),
+        (3, {}, "or an estimator with scikit-learn's interface"),
+        (Ridge(), {"C": 1.0}, "settings: C found, which method 'Ridge' does not know"),
+    ],
+)
+def test_an_object_that_is_no_linear_estimator_is_refused(
+    cao_zigzag: Trial, mariner: ShipModel, method: Any, settings: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
