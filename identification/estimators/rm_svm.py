@@ -15,13 +15,13 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import validate_data
 
 from identification.estimators.estimator import Estimator
+from identification.estimators.linear import LinearRegressor, settings
 from identification.regression.samples import Samples
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
@@ -46,7 +46,8 @@ MOST_SWEEPS = 20_000  # of coordinate descent through the samples
 PIECES = 3  # into which a single trial is cut to choose the weight of the errors
 
 
-class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class RMSVM(LinearRegressor):
     """The linear correction of one equation: epsilon-SVR with standardised features and targets.
 
     Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised features and e in
@@ -84,23 +85,13 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Number of features.
     """
 
-    def __init__(
-        self,
-        C: float | None = None,
-        epsilon: float | None = None,
-        objective: str = "rmse",
-        regression: str = "svr",
-        free_constant: bool = False,
-        constant: int | None = None,
-        folds: str = TRIALS,
-    ) -> None:
-        self.C = C
-        self.epsilon = epsilon
-        self.objective = objective
-        self.regression = regression
-        self.free_constant = free_constant
-        self.constant = constant
-        self.folds = folds
+    C: float | None = None
+    epsilon: float | None = None
+    objective: str = "rmse"
+    regression: str = "svr"
+    free_constant: bool = False
+    constant: int | None = None
+    folds: str = TRIALS
 
     def check(self) -> None:
         """Refuse settings that cannot be.
@@ -118,19 +109,7 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             check_number(self.epsilon, "epsilon", at_least=0.0, hint="in standard deviations of the target")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         self.check()
         checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         features: Floats = checked[0]
@@ -177,23 +156,6 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             return _through_zero(Z, e, weight / len(e), band), 0.0
         estimator = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
         return np.asarray(estimator.coef_, dtype=float).ravel(), float(estimator.intercept_[0])
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_
-        return prediction
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -276,11 +238,10 @@ class _Tuner:
         if key not in self._known:
             names = [term.name for term in self.blank.table.terms(equation)]
             constant = names.index("0") if self.asked.free_constant and "0" in names else None
-            settings = {"C": weight, "epsilon": band, "constant": constant}
-            settings = self.asked.get_params() | settings
+            chosen = {"C": weight, "epsilon": band, "constant": constant}
             used = np.flatnonzero(rows)[:: self.thin]
             X, y = self.samples.features[equation][used], self.samples.targets[equation][used]
-            self._known[key] = RMSVM(**settings).fit(X, y)
+            self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
         return self._known[key]
 
     def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
