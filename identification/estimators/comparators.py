@@ -81,10 +81,10 @@ class LinearSupportVectorMachine(LinearRegressor):
         self.converged_ = not caught
         self.coef_ = estimator.coef_ * size / scale
         self.intercept_ = mean + size * float(np.sum(estimator.intercept_)) - float(centre @ self.coef_)
-        self._spread(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
+        self._estimate_covariance(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
         return self
 
-    def _spread(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
+    def _estimate_covariance(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
         """Weights, moment and covariance of Huber's estimator at the errors found."""
         scale_of_error = MAD * float(np.median(np.abs(error)))
         large = np.abs(error) > scale_of_error

@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
-NEARLY_ONE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
+LEAST_SHARE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
 
 
 @settings()
@@ -255,8 +255,8 @@ def take(
     effective = residual if weights is None else residual * weights
     estimator.noise_variance_ = float(effective @ effective) / freedom if freedom > 0.5 else np.nan
     # Huber's sandwich: the residuals that count are the weighted ones, the moment is that of all samples
-    spread = 1.0 if weights is None else len(y) / float(weights.sum())
-    estimator.covariance_ = estimator.noise_variance_ * spread * (root @ root.T)
+    unequal = 1.0 if weights is None else len(y) / float(weights.sum())
+    estimator.covariance_ = estimator.noise_variance_ * unequal * (root @ root.T)
     return residual
 
 
@@ -270,4 +270,4 @@ def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool
 
 def _members(direction: Floats) -> tuple[int, ...]:
     share = np.abs(direction) / np.max(np.abs(direction))
-    return tuple(int(i) for i in np.flatnonzero(share >= NEARLY_ONE))
+    return tuple(int(i) for i in np.flatnonzero(share >= LEAST_SHARE))

@@ -126,10 +126,6 @@ class Recursion(LinearRegressor):
         y : float or array-like of shape (n_samples,) or (n_samples, n_signals)
             What they explain.
 
-        Returns
-        -------
-        self
-
         Raises
         ------
         InputError
@@ -224,8 +220,8 @@ class Recursion(LinearRegressor):
             self.weights_.sum() - float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C))), 1.0
         )
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
-        spread = (scaled.T * self.weights_**2) @ scaled
-        self.covariance_ = self.noise_variance_ * (inverse @ spread @ inverse) / unscale
+        middle = (scaled.T * self.weights_**2) @ scaled
+        self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
 
     @abstractmethod
     def _begin_memory(self, features: Floats) -> None: ...

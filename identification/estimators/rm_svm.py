@@ -37,9 +37,9 @@ Estimators = dict[str, Estimator]
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
-BARE = 0.0  # weight of the errors at which nothing is added to the reference ship
-WEIGHTS = (BARE, *np.geomspace(0.01, 100.0, 9).tolist())
-NEARLY = 1.1  # times the least error is as good
+NO_CORRECTION = 0.0  # weight of the errors at which nothing is added to the reference ship
+WEIGHTS = (NO_CORRECTION, *np.geomspace(0.01, 100.0, 9).tolist())
+ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
 FIRST_BAND = 0.1
 MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
 MOST_SWEEPS = 20_000  # of coordinate descent through the samples
@@ -115,7 +115,7 @@ class RMSVM(LinearRegressor):
         features: Floats = checked[0]
         target = np.asarray(checked[1], dtype=np.float64)
         weight = 1.0 if self.C is None else float(self.C)
-        if weight == BARE:
+        if weight == NO_CORRECTION:
             self.coef_ = np.zeros(features.shape[1])
             self.inverse_moment_ = np.zeros((features.shape[1],) * 2)
         else:
@@ -134,13 +134,13 @@ class RMSVM(LinearRegressor):
             centre, level = np.where(free, rows.mean(axis=0), 0.0), float(target.mean())
         scale = np.sqrt(np.mean((rows - centre) ** 2, axis=0))
         scale = np.where((scale > 0.0) & free, scale, 1.0)
-        spread = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
-        Z, e = ((rows - centre) / scale)[:, free], (target - level) / spread
+        deviation = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
+        Z, e = ((rows - centre) / scale)[:, free], (target - level) / deviation
         slope, offset = self._solve(Z, e, weight, band)
         self.coef_ = np.zeros(X.shape[1])
-        self.coef_[free] = slope * spread / scale[free]
+        self.coef_[free] = slope * deviation / scale[free]
         if self.constant is not None:
-            self.coef_[self.constant] = level + spread * offset - centre @ self.coef_
+            self.coef_[self.constant] = level + deviation * offset - centre @ self.coef_
         penalty = np.diag(np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0))
         self.inverse_moment_ = np.linalg.pinv(X.T @ X + penalty, hermitian=True)
 
@@ -272,8 +272,8 @@ class _Tuner:
             for weight in WEIGHTS
         ])  # fmt: skip
         if not np.isfinite(errors.min()):
-            return BARE
-        return float(WEIGHTS[int(np.flatnonzero(errors <= NEARLY * errors.min())[0])])
+            return NO_CORRECTION
+        return float(WEIGHTS[int(np.flatnonzero(errors <= ERROR_TOLERANCE * errors.min())[0])])
 
     def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
         """Rows to fit, and the trial or the piece of the only trial that is held out."""
@@ -298,7 +298,7 @@ class _Tuner:
     def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
         count = len(self.samples.features)
-        if self.asked.epsilon is not None or weight == BARE or self.asked.regression == "ls-svm":
+        if self.asked.epsilon is not None or weight == NO_CORRECTION or self.asked.regression == "ls-svm":
             return np.full(count, FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon), None
         everything = np.ones(len(self.samples), dtype=bool)
 

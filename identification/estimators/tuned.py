@@ -84,10 +84,6 @@ class TunedLSSVM(LinearRegressor):
             Targets.
         groups : array-like of shape (n_samples,), optional
             Trial of each sample, for folds="trials".
-
-        Returns
-        -------
-        self
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_whole(self.seed, "seed", at_least=0)

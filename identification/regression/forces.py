@@ -95,10 +95,6 @@ def force_regression(
     model_inertia : bool
         Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`); it is taken out.
 
-    Returns
-    -------
-    ForceRegression
-
     Raises
     ------
     InputError

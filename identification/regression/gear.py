@@ -13,7 +13,7 @@ from shipgym.trials.trial import Trial
 
 USUAL_LIMIT_DEG = 35.0
 MOVING = 0.5  # of the fastest move: faster ones are taken for the gear's own rate
-FASTEST = 0.995  # quantile, for records with noise
+FAST_QUANTILE = 0.995  # of the rates of records with noise
 
 
 def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
@@ -26,10 +26,6 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     ----------
     trials : sequence of Trial
         With `delta`.
-
-    Returns
-    -------
-    SteeringGear
     """
     limit = max(USUAL_LIMIT_DEG, *(float(np.degrees(np.abs(trial["delta"]).max())) for trial in trials))
     clean = [t for t in trials if not is_noisy(t.t, (t[channel] for channel in "uvr"))]
@@ -39,6 +35,6 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
         lag = float(np.median([rudder.time_constant for rudder in exact]))
     else:
         rates = np.concatenate([np.abs(np.diff(trial["delta"])) / np.diff(trial.t) for trial in trials])
-        fastest = float(np.quantile(rates[rates > 0.0], FASTEST))
+        fastest = float(np.quantile(rates[rates > 0.0], FAST_QUANTILE))
         rate, lag = float(np.median(rates[rates >= MOVING * fastest])), 0.0
     return SteeringGear(min(limit, 90.0), float(np.degrees(rate)), lag)

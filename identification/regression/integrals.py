@@ -98,10 +98,6 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
         s and the unit of the channel.
     rudder : Rudder
         With the corners.
-
-    Returns
-    -------
-    BSpline
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)

@@ -59,10 +59,6 @@ def pose(
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
-    Returns
-    -------
-    Problem
-
     Raises
     ------
     InputError

@@ -82,10 +82,6 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
         s and rad.
     gear : SteeringGear, optional
         Tried first; a gear estimated from the samples takes its place where it explains them better.
-
-    Returns
-    -------
-    Rudder
     """
     t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
     candidates = [estimate_gear(t, delta)]

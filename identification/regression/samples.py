@@ -121,10 +121,6 @@ def build_samples(
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
 
-    Returns
-    -------
-    Samples
-
     Raises
     ------
     InputError

@@ -18,7 +18,7 @@ class ArtificialBeeColony:
 
     Employed bees move each food source along one dimension towards or away from another; onlookers do the
     same to sources drawn by their fitness; a source that did not improve for too long is left and
-    drawn anew. All bees of a stage fly at once, from the same sources, so that the objective is
+    drawn anew. All bees of a stage move at once, from the same sources, so that the objective is
     evaluated for a batch of candidates; of several onlookers at one source the best counts.
 
     Parameters
@@ -47,11 +47,11 @@ class ArtificialBeeColony:
         values = record(sources)
         record.end_round()
         idle = np.zeros(n, dtype=np.int64)
-        everyone = np.arange(n)
+        all_sources = np.arange(n)
         for _ in range(self.rounds):
             for bees in ("employed", "onlookers"):
                 if bees == "employed":
-                    chosen = everyone
+                    chosen = all_sources
                 else:
                     chosen = np.searchsorted(_chances(values), rng.random(n), side="right")
                 moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)

@@ -61,10 +61,6 @@ class Optimiser(Protocol):
             Lower and upper bound of each dimension.
         seed : int
             The same seed gives the same search.
-
-        Returns
-        -------
-        SearchResult
         """
         ...
 
