@@ -233,11 +233,6 @@ def advise(
     number : int
         How many to choose; the same one may be chosen again.
 
-    Returns
-    -------
-    Advice
-        Printable.
-
     Raises
     ------
     InputError
@@ -259,18 +254,23 @@ def advise(
     size = _size(model, total)
     before = dict(zip(names, _errors(total, size).tolist(), strict=True))
     worst = max(before, key=lambda name: before[name]) if coefficient is None else coefficient
-    at, steps, chosen = names.index(worst), [], []
+    steps: list[dict[str, float]] = []
+    chosen: list[str] = []
     for _ in range(number):
-        now = _uncertainty(total, size, criterion, at)
-        gains = {
-            name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()
-        }
-        best = max(gains, key=lambda name: gains[name])
-        total = total + offers[best]
+        gains = _gains(total, offers, size, criterion, names.index(worst))
+        chosen.append(max(gains, key=lambda name: gains[name]))
         steps.append(gains)
-        chosen.append(best)
+        total = total + offers[chosen[-1]]
     after = dict(zip(names, _errors(total, size).tolist(), strict=True))
     return Advice(criterion, worst, known, before, tuple(steps), tuple(chosen), after)
+
+
+def _gains(
+    total: Floats, offers: Mapping[str, Floats], size: Floats, criterion: str, at: int
+) -> dict[str, float]:
+    """By what factor each candidate would shrink what the criterion looks at."""
+    now = _uncertainty(total, size, criterion, at)
+    return {name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()}
 
 
 def _table(model: ShipModel) -> Structure:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds, check_count
+from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from shipgym.checks import check_whole
 
 Floats = NDArray[np.float64]
 
@@ -37,9 +38,9 @@ class ArtificialBeeColony:
 
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise; see `Optimiser.minimise`."""
-        n = check_count(self.sources, 2, "sources")
-        check_count(self.rounds, 1, "rounds")
-        check_count(self.limit, 1, "limit")
+        n = check_whole(self.sources, "sources", at_least=2)
+        check_whole(self.rounds, "rounds", at_least=1)
+        check_whole(self.limit, "limit", at_least=1)
         low, high = check_bounds(bounds)
         rng = np.random.default_rng(seed)
         record = Recorder(objective)
