@@ -73,9 +73,13 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
         **training_options(plan),
     )
     settings = plan.settings
-    if base is not None or settings.history > 1 or settings.hold > 1:
+    if base is not None or settings.frame_stack > 1 or settings.action_repeat > 1:
         ships = ResidualVecEnv(
-            ships, base, authority=settings.authority, history=settings.history, hold=settings.hold
+            ships,
+            base,
+            authority=settings.authority,
+            frame_stack=settings.frame_stack,
+            action_repeat=settings.action_repeat,
         )
     return scaled_rewards(ships, settings)
 

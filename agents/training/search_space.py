@@ -7,7 +7,7 @@ learning_rate          1e-4 to 3e-3, evenly in its logarithm          all
 gamma                  1 - gamma: 1e-3 to 0.1, in its logarithm       all
 net_arch               [32, 32], [64, 64], [128, 128]                 all
 activation             relu, tanh                                     all
-hold                   1, 4, 16                                       all
+action_repeat          1, 4, 16                                       all
 n_steps                16, 32, 64, 128, 256                           ppo
 batch_size             ships x n_steps over 2, 4, 8 or 16             ppo
 n_epochs               2 to 12                                        ppo
@@ -67,7 +67,7 @@ ALL: Mapping[str, Dimension] = {
     "one_minus_gamma": Reals(1e-3, 0.1, log=True),
     "net_arch": Choice(("32 32", "64 64", "128 128")),
     "activation": Choice(("relu", "tanh")),
-    "hold": Choice((1, 4, 16)),
+    "action_repeat": Choice((1, 4, 16)),
 }
 OFF_POLICY: Mapping[str, Dimension] = {
     "batch_size": Choice((128, 256, 512)),

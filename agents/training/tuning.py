@@ -105,7 +105,7 @@ def tune(
     where : Engine
         Where trials are trained; the results are the same.
     progress : callable, optional
-        Told the trials done, their total and the best cost.
+        Called with the trials done, their total and the best cost.
     training : callable, optional
         In the place of `train_trial`: a job in, cost, curve and how it ended out.
 
@@ -158,7 +158,7 @@ def evaluated_evenly(plan: Plan) -> Plan:
 def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     """Train one trial; stop it when it is worse than finished ones were.
 
-    What a base does before anything is learned is no merit of the settings: step 0 does not count.
+    What a base does before anything is learned says nothing about the settings: step 0 does not count.
     """
     from agents.training.training import Progress, train
 
@@ -277,7 +277,7 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
         found = read_json(note, "study", "name another folder")
         check_same(expected, found, str(note))
     elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists and is no study of tuning; name another folder")
+        raise InputError(f"{folder}: exists and is not a tuning study; name another folder")
     else:
         try:
             folder.mkdir(parents=True, exist_ok=True)
