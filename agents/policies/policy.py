@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Controller, check_names, check_scales
+from agents.controllers.controller import FORMAT, Action, Controller, check_observed
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
 from agents.policies.policy_extraction import sb3_fields
@@ -136,21 +136,10 @@ class LearnedPolicy:
 
     @classmethod
     def from_sb3(cls, agent: Any, env: Any = None, training: Mapping[str, Any] | None = None) -> Self:
-        """The policy of a trained agent of stable-baselines3 (see `agents.policies.policy_extraction`).
+        """The policy of a trained agent of stable-baselines3.
 
-        Parameters
-        ----------
-        agent : BaseAlgorithm
-            PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy".
-        env : VecEnv, optional
-            The environment that it learned in, with its wrappers; by default the agent's own.
-        training : dict, optional
-            How it was made.
-
-        Raises
-        ------
-        InputError
-            For an agent or a wrapper that cannot be written as such a policy.
+        Arguments and errors as in `agents.policies.policy_extraction.sb3_fields`; `training` is a record of
+        how it was made.
         """
         return cls(**sb3_fields(agent, env), training=dict(training or {}))
 
@@ -237,24 +226,10 @@ class LearnedPolicy:
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse what shows other quantities first, or in other scales, than those it learned with.
 
-        Parameters
-        ----------
-        names : sequence of str
-            `observation_names` of an environment; it may show more after what the policy observes.
-        scales : sequence of float
-            Its `observation_scales`.
-        where : str
-            Start of the message.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
+        Arguments and errors as in `Controller.check_fits`.
         """
-        n = len(self.observation_names)
-        check_names(names[:n], self.observation_names, where)
-        check_scales(
-            names[:n], scales[:n], self.observation_scales, where,
+        check_observed(
+            self, names, scales, where,
             f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
             f"ship or task; train one in this environment",
         )  # fmt: skip
