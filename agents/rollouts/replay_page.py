@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
+from typing import Any
 
-import shipgym
 from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
+from shipgym.pages import render
 from shipgym.whole_file import write_text
 
 
@@ -63,33 +60,25 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
     ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
-    data = json.dumps({"runs": runs, "quantities": quantities(runs)}, allow_nan=False)
-    return player(f"Replay: {ships}", _script_safe(data))
+    return player(f"Replay: {ships}", {"runs": runs, "quantities": quantities(runs)})
 
 
-def player(title: str, data: str) -> str:
+def player(title: str, data: Any) -> str:
     """The page about data of runs.
 
     Parameters
     ----------
     title : str
         Of the window.
-    data : str
-        JSON of `runs` and `quantities` (`agents.rollouts.replay_series`) as a script element may hold it; or
-        what will be put in its place.
+    data : dict or str
+        `runs` and `quantities` (`agents.rollouts.replay_series`); or a mark in the place of their JSON.
 
     Returns
     -------
     str
         HTML that loads nothing.
     """
-    return Template(_part("template")).substitute(
-        title=escape(title),
-        version=escape(shipgym.__version__),
-        chart=_part("chart"),
-        player=_part("player"),
-        data=data,
-    )
+    return render("agents.rollouts/template.html", title=title, data=data)
 
 
 def names(paths: Sequence[Path]) -> list[str]:
@@ -109,13 +98,3 @@ def names(paths: Sequence[Path]) -> list[str]:
 def _earlier(called: Sequence[str]) -> list[int]:
     """How often each name stood before."""
     return [called[:i].count(name) for i, name in enumerate(called)]
-
-
-def _part(name: str) -> str:
-    """One of the files of which the page is made."""
-    return files("agents.rollouts").joinpath(f"{name}.html").read_text(encoding="utf-8")
-
-
-def _script_safe(text: str) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return text.replace("<", "\\u003c")

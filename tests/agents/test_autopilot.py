@@ -11,7 +11,7 @@ from agents.verification.index_uncertainty import manoeuvre_spread
 from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from identification import identify
-from identification.validation.warnings import concerns
+from identification.validation.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy
@@ -140,7 +140,7 @@ def test_a_rudder_of_the_wrong_sign_is_noticed(demo, tmp_path):
     (tmp_path / "ship.toml").write_text(text)
     ship = ShipFile.load(tmp_path / "ship.toml")
     result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
-    assert "likely a wrong rudder_positive" in concerns(result)[0]
+    assert "likely a wrong rudder_positive" in model_warnings(result)[0]
 
 
 def test_unstable_draws_count_as_failed_and_are_never_dropped():
