@@ -4,9 +4,9 @@
     python scripts/train_pretrained.py --tasks mariner-calm --seeds 0,1,2
     python scripts/train_pretrained.py --table                           # markdown for docs/pretrained.md
 
-Each task of the suite is learned with its settings in `agents/learning/hyperparameters`, once for each
+Each task of the suite is learned with its settings in `agents/training/hyperparameters`, once for each
 training seed. Of all evaluations of all runs the policy that costs least on held-out episodes is kept; only
-then is it flown on the episodes that are scored. Killed at any moment, it goes on where it was.
+then is it run on the episodes that are scored. Killed at any moment, it goes on where it was.
 """
 
 from __future__ import annotations

@@ -104,8 +104,8 @@ def standard_trials(
         except (InputError, ManoeuvreError) as error:
             refused[name] = str(error)
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
-    judged = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
-    found = intervals_of(own, drawn, judged, progress)
+    assessed = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
+    found = intervals_of(own, drawn, assessed, progress)
     criteria = judge_imo(model, found) if np.isinf(water_depth) else {}
     return StandardTrials(sailed, found, criteria, refused, len(drawn), water_depth)
 

@@ -49,7 +49,7 @@ def tune_command(
     randomise: Annotated[
         bool,
         typer.Option(
-            "--randomise", help="Learn on ships drawn from the posterior, in all seas, at all speeds."
+            "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
         ),
     ] = False,
     engine: EngineName = "local",

@@ -14,8 +14,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from agents.controllers.batched_lq import lq_rows, sampled_ships
-from agents.controllers.linear_loop import SIGNALS, length_time
+from agents.controllers.batched_lq import lq_rows
+from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
@@ -55,7 +55,7 @@ class AdaptiveLQ(Stateful):
     """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
 
     It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
-    be linear are not learned from, nor is anything while the yaw rate trembles more than noise explains: in
+    be linear are not learned from, nor is anything while the yaw rate oscillates more than noise explains: in
     waves, unless they are filtered out. An estimate whose rudder effect is not believable, or whose gains
     would leave it or the model unstable, changes nothing.
 
@@ -197,9 +197,9 @@ class AdaptiveLQ(Stateful):
     def _at_rest(self, kept: Floats, now: Floats, begins: Flags) -> Flags:
         """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
         change = np.where(begins, 0.0, now[:, 1] - kept[:, LAST][:, 1])
-        trembling = (change - kept[:, CHANGE]) ** 2
+        oscillation = (change - kept[:, CHANGE]) ** 2
         share = 1.0 / self.design["redesign_steps"]
-        kept[:, RESTLESS] += share * (trembling - kept[:, RESTLESS])
+        kept[:, RESTLESS] += share * (oscillation - kept[:, RESTLESS])
         kept[:, CHANGE] = change
         at_rest: Flags = kept[:, RESTLESS] < self.design["restless_limit"] ** 2
         return at_rest
@@ -254,7 +254,7 @@ class AdaptiveLQ(Stateful):
         chosen[:, COVARIANCE] = covariance.reshape(n, -1)
 
     def coefficients(self, state: Floats) -> Floats:
-        """Prime coefficients that are identified, of the state that `predict` hands back.
+        """Prime coefficients that are identified, of the state that `predict` returns.
 
         Parameters
         ----------

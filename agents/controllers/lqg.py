@@ -21,6 +21,7 @@ from agents.controllers.linear_loop import (
     Compensator,
     length_time,
     sample_ship,
+    sampled_ships,
 )
 from agents.controllers.lq import LQ, lq_gain, lq_settings
 from agents.controllers.memory import Flags, Floats, heading_error
@@ -44,8 +45,8 @@ class LQG(Stateful):
     """LQ feedback of estimated motions: a stationary Kalman filter on noisy heading and yaw rate.
 
     The measured sway speed is not used. The filter's states are sway, yaw rate and heading error and, where a
-    wave period is given, heading and rate of the first-order motion, which is not answered with rudder. It is
-    told the measured rudder, so limits of the steering gear do not mislead it. A jump of the
+    wave period is given, heading and rate of the first-order motion, which is not answered with rudder. Its
+    input is the measured rudder, so limits of the steering gear do not mislead it. A jump of the
     heading error that neither noise nor the ship can make is taken as a new course.
 
     Attributes
@@ -104,7 +105,7 @@ class LQG(Stateful):
             How much the sea pushes the ship: standard deviation of a rudder angle, drawn anew each interval,
             that would do the same. More makes the filter trust what is measured.
         wave_period : float, optional
-            Of the first-order motion, s, as it is met; by default none is modelled.
+            Of the first-order motion, s, as it is met; by default it is not modelled.
         wave_heading_deg : float
             Standard deviation of the heading in it, degrees.
 
@@ -130,7 +131,7 @@ class LQG(Stateful):
             effect = np.append(effect, [0.0, 0.0])
             output = np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]])
         deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
-        kalman, spread = kalman_gain(transition, process, output, np.diag(deviation**2))
+        kalman, deviations = kalman_gain(transition, process, output, np.diag(deviation**2))
         return cls.designed(
             model,
             ship,
@@ -140,7 +141,7 @@ class LQG(Stateful):
                 "rate_weight_s2": weight,
                 "noise": float(noise),
                 "disturbance_deg": float(disturbance_deg),
-                "new_course_rad": max(NEW_COURSE, GATE * spread[1]),
+                "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
                 **({} if wave_period is None else {"wave_period": float(wave_period)}),
             },
             transition=transition,
@@ -213,13 +214,8 @@ def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tupl
     effect : array of shape (3,)
         Of the rudder angle, per rad.
     """
-    import control  # here, because it takes a second to import
-
-    A, B = np.zeros((3, 3)), np.zeros((3, 1))
-    A[:2, :2], B[:2] = linearise(model, about)
-    A[2, 1] = -1.0
-    held = control.sample_system(control.ss(A, B, np.eye(3), 0.0), dt, method="zoh")
-    return np.asarray(held.A, dtype=np.float64), np.asarray(held.B, dtype=np.float64)[:, 0]
+    A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
+    return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
 
 
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:

@@ -32,7 +32,7 @@ from shipgym.errors import InputError
 
 __all__ = ["JobError", "JobProgress", "WorkerDiedError", "check_engine", "run_jobs"]
 
-#: Told the number of jobs done and their total.
+#: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
 
 ENGINES = ("local", "ray")
@@ -70,7 +70,7 @@ def run_jobs(
     retries : int
         How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
     progress : callable, optional
-        Told the number of jobs done and their total.
+        Called with the number of jobs done and their total.
 
     Returns
     -------
