@@ -68,10 +68,6 @@ def identify(
     **options
         The other fields of `Options`: of the identification, and settings of the method.
 
-    Returns
-    -------
-    IdentificationResult
-
     Raises
     ------
     InputError

@@ -208,10 +208,6 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
         Size of each term in a hard turn (`guard.hard_turn_features`).
     strength : float
         Of the penalty, relative to the terms' contribution in the hard turn.
-
-    Returns
-    -------
-    dict of str to LSSVM
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.regression.gear import estimated_gear
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
+from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
@@ -59,10 +59,6 @@ def pose(
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
-    Returns
-    -------
-    Problem
-
     Raises
     ------
     InputError
@@ -82,8 +78,8 @@ def pose(
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     regression = structure_samples(
-        used, table, ship, options.samples, options.window, steering,
-        options.preprocessing or options.smooth, shaft,
+        used, table, ship, samples=options.samples, window=options.window, gear=steering,
+        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering

@@ -67,10 +67,6 @@ def compare_methods(
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not know.
 
-    Returns
-    -------
-    Comparison
-
     Raises
     ------
     InputError

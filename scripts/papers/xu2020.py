@@ -239,7 +239,7 @@ def _loss_row(table: int) -> Row:
 
 
 def coefficient_rows() -> Iterator[Row]:
-    """Table 11 found back: by the last step of each force, and from X, Y and N together."""
+    """Table 11 recovered: by the last step of each force, and from X, Y and N together."""
     found = usual_fit()
     for name, value in TABLE_11.items():
         off = 100.0 * abs(found.joint[name] / value - 1.0)

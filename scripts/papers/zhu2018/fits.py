@@ -47,7 +47,7 @@ WITH_SPEED = accelerations(
 
 
 def every(trial: Trial, steps: int, name: str) -> Trial:
-    """Every so manieth sample of a simulated trial."""
+    """Every n-th sample of a simulated trial."""
     channels = {channel: values[::steps] for channel, values in trial.channels.items()}
     return Trial(trial.t[::steps], channels, name=name, kind=trial.kind, length=trial.length)
 
