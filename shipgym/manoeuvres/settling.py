@@ -39,7 +39,7 @@ class Steady:
 
 
 class Voyage:
-    """A manoeuvre in the making: one leg after the other, from service speed straight ahead, or a given state.
+    """A manoeuvre in the making: one leg after the other, from service speed or a given state.
 
     Samples are dt apart, s; by default a fortieth of the time to travel one ship length. In weather the
     motion is never steady: legs that wait for it last their longest.
