@@ -38,6 +38,8 @@ soak: $(VENV)/dev-installed
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
+	$(BIN)/python scripts/oracle.py --again --from-agents
+	$(BIN)/python scripts/transfer.py --data $(DATA)
 
 docs: $(VENV)/docs-installed
 	$(BIN)/mkdocs build --strict

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 
 from agents import LQ, Policy, benchmark
-from agents.benchmarking.suite import BenchmarkTask
+from agents.suites.suite import BenchmarkTask
 
 
 def gentle(task: BenchmarkTask) -> Policy:

@@ -41,9 +41,9 @@ from agents.benchmarking.episode_table import (
     read_episodes,
     write_episodes,
 )
-from agents.benchmarking.suite import FIRST_SEED, BenchmarkTask, Suite, suite_hash
 from agents.benchmarking.summary import summary_of
 from agents.controllers.controller import model_hash
+from agents.suites.suite import FIRST_SEED, BenchmarkTask, Suite, suite_hash
 from shipgym.checks import check_choice, check_keys, check_table
 from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json

@@ -1,9 +1,8 @@
-"""The benchmark: every contestant flies every task of a suite, in the same episodes."""
+"""The benchmark: every contestant sails every task of a suite, in the same episodes."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,18 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
-from agents.benchmarking.oracle_costs import oracle_costs
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
-from agents.benchmarking.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
 from agents.engines.jobs import check_engine, run_jobs
-from agents.rollouts.flying import fly_task
+from agents.rollouts.metrics import evaluate
+from agents.suites.reference import oracle_costs
+from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
     from agents.verification.chain import Progress
-
-_suite = lru_cache(maxsize=4)(load_suite)
 
 
 def benchmark(
@@ -38,7 +35,7 @@ def benchmark(
     resume: bool = False,
     episodes: int = N_EPISODES,
 ) -> BenchmarkResult:
-    """Fly controllers through the tasks of a suite and rank them.
+    """Run controllers through the tasks of a suite and rank them.
 
     Parameters
     ----------
@@ -53,7 +50,7 @@ def benchmark(
         Folder for the results and for what each contestant did in each task; by default nothing is written.
     workers : int or None
         Processes; None for as many as there are cores. Controllers that are given as objects, not by a text,
-        fly in this process.
+        steer in this process.
     engine : {"local", "ray"}
         See `agents.engines.jobs.run_jobs`.
     progress : callable, optional
@@ -61,7 +58,7 @@ def benchmark(
     address : str, optional
         Of a ray cluster.
     resume : bool
-        Whether to go on in a folder where results are: what is there already is not flown again.
+        Whether to go on in a folder where results are: what is there already is not run again.
     episodes : int
         The first so many of the scored ones. Fewer than all of them are for a quick look, not for a ranking.
 
@@ -76,7 +73,7 @@ def benchmark(
         For an unknown contestant, suite or task, with the nearest known one, the file of an agent that is
         broken or fits none of the tasks, or a folder that is in use.
     """
-    found = _suite(suite)
+    found = load_suite(suite)
     chosen = found.tasks if tasks is None else tuple(found.task(name) for name in _once(tasks))
     who = contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)
@@ -86,21 +83,21 @@ def benchmark(
         check_new(folder, resume)
     for one in who:
         check_agents(one, chosen)
-    jobs = [fly_job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
-    flown = run_jobs(
-        fly_job,
+    jobs = [job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
+    done = run_jobs(
+        run_job,
         jobs,
         engine=engine,
         workers=workers,
         address=address,
         keep=None if folder is None else folder / PARTS,
-        progress=None if progress is None else lambda done, total: progress("tasks flown", done, total),
+        progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
     )
-    by_pair = {(job["contestant"], job["task"]): result for job, result in zip(jobs, flown, strict=True)}
+    by_pair = {(job["contestant"], job["task"]): result for job, result in zip(jobs, done, strict=True)}
     for one in who:
         if not one.is_text:
             for task in chosen:
-                by_pair[one.name, task.name] = flown_by(one, task, suite, episodes)
+                by_pair[one.name, task.name] = results_of(one, task, suite, episodes)
     result = gathered(found, chosen, who, by_pair, episodes)
     if folder is not None:
         result.save(folder)
@@ -115,7 +112,7 @@ def _once(names: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def fly_job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
+def job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
     """The job of one contestant and task; it names all that its result depends on."""
     return {
         "suite": suite,
@@ -128,14 +125,14 @@ def fly_job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) 
     }
 
 
-def fly_job(job: dict[str, Any]) -> dict[str, Any]:
-    """Do a job of `fly_job_of`, in any process; see `flown_by`."""
+def run_job(job: dict[str, Any]) -> dict[str, Any]:
+    """Do a job of `job_of`, in any process; see `results_of`."""
     one = Contestant(job["contestant"], job["source"])
-    return flown_by(one, _suite(job["suite"]).task(job["task"]), job["suite"], job["episodes"])
+    return results_of(one, load_suite(job["suite"]).task(job["task"]), job["suite"], job["episodes"])
 
 
-def flown_by(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
-    """Fly one task with every training run of one contestant.
+def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
+    """Run one task with every training run of one contestant.
 
     Returns
     -------
@@ -157,12 +154,12 @@ def flown_by(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) ->
         return {"refused": f"{type(error).__name__}: {error}", "runs": []}
     runs = []
     for policy in policies:
-        flown = fly_task(policy, task, seeds)
+        figures, run = evaluate(policy, task, seeds)
         runs.append(
             {
-                "episodes": {name: np.asarray(values) for name, values in flown.episodes.items()},
-                "failure": flown.failure,
-                "seconds_per_action": flown.seconds_per_action,
+                "episodes": figures,
+                "failure": run.failure,
+                "seconds_per_action": run.seconds_per_action,
                 "policy_sha256": policy_hash(policy),
             }
         )

@@ -20,39 +20,14 @@ from agents.benchmarking.statistics import (
     performance_profile,
     score,
 )
-from agents.benchmarking.suite import N_EPISODES, BenchmarkTask, suite_file
-from shipgym.checks import check_number, check_table
-from shipgym.json_file import read_json
+from agents.suites.reference import reference_costs
+from agents.suites.suite import N_EPISODES, BenchmarkTask
 
 Floats = NDArray[np.float64]
 Flown = Mapping[tuple[str, str], Mapping[str, Any]]
 
 THRESHOLDS = np.linspace(-1.0, 1.5, 51)  # scores of the performance profile
 NOTHING: dict[str, float | None] = {"value": None, "low": None, "high": None}
-
-
-def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
-    """Costs that are scores of 0 and 1, by task: of the best constant-gain PID and of the oracle.
-
-    Returns
-    -------
-    dict of str to tuple
-        Empty where the suite has no file of them, `agents/suites/SUITE-reference.json`.
-
-    Raises
-    ------
-    InputError
-        Naming the field of the file at fault.
-    """
-    path = suite_file(suite, "reference")
-    if not path.exists():
-        return {}
-    found = {}
-    for task, value in read_json(path, "file of reference costs", "take another copy").items():
-        costs = check_table(value, f"{path}: {task}")
-        pid, oracle = (check_number(costs.get(name), f"{path}: {task}.{name}") for name in ("pid", "oracle"))
-        found[task] = (pid, oracle)
-    return found
 
 
 def summary_of(

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from agents.benchmarking.contestants import CLASSICAL, Contestant, file_hash
+from agents.benchmarking.contestants import Contestant, file_hash
 from agents.benchmarking.results import BenchmarkResult, load_results, versions
-from agents.benchmarking.run import fly_job, fly_job_of
-from agents.benchmarking.suite import load_suite, suite_hash
+from agents.benchmarking.run import job_of, run_job
+from agents.controllers.designs import CLASSICAL
 from agents.engines.jobs import run_jobs
+from agents.suites.suite import load_suite, suite_hash
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
@@ -107,7 +108,7 @@ def verify(
         )
     pairs = _sampled(result, sample, seed)
     jobs = [_job(result, one, task) for one, task in pairs]
-    flown = run_jobs(fly_job, jobs, workers=workers)
+    flown = run_jobs(run_job, jobs, workers=workers)
     return [
         _compared(result, one, task, again, tolerance)
         for (one, task), again in zip(pairs, flown, strict=True)
@@ -139,7 +140,7 @@ def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str,
 def _job(result: BenchmarkResult, name: str, task: str) -> dict[str, Any]:
     suite = result.summary["suite"]["name"]
     one = Contestant(name, result.summary["contestants"][name]["source"])
-    return fly_job_of(one, load_suite(suite).task(task), suite, result.summary["seeds"]["count"])
+    return job_of(one, load_suite(suite).task(task), suite, result.summary["seeds"]["count"])
 
 
 def _compared(

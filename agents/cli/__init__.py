@@ -92,9 +92,10 @@ def trials_command(
     Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
     indices of an identified model come with their 95 % intervals.
     """
-    from agents.cli.standard_trials import check_page, standard_trials, write_page
+    from agents.cli.standard_trials import standard_trials
     from agents.cli.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
     from agents.cli.terminal import out as console
+    from agents.cli.trials_page import check_page, write_page
     from shipgym.ships import load_model
 
     ship = load_model(model)
@@ -169,7 +170,7 @@ def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> N
     """Print the result of the chain; fail for an unstable model."""
     from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.cli.terminal import out as console
-    from identification.validation.warnings import concerns
+    from identification.validation.warnings import model_warnings
 
     if as_json:
         print_json({**result.metrics, "report": str(report)})
@@ -183,8 +184,8 @@ def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> N
         console.print()
     if not result.stable:
         fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
-    for concern in concerns(result.identification):
-        warn(concern)
+    for warning in model_warnings(result.identification):
+        warn(warning)
     for name, reason in (result.verification.refused if result.verification else {}).items():
         warn(f"no {name.upper()} autopilot: {reason}")
     if not as_json:
@@ -231,7 +232,3 @@ def doctor_command(as_json: Json = False) -> None:
 def main() -> None:
     """Run the command line."""
     app(prog_name="shipgym")
-
-
-if __name__ == "__main__":
-    main()

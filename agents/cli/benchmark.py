@@ -62,9 +62,9 @@ def benchmark_command(
     if verify is not None:
         _verify(verify, sample, tolerance, workers, as_json)
         return
-    from agents.benchmarking.contestants import CLASSICAL
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars
+    from agents.controllers.designs import CLASSICAL
 
     if out is None:
         fail("--out: no folder found, expected one for the results: --out results/", 2)

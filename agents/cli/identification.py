@@ -88,13 +88,13 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
 def _judge(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
-    from identification.validation.warnings import concerns, why_unstable
+    from identification.validation.warnings import model_warnings, why_unstable
 
     instability = why_unstable(result)
     if instability is not None:
         fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
-    for concern in concerns(result):
-        warn(concern)
+    for warning in model_warnings(result):
+        warn(warning)
 
 
 def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str | None, as_json: bool) -> None:

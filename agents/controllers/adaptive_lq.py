@@ -13,12 +13,12 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.batched_lq import lq_rows, sampled_ships
 from agents.controllers.linear_loop import SIGNALS, length_time
 from agents.controllers.lq import LQ
-from agents.controllers.stateful import Flags, Stateful, heading_error
+from agents.controllers.memory import Flags, Floats, deviations
+from agents.controllers.stateful import Stateful
 from identification.estimators.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
 from shipgym.envs.task import RUDDER_WEIGHT
@@ -26,8 +26,6 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import LARGEST_RUDDER, linearise, straight_running
 from shipgym.trials.sensors import SEA_TRIAL
-
-Floats = NDArray[np.float64]
 
 # Sway and yaw acceleration each are explained by sway, yaw rate, rudder and what is always there, in the
 # prime system with the instantaneous speed.
@@ -172,14 +170,7 @@ class AdaptiveLQ(Stateful):
         if len(due):
             kept[due] = self._redesigned(kept[due])
         rudder, sway = kept[:, NEUTRAL].T
-        signals = (
-            seen["sway"] - sway,
-            seen["yaw_rate"],
-            heading_error(seen),
-            seen["rudder"] - rudder,
-            seen["heading_error_integral"],
-        )
-        order: Floats = rudder + np.einsum("ij,ij->i", kept[:, GAINS], np.stack(signals, axis=-1))
+        order: Floats = rudder + np.einsum("ij,ij->i", kept[:, GAINS], deviations(seen, rudder, sway))
         return order, kept
 
     @property

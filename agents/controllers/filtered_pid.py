@@ -12,17 +12,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, sample_ship
+from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.pid import PID
-from agents.controllers.stateful import Flags, Stateful, heading_error
+from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.envs.task import control_interval
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
-
-Floats = NDArray[np.float64]
 
 DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator (Fossen 2011, 11.1.2)
 # what is remembered: last measured error and yaw rate, the reference's lead over the course with its first

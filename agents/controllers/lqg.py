@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import (
     ERROR,
@@ -21,19 +20,17 @@ from agents.controllers.linear_loop import (
     YAW_RATE,
     Compensator,
     length_time,
-    rate_weight,
     sample_ship,
 )
-from agents.controllers.lq import LQ, lq_gain
-from agents.controllers.stateful import Flags, Stateful, heading_error
+from agents.controllers.lq import LQ, lq_gain, lq_settings
+from agents.controllers.memory import Flags, Floats, heading_error
+from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
+from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.sensors import SEA_TRIAL
-
-Floats = NDArray[np.float64]
 
 OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
 COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two looks at it, rad
@@ -116,14 +113,10 @@ class LQG(Stateful):
         InputError
             If the model has no straight course, or an argument is out of its range.
         """
-        check_number(integral_lengths, "integral_lengths", above=0.0)
         check_number(noise, "noise", above=0.0)
         check_number(disturbance_deg, "disturbance_deg", above=0.0)
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        ship, weight = sample_ship(model, interval), rate_weight(model)
-        check_number(rudder_weight, "rudder_weight", above=0.0)
-        if rate_weight_s2 is not None:
-            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
+        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
+        ship = sample_ship(model, interval)
         gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
         transition, effect = rudder_response(model, ship.about, interval)
         push = np.radians(disturbance_deg) * effect

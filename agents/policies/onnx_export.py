@@ -25,9 +25,8 @@ from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller_file import controller_content
 from agents.policies.policy import ORDERS, LearnedPolicy
-from agents.policies.policy_file import as_json
+from agents.policies.weights_file import as_json
 from shipgym.errors import InputError
 from shipgym.whole_file import write_bytes
 
@@ -132,7 +131,7 @@ def _metadata(policy: LearnedPolicy) -> dict[str, str]:
         "action": policy.action,
         "authority": policy.authority,
         "hold": policy.hold,
-        "base": None if policy.base is None else controller_content(policy.base),
+        "base": None if policy.base is None else policy.base.to_dict(),
         "environment": {"id": policy.env_id, "options": as_json(policy.env_options)},
         "model": {"name": policy.model_name, "sha256": policy.model_sha256},
     }

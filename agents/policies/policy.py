@@ -20,8 +20,11 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import Action, Controller, check_names, check_scales
+from agents.controllers.controller import FORMAT, Action, Controller, check_names, check_scales
+from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
+from agents.policies.policy_extraction import sb3_fields
+from agents.policies.weights_file import Tensors, as_json, write_policy
 from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.path_following_task import PathFollowingTask
@@ -149,8 +152,6 @@ class LearnedPolicy:
         InputError
             For an agent or a wrapper that cannot be written as such a policy.
         """
-        from agents.policies.policy_extraction import sb3_fields
-
         return cls(**sb3_fields(agent, env), training=dict(training or {}))
 
     @property
@@ -168,39 +169,13 @@ class LearnedPolicy:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """Commands for one or many observations, with the signature of stable-baselines3.
+        """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
 
-        Parameters
-        ----------
-        observation : array-like of shape (n_observations,) or (n, n_observations)
-            Of the environment that it learned in, or of one that shows more after these.
-        state : Memory, optional
-            What the last call handed back; None where episodes begin.
-        episode_start : bool or array-like of bool of shape (n,), optional
-            Where an episode begins and the state is that of the one before.
-        deterministic
-            Not used: it always gives the mean of what it learned, or its most likely order.
-
-        Returns
-        -------
-        action : float32 array of shape (n_commands,) or (n, n_commands)
-            Parts of the limits, in [-1, 1]; of discrete orders the order itself, not its number
-            (`order_numbers` gives it).
-        state
-            As given, or a `Memory` if there is a history or a base, or outputs are held.
-
-        Raises
-        ------
-        InputError
-            If the observation has fewer entries or another number of dimensions, or the state is not one of
-            as many ships.
+        Of discrete orders the order itself is returned, not its number (`order_numbers` gives it). The state
+        is a `Memory` if there is a history or a base, or outputs last, else as given.
         """
-        given, n = np.asarray(observation, dtype=np.float32), len(self.observation_names)
-        if given.ndim not in (1, 2) or given.shape[-1] < n:
-            raise InputError(
-                f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: "
-                f"{self.observation_names[-1]!r} is the last that the policy needs"
-            )
+        n = len(self.observation_names)
+        given = checked_observation(observation, self.observation_names, np.float32)
         rows = given.reshape(-1, given.shape[-1])
         if self.history == 1 and self.base is None and self.hold == 1:
             action = self.commands(self.network(rows[:, :n]), None)
@@ -247,19 +222,13 @@ class LearnedPolicy:
             return present, None, nothing
         if not isinstance(state, tuple) or len(state) != len(Memory._fields):
             raise InputError(
-                f"state: {type(state).__name__} found, expected what the last predict handed back, or None "
+                f"state: {type(state).__name__} found, expected what the last predict returned, or None "
                 f"where episodes begin"
             )
         seen, inner, held = state
         expected = (n, past, rows.shape[1])
-        if np.shape(seen) != (expected if ndim == 2 else expected[1:]):
-            raise InputError(
-                f"state: shape {np.shape(seen)} found, expected {expected if ndim == 2 else expected[1:]}: "
-                f"what the last predict of as many ships handed back, or None where episodes begin"
-            )
-        flags = np.asarray(False if starts is None else starts, dtype=np.bool_).reshape(-1)
-        if flags.size not in (1, n):
-            raise InputError(f"episode_start: {flags.size} found, expected one for each of {n} ships")
+        seen = checked_memory(seen, expected if ndim == 2 else expected[1:])
+        flags = checked_starts(starts, (n,))
         held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
         return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner, held
 
@@ -305,9 +274,32 @@ class LearnedPolicy:
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
-        from agents.policies.policy_file import save
+        write_policy(*self.file_fields(), Path(path))
 
-        save(self, Path(path))
+    def file_fields(self) -> tuple[dict[str, Any], Tensors]:
+        """What stands in its JSON, and its weights by name."""
+        network, tensors = self.network, Tensors()
+        for i, (weight, bias) in enumerate(network.layers):
+            tensors[f"layers.{i}.weight"] = np.ascontiguousarray(weight)
+            tensors[f"layers.{i}.bias"] = np.ascontiguousarray(bias)
+        content = {
+            "format": FORMAT,
+            "kind": "learned",
+            "observation_names": list(self.observation_names),
+            "observation_scales": list(self.observation_scales),
+            "action": self.action,
+            "network": {
+                "activation": network.activation, "output": network.output, "sizes": list(network.sizes)
+            },
+            "history": self.history,
+            "base": None if self.base is None else self.base.to_dict(),
+            "authority": self.authority,
+            "hold": self.hold,
+            "environment": {"id": self.env_id, "options": as_json(self.env_options)},
+            "model": {"name": self.model_name, "sha256": self.model_sha256},
+            "training": as_json(self.training),
+        }  # fmt: skip
+        return content, tensors
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller, model_hash
 from agents.policies.network import Layer, Network
-from agents.policies.policy_file import as_json
+from agents.policies.weights_file import as_json
 from shipgym.errors import InputError
 
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}

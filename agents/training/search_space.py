@@ -121,7 +121,7 @@ def with_parameters(settings: Settings, parameters: Mapping[str, Any]) -> Settin
     given = {name: value for name, value in parameters.items() if name not in STANDS_FOR}
     if "one_minus_gamma" in parameters:
         given["gamma"] = 1.0 - parameters["one_minus_gamma"]
-    for name in given.keys() & set(settings.WIDTHS):
+    for name in given.keys() & {"net_arch", "critic_arch"}:
         given[name] = [int(width) for width in parameters[name].split()]
     if "minibatches" in parameters:
         n_steps = given.get("n_steps", settings.to_dict()["n_steps"])

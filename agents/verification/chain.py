@@ -60,11 +60,11 @@ def build_autopilot(
     draws : int
         Number of models drawn from the coefficient covariance, at least 2.
     seed : int
-        Of the draws and of the episodes flown.
+        Of the draws and of the episodes.
     options : mapping, optional
         Of `identify`, by name, trials by file; those not given are the ship file's.
     agents : sequence of str or Path
-        Files of autopilots to fly beside PID and LQ, or names of pretrained ones (`load_agent`).
+        Files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`).
     progress : callable, optional
         Called as the work goes on.
     where : Engine
@@ -151,7 +151,7 @@ def verify(
     where: Engine = HERE,
     guests: Sequence[Agent] = (),
 ) -> Verification:
-    """Design PID and LQ on a model and fly them, and guests, over models drawn from its covariance.
+    """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def verify(
     InputError
         If no autopilot can be designed on it.
     """
-    from agents.rollouts.flight import fly, step_response
+    from agents.rollouts.course_keeping import sail, step_response
 
     stage = "models drawn"
     _tell(progress, stage, 0, draws)
@@ -191,23 +191,23 @@ def verify(
         progress=lambda done: _tell(progress, stage, done, draws),
     )
     seeds = seed + np.arange(draws)
-    flights = [*found.flights, *(fly(guest, found.draws, seeds=seeds) for guest in guests)]
+    episodes = [*found.episodes, *(sail(guest, found.draws, seeds=seeds) for guest in guests)]
     lost = found.manoeuvres.unstable
     stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
-    pilots, flown = [], [*controllers, *guests]
-    keys = _told_apart([str(one.name) for one in flown])
-    for k, (controller, flight) in enumerate(zip(flown, flights, strict=True)):
-        _tell(progress, "step responses", k, len(flown))
+    pilots, autopilots = [], [*controllers, *guests]
+    keys = _told_apart([str(one.name) for one in autopilots])
+    for k, controller in enumerate(autopilots):
+        _tell(progress, "step responses", k, len(autopilots))
         step = step_response(controller, [model, *stable], STEP_DEG)
-        pilots.append(Pilot(keys[k], controller, flight, step))
-    _tell(progress, "step responses", len(flown), len(flown))
+        pilots.append(Pilot(keys[k], controller, episodes[k], step))
+    _tell(progress, "step responses", len(autopilots), len(autopilots))
     return Verification(
         draws=draws,
         seed=seed,
         manoeuvres=found.manoeuvres,
         course_unstable=found.course_unstable,
         nomoto=nomoto(model),
-        pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.flights.cost)))),
+        pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.episodes.cost)))),
         refused=refused,
     )
 
@@ -221,7 +221,7 @@ def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     if more := [name for name in guest.observation_names if name not in names]:
         raise InputError(
             f"{where}: it observes {quoted(more)}, which course keeping does not show; expected an agent for "
-            "course keeping, such as mariner-calm-ppo; paths are flown by shipgym benchmark"
+            "course keeping, such as mariner-calm-ppo; for paths there is shipgym benchmark"
         )
     guest.check_fits(names, [one.scale for one in shown], where)
 

@@ -72,4 +72,3 @@ class FitTask:
 
 
 Estimators = dict[str, Estimator]
-Machine = Estimator

@@ -22,9 +22,10 @@ from agents.benchmarking.page_replays import (
     replayable,
     worst_of,
 )
-from agents.benchmarking.suite import load_suite
+from agents.benchmarking.replays import EpisodeId, rerun
 from agents.cli import app
-from agents.rollouts.refly import Flight, recorded, refly
+from agents.rollouts.episodes import recorded
+from agents.suites.suite import load_suite
 from shipgym.errors import InputError
 from tests.agents.browser import COMMAND, Browser
 
@@ -98,8 +99,8 @@ def test_too_many_runs_are_cut_down(result, monkeypatch):
 
 
 def test_what_is_flown_again_costs_the_same(result):
-    flights = [Flight("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
-    reflown = refly(result, flights)
+    flights = [EpisodeId("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
+    reflown = rerun(result, flights)
     assert (reflown.different, reflown.refused) == ((), {})
     for flight in flights:
         flown = reflown.episodes[flight]
@@ -169,16 +170,16 @@ def test_a_changed_result_is_told(result):
     costs = result.episodes["cost"].copy()
     result.episodes["cost"] = costs * 1.001
     try:
-        flight = Flight("pid", "mariner-calm", 0, FIRST)
-        assert refly(result, [flight]).different == (flight,)
+        flight = EpisodeId("pid", "mariner-calm", 0, FIRST)
+        assert rerun(result, [flight]).different == (flight,)
     finally:
         result.episodes["cost"] = costs
 
 
 def test_objects_are_replayed_where_they_are_given(result):
-    flight = Flight(Lazy.name, "mariner-calm", 0, FIRST)
-    assert "given as an object" in refly(result, [flight]).refused[Lazy.name, "mariner-calm"]
-    given = refly(result, [flight], {Lazy.name: Lazy()})
+    flight = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
+    assert "given as an object" in rerun(result, [flight]).refused[Lazy.name, "mariner-calm"]
+    given = rerun(result, [flight], {Lazy.name: Lazy()})
     assert (given.refused, given.different) == ({}, ())
     assert not given.episodes[flight].actions.any()
 
@@ -290,7 +291,7 @@ def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
 
 def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
     opened.run("document.querySelector('#ranking-table thead button').focus()")
-    opened.press(" ", "Space")
+    opened.press("Space")
     names = column(opened, "ranking-table", 0)
     assert names == sorted(names)
     table = "document.querySelector('#improvement-table')"
@@ -318,7 +319,7 @@ def test_tabs_show_one_task_at_a_time(opened):
     shown = "[...document.querySelectorAll('[role=tabpanel]')].filter((p) => !p.hidden).map((p) => p.id)"
     assert opened.run(shown) == ["task-mariner-calm"]
     opened.run("document.querySelector('[role=tab]').focus()")
-    opened.press("ArrowRight", "ArrowRight")
+    opened.press("ArrowRight")
     assert opened.run(shown) == ["task-mariner-current"]
     opened.run("document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()")
     opened.wait(f"{shown}[0] === 'task-mariner-calm'")

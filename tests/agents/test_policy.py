@@ -106,7 +106,7 @@ def test_what_was_no_number_is_not_held():
 
 @pytest.mark.parametrize("state", [3, (1, 2), "state"])
 def test_a_state_that_is_none_is_refused(state):
-    with pytest.raises(InputError, match=r"state: .* found, expected what the last predict handed back"):
+    with pytest.raises(InputError, match=r"state: .* found, expected what the last predict returned"):
         random_policy(history=2).predict(SEEN, state)
 
 

@@ -6,18 +6,21 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from typing import Any
 
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Controller, model_hash
-from agents.controllers.controller_file import HOMES
-from agents.controllers.los_autopilot import LAWS
-from shipgym.checks import check_choice
+from agents.controllers.registry import BUILT_IN, controller_class
+from agents.suites.reference import load_tuned
+from agents.suites.suite import BenchmarkTask
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 
+CLASSICAL = BUILT_IN  # in an order in which those come first that others build on
+#: Of these, no bases for policies unless asked for by name, being slow: MPC, which needs an extra too, solves
+#: for one ship after another, and adaptive LQ estimates while the policy learns; an action takes them 64 and
+#: 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
+NO_BASES = ("mpc", "lq-adaptive")
 INNER = "lq_"  # before settings of the LQ that a guidance law leads
 
 
@@ -27,7 +30,7 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     Parameters
     ----------
     kind : str
-        Of the controller file's kinds.
+        As registered (`agents.controllers.registry`).
     task : BenchmarkTask
         Its ship and control interval; of a guidance law also its path's lookahead and corridor.
     settings : mapping of str, optional
@@ -38,18 +41,46 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     InputError
         If there is no such design for the ship, or guidance has no path to follow.
     """
-    home, name = HOMES[check_choice(kind, HOMES, "controller")]
+    made: Any = controller_class(kind)
     given = settings or {}
-    if kind not in LAWS:
+    if not made.has_autopilot:
         written = json.dumps(dict(given), sort_keys=True)
-        return _designed(home, name, _Ship(task.ship), task.task.interval(task.ship), written)
+        return _designed(made, _Ship(task.ship), task.task.interval(task.ship), written)
     if not isinstance(task.task, PathFollowingTask):
         raise no_path(kind, task)
     inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
     own = {key: value for key, value in given.items() if not key.startswith(INNER)}
-    law: Any = getattr(import_module(home), name)
-    guide: Controller = law.from_model(task.ship, autopilot=design("lq", task, inner), task=task.task, **own)
+    guide: Controller = made.from_model(task.ship, autopilot=design("lq", task, inner), task=task.task, **own)
     return guide
+
+
+def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
+    """A classical controller with the settings found for a task of a suite.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`.
+    task : BenchmarkTask
+    suite : str
+        Its name.
+
+    Raises
+    ------
+    InputError
+        If there are no such settings.
+    """
+    found = load_tuned(suite).get(task.name, {})
+    without = {"best": (), "base": NO_BASES}.get(kind)
+    if without is not None:
+        costs = {name: float(one["cost"]) for name, one in found.items() if name not in without}
+        kind = min(costs, key=costs.__getitem__, default=kind)
+    if kind not in found:
+        raise InputError(
+            f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
+            f"{', '.join(found) or 'none'}"
+        )
+    return design(kind, task, found[kind]["settings"])
 
 
 def no_path(kind: str, task: BenchmarkTask) -> InputError:
@@ -59,8 +90,7 @@ def no_path(kind: str, task: BenchmarkTask) -> InputError:
 
 
 @lru_cache(maxsize=256)
-def _designed(home: str, name: str, ship: _Ship, dt: float, settings: str) -> Controller:
-    kind: Any = getattr(import_module(home), name)
+def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
     made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
     return made
 

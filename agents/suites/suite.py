@@ -20,7 +20,7 @@ import hashlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -112,7 +112,7 @@ class BenchmarkTask:
         num_envs : int
             Number of ships.
         model : ShipModel, optional
-            Another ship to fly the same task with.
+            Another ship for the same task.
         threads : int
             Of the kernels.
         """
@@ -162,6 +162,7 @@ def list_suites() -> list[str]:
     )
 
 
+@lru_cache(maxsize=4)
 def load_suite(name: str = DEFAULT_SUITE) -> Suite:
     """Read a shipped suite.
 

@@ -1,11 +1,11 @@
-"""Flights over many ships: complete, repeatable, and clear about controllers that do not answer."""
+"""Rollouts over many ships: complete, repeatable, and clear about controllers that do not answer."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from agents import LQ, PID, fly, step_response
+from agents import LQ, PID, sail, step_response
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -50,32 +50,32 @@ def fleet(n, seed=0):
 
 def test_an_episode_depends_on_its_ship_and_seed_alone():
     ships, seeds = fleet(70), np.arange(70) + 5
-    together = fly(PILOT, ships, SHORT, seeds)
-    again = fly(PILOT, ships, SHORT, seeds)
+    together = sail(PILOT, ships, SHORT, seeds)
+    again = sail(PILOT, ships, SHORT, seeds)
     np.testing.assert_array_equal(together.cost, again.cost)
     for i in (0, 33, 69):
-        alone = fly(PILOT, ships[i], SHORT, seeds=[seeds[i]])
+        alone = sail(PILOT, ships[i], SHORT, seeds=[seeds[i]])
         assert alone.cost[0] == together.cost[i]
         assert alone.rudder_travel_deg_min[0] == together.rudder_travel_deg_min[i]
 
 
 def test_seeds_give_the_results_their_shape():
     ships = fleet(3)
-    grid = fly(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
+    grid = sail(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
     assert grid.cost.shape == grid.terminated.shape == grid.heading_rmse_deg.shape == (3, 4)
-    assert grid.cost[2, 1] == fly(PILOT, ships[2], SHORT, seeds=9).cost
-    assert fly(PILOT, ships, SHORT, seeds=7).cost.tolist() == [
-        float(fly(PILOT, ship, SHORT, seeds=7).cost) for ship in ships
+    assert grid.cost[2, 1] == sail(PILOT, ships[2], SHORT, seeds=9).cost
+    assert sail(PILOT, ships, SHORT, seeds=7).cost.tolist() == [
+        float(sail(PILOT, ship, SHORT, seeds=7).cost) for ship in ships
     ]
 
 
 def test_costs_add_up_and_are_those_of_the_environment():
     import gymnasium as gym
 
-    flights = fly(PILOT, MARINER, SHORT, seeds=np.arange(5))
-    parts = flights.heading_cost + flights.rudder_cost + flights.rudder_rate_cost + flights.end_cost
-    np.testing.assert_allclose(flights.cost, parts)
-    assert np.all(flights.duration_s == 150.0)
+    episodes = sail(PILOT, MARINER, SHORT, seeds=np.arange(5))
+    parts = episodes.heading_cost + episodes.rudder_cost + episodes.rudder_rate_cost + episodes.end_cost
+    np.testing.assert_allclose(episodes.cost, parts)
+    assert np.all(episodes.duration_s == 150.0)
     env = gym.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
     observation, _ = env.reset(seed=0)
     cost, errors, over = 0.0, [], False
@@ -84,26 +84,28 @@ def test_costs_add_up_and_are_those_of_the_environment():
         cost -= reward
         errors.append(info["heading_error"])
         over = terminated or truncated
-    flight = fly(PILOT, MARINER, SHORT, seeds=0)
-    assert flight.cost == pytest.approx(cost, rel=1e-6)
-    assert flight.heading_rmse_deg == pytest.approx(np.degrees(np.sqrt(np.mean(np.square(errors)))), rel=1e-6)
+    episode = sail(PILOT, MARINER, SHORT, seeds=0)
+    assert episode.cost == pytest.approx(cost, rel=1e-6)
+    assert episode.heading_rmse_deg == pytest.approx(
+        np.degrees(np.sqrt(np.mean(np.square(errors)))), rel=1e-6
+    )
 
 
 def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
-    flights = fly(PILOT, [MARINER, TURNED, MARINER], SHORT, seeds=[1, 1, 1])
-    assert flights.terminated.tolist() == [False, True, False]
-    assert flights.cost[0] == flights.cost[2] < 0.05 * flights.cost[1]
-    remaining = 150.0 - flights.duration_s[1]
+    episodes = sail(PILOT, [MARINER, TURNED, MARINER], SHORT, seeds=[1, 1, 1])
+    assert episodes.terminated.tolist() == [False, True, False]
+    assert episodes.cost[0] == episodes.cost[2] < 0.05 * episodes.cost[1]
+    remaining = 150.0 - episodes.duration_s[1]
     assert 0.0 < remaining < 150.0
-    assert flights.end_cost.tolist() == pytest.approx([0.0, 9.0 * remaining, 0.0])
+    assert episodes.end_cost.tolist() == pytest.approx([0.0, 9.0 * remaining, 0.0])
 
 
 def test_a_ship_without_a_helmsman_costs_its_heading_error():
     task = CourseKeepingTask(episode_steps=100, course_change_deg=0.0)
-    flights = fly(AMIDSHIPS, MARINER, task, seeds=[0])
-    assert flights.rudder_travel_deg_min[0] == 0.0
-    assert flights.cost[0] == flights.heading_cost[0] > 0.0
-    assert flights.extrapolating[0] == 0.0
+    episodes = sail(AMIDSHIPS, MARINER, task, seeds=[0])
+    assert episodes.rudder_travel_deg_min[0] == 0.0
+    assert episodes.cost[0] == episodes.heading_cost[0] > 0.0
+    assert episodes.extrapolating[0] == 0.0
 
 
 def test_step_responses_of_many_ships_are_those_of_each():
@@ -153,7 +155,7 @@ def test_a_lost_ship_stays_where_it_was_lost():
 )
 def test_a_controller_that_gives_no_command_is_named(answer, message):
     with pytest.raises(InputError, match=message):
-        fly(Helmsman(answer), MARINER, SHORT, seeds=[0, 1])
+        sail(Helmsman(answer), MARINER, SHORT, seeds=[0, 1])
     with pytest.raises(InputError, match=message):
         step_response(Helmsman(answer), [MARINER, MARINER])
 
@@ -161,11 +163,11 @@ def test_a_controller_that_gives_no_command_is_named(answer, message):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: fly(PILOT, mariner(4.0)), "model 'mariner': the scale of 'yaw_rate'"),
-        (lambda: fly(PILOT, []), "models: none found"),
-        (lambda: fly(PILOT, fleet(3), seeds=[1, 2]), r"seeds: shape \(2,\) found, expected \(3,\)"),
-        (lambda: fly(PILOT, MARINER, seeds=[0.5]), r"seeds: \[0.5\] found, expected integers"),
-        (lambda: fly(PILOT, MARINER, seeds=[]), r"seeds: \[\] found, expected integers"),
+        (lambda: sail(PILOT, mariner(4.0)), "model 'mariner': the scale of 'yaw_rate'"),
+        (lambda: sail(PILOT, []), "models: none found"),
+        (lambda: sail(PILOT, fleet(3), seeds=[1, 2]), r"seeds: shape \(2,\) found, expected \(3,\)"),
+        (lambda: sail(PILOT, MARINER, seeds=[0.5]), r"seeds: \[0.5\] found, expected integers"),
+        (lambda: sail(PILOT, MARINER, seeds=[]), r"seeds: \[\] found, expected integers"),
         (lambda: step_response(PILOT, MARINER, 120.0), "step_deg: 120 found"),
         (lambda: step_response(PILOT, MARINER, duration=0.0), "duration: 0 found"),
     ],
@@ -175,14 +177,28 @@ def test_arguments_that_do_not_fit_are_refused(call, message):
         call()
 
 
-def test_a_model_found_unstable_is_flown_only_where_asked():
+def test_a_model_found_unstable_is_steered_only_where_asked():
     marked = replace(MARINER, provenance={"stable": False})
-    for sail in (fly, step_response):
+    for call in (sail, step_response):
         with pytest.raises(InputError, match="found unstable when it was identified"):
-            sail(PILOT, marked, task=SHORT)
+            call(PILOT, marked, task=SHORT)
         with pytest.warns(UserWarning, match="found unstable when it was identified"):
-            asked = sail(PILOT, marked, task=SHORT, allow_unstable=True)
-        plain = sail(PILOT, MARINER, task=SHORT)
+            asked = call(PILOT, marked, task=SHORT, allow_unstable=True)
+        plain = call(PILOT, MARINER, task=SHORT)
         np.testing.assert_array_equal(
-            *(found.cost if sail is fly else found.heading for found in (asked, plain))
+            *(found.cost if call is sail else found.heading for found in (asked, plain))
         )
+
+
+def test_the_first_names_still_work():
+    import agents
+
+    assert (agents.fly, agents.Flights) == (agents.sail, agents.Episodes)
+
+
+def test_more_ships_than_are_steered_at_once_are_steered_in_groups(monkeypatch):
+    seeds = np.arange(5)
+    whole = sail(PILOT, MARINER, SHORT, seeds)
+    monkeypatch.setattr("agents.rollouts.course_keeping.AT_ONCE", 2)
+    for ships in (MARINER, [MARINER] * 5):
+        np.testing.assert_array_equal(whole.cost, sail(PILOT, ships, SHORT, seeds).cost)

@@ -21,10 +21,10 @@ from shipgym.errors import InputError
 from shipgym.json_file import read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
-LONGEST_IN_MESSAGE = 200
+LONGEST_IN_MESSAGE = 200  # characters
 
 
-def job_text(job: Any, where: str) -> str:
+def serialised(job: Any, where: str) -> str:
     """A job as text, its keys in the order in which they are.
 
     Raises
@@ -110,7 +110,7 @@ class KeptResults:
         self.folder = Path(folder)
         self.function = f"{function.__module__}.{function.__qualname__}"
         if self.folder.exists() and not self.folder.is_dir():
-            raise InputError(f"{folder}: is no folder, expected one for results; choose another")
+            raise InputError(f"{folder}: is not a folder, expected one for results; choose another")
 
     def load(self, text: str) -> dict[str, Any] | None:
         """The packed result of a job, None where there is none yet or its file is broken."""
