@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.estimators.methods import Estimators, FitTask, Method
+from identification.estimators.methods import Method
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
