@@ -17,8 +17,8 @@ import shipgym
 from shipgym.engine.compiled import CACHE_VARIABLE
 
 NEEDED = (
-    "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs", "joblib",
-    "safetensors", "lazy-loader",
+    "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
+    "joblib", "safetensors", "lazy-loader",
 )  # fmt: skip
 EXTRAS = {
     "report": ("plotly",),
