@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.regression.samples import Samples
 from identification.search import SearchResult
 from identification.validation.diagnostics import EquationDiagnostics
@@ -36,7 +36,7 @@ class Fit:
         Those predicted, as they were given, marked "fit" or "validate".
     samples : Samples
         The regression.
-    machines : dict of str to Machine
+    estimators : dict of str to Estimator
         Fitted to it, by equation.
     settings : dict
         The arguments that `identify` was called with, defaults among them, as JSON knows them.
@@ -52,7 +52,7 @@ class Fit:
     predictions: dict[str, Trial | None]
     trials: tuple[Trial, ...]
     samples: Samples
-    machines: dict[str, Machine]
+    estimators: dict[str, Estimator]
     settings: dict[str, Any]
     searches: dict[str, SearchResult] = field(default_factory=dict)
 

@@ -187,7 +187,7 @@ def _evaluated(
         predictions=predictions,
         trials=trials,
         samples=problem.samples,
-        machines=fit.estimators,
+        estimators=fit.estimators,
         settings=call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )

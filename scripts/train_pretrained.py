@@ -28,7 +28,7 @@ from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 AGENTS = Path(__file__).parents[1] / "agents"
 PRETRAINED = AGENTS / "pretrained"

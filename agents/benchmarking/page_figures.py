@@ -104,7 +104,7 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     least, most = (costs.min(), costs.max()) if len(costs) else (0.0, 0.0)
     kind = "log" if least > 0.0 and most > LOGARITHMIC * least else "linear"
     figure.update_layout(_layout(34 * len(names) + 70, hovermode="closest"))
-    marks = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
+    marks: dict[str, Any] = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
     costs_axis = axis("cost of an episode", type=kind, **marks)
     label(figure, costs_axis, axis(autorange="reversed", automargin=True))
     return figure
@@ -201,4 +201,5 @@ def _line(x: Any, y: Any, name: str, style: tuple[str, str], width: float) -> An
 
 def _layout(height: int, **changes: Any) -> dict[str, Any]:
     """The shared layout without a legend: the page has one for all figures."""
-    return layout(height, **({"margin": MARGIN, "showlegend": False, "hovermode": "x"} | changes))
+    shared: dict[str, Any] = {"margin": MARGIN, "showlegend": False, "hovermode": "x"}
+    return layout(height, **(shared | changes))

@@ -46,7 +46,7 @@ from agents.controllers.controller import model_hash
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
 from shipgym.checks import check_choice, check_keys, check_table
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 Floats = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.plots import graph_objects
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto

@@ -20,6 +20,7 @@ from agents.verification.figures import (
 )
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.report.view import fit_view, trial_figures
+from shipgym.files import write_text
 from shipgym.pages import NONE, render
 
 SURE = 0.95  # probability of passing from which on a criterion counts as met
@@ -65,7 +66,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         step_deg=STEP_DEG,
         infinity=np.inf,
     )
-    Path(path).write_text(page, encoding="utf-8")
+    write_text(page, Path(path))
 
 
 def verification_view(found: Verification) -> dict[str, Any]:
@@ -92,7 +93,7 @@ def verification_view(found: Verification) -> dict[str, Any]:
         "learned": [pilot.name for pilot in _by_name(found) if pilot.design is None],
         "refused": found.refused,
         "cheaper": [
-            (other.name, float(np.mean(first.flights.cost < other.flights.cost))) for other in others
+            (other.name, float(np.mean(first.episodes.cost < other.episodes.cost))) for other in others
         ],
     }
 
@@ -115,7 +116,7 @@ def headline(found: Verification) -> str:
     if unstable:
         imo += f" {unstable} of {found.draws} models drawn run away in a manoeuvre."
     best = found.pilots[0]
-    lost = int(np.sum(best.flights.terminated))
+    lost = int(np.sum(best.episodes.terminated))
     control = f"keeps control of all {found.draws} models drawn"
     if lost:
         control = f"loses control of {lost} of {found.draws} models drawn"
@@ -136,16 +137,16 @@ def _criteria(found: Verification) -> list[dict[str, Any]]:
 
 def _pilot(pilot: Pilot) -> dict[str, Any]:
     """A row of the ranking: means and 95 % quantiles over the models drawn."""
-    flights = pilot.flights
+    episodes = pilot.episodes
     return {
         "name": pilot.name,
-        "lost": int(np.sum(flights.terminated)),
-        "cost": float(np.mean(flights.cost)),
-        "cost_95": float(np.quantile(flights.cost, BAND[1])),
-        "heading": float(np.mean(flights.heading_rmse_deg)),
-        "heading_95": float(np.quantile(flights.heading_rmse_deg, BAND[1])),
-        "rudder_travel": float(np.mean(flights.rudder_travel_deg_min)),
-        "extrapolating": float(np.mean(flights.extrapolating)),
+        "lost": int(np.sum(episodes.terminated)),
+        "cost": float(np.mean(episodes.cost)),
+        "cost_95": float(np.quantile(episodes.cost, BAND[1])),
+        "heading": float(np.mean(episodes.heading_rmse_deg)),
+        "heading_95": float(np.quantile(episodes.heading_rmse_deg, BAND[1])),
+        "rudder_travel": float(np.mean(episodes.rudder_travel_deg_min)),
+        "extrapolating": float(np.mean(episodes.extrapolating)),
     }
 
 
@@ -169,7 +170,7 @@ def _figures(result: AutopilotResult, found: Verification) -> dict[str, Any]:
         "criteria": criteria_figure(found.manoeuvres.criteria),
         "manoeuvres": manoeuvres_figure(found.manoeuvres, _length(result)),
         "steps": steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
-        "costs": costs_figure({pilot.name: pilot.flights.cost for pilot in pilots}),
+        "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in pilots}),
     }
 
 

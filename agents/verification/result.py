@@ -52,11 +52,6 @@ class Pilot:
         return self.key.upper()
 
     @property
-    def flights(self) -> Episodes:
-        """The first name of `episodes`."""
-        return self.episodes
-
-    @property
     def design(self) -> Controller | None:
         """The controller, if it is one that was designed: with gains and margins."""
         return self.controller if isinstance(self.controller, Controller) else None

@@ -68,7 +68,7 @@ def regression_figures(fit: Fit) -> dict[str, Figure]:
 
 def fit_figure(fit: Fit) -> Figure:
     """Mean acceleration over each window, as the trials have it and as the regression explains it."""
-    samples, equations = fit.samples, list(fit.machines)
+    samples, equations = fit.samples, list(fit.estimators)
     figure = subplots(
         len(equations), 2, column_widths=[0.7, 0.3], horizontal_spacing=0.1,
         vertical_spacing=0.24 / len(equations),
@@ -78,7 +78,7 @@ def fit_figure(fit: Fit) -> Figure:
     for row, q in enumerate(equations, start=1):
         factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
         measured = (samples.targets[q] * factor)[drawn]
-        explained = (fit.machines[q].predict(samples.features[q]) * factor)[drawn]
+        explained = (fit.estimators[q].predict(samples.features[q]) * factor)[drawn]
         for values, name, colour, width in (
             (measured, "trials", MEASURED, 1.2),
             (explained, "regression", MODEL, 1.7),
@@ -107,7 +107,7 @@ def fit_figure(fit: Fit) -> Figure:
 
 def residual_figure(fit: Fit) -> Figure:
     """Autocorrelation of the residuals and their cross-correlation with the rudder, with 95 % bounds."""
-    errors, equations = residuals(fit.machines, fit.samples), list(fit.machines)
+    errors, equations = residuals(fit.estimators, fit.samples), list(fit.estimators)
     rows = without_overlap(fit.samples)
     rudder = rudder_at_windows(fit)
     figure = subplots(
@@ -162,9 +162,10 @@ def rudder_at_windows(fit: Fit) -> Floats | None:
 def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
     """The estimators, by equation, that chose or were given a rank."""
     return {
-        q: machine
-        for q, machine in fit.machines.items()
-        if isinstance(machine, TruncatedLSSVM) and (machine.selection != "full" or machine.rank is not None)
+        q: estimator
+        for q, estimator in fit.estimators.items()
+        if isinstance(estimator, TruncatedLSSVM)
+        and (estimator.selection != "full" or estimator.rank is not None)
     }
 
 
@@ -174,8 +175,8 @@ def l_curve_figure(fit: Fit) -> Figure:
     titles = [f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}" for q, m in curves.items()]
     figure = subplots(1, len(curves), titles=titles, horizontal_spacing=0.09)
     go = graph_objects()
-    for column, machine in enumerate(curves.values(), start=1):
-        curve, rank = machine.l_curve_, machine.rank_
+    for column, estimator in enumerate(curves.values(), start=1):
+        curve, rank = estimator.l_curve_, estimator.rank_
         ranks = [str(k) for k in range(1, len(curve.residual_norm) + 1)]
         place = {"row": 1, "col": column}
         x, y = compact(curve.residual_norm), compact(curve.solution_norm)
