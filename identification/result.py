@@ -76,7 +76,7 @@ class IdentificationResult(Fit):
                 for name in FILES:
                     if (Path(draft) / name).exists():
                         (Path(draft) / name).replace(folder / name)
-                    else:  # an earlier one would tell of another model
+                    else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:
             raise InputError(

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
 
-#: Further figures of a task: what the head says, and how a number is written.
+#: Further figures of a task: what the head shows, and how a number is written.
 METRICS = {
     "heading_rmse_deg": ("heading RMSE, deg", "number"),
     "cross_track_rmse_m": ("cross-track RMSE, m", "number"),
@@ -86,7 +86,7 @@ def write_page(
     """
     target = Path(path)
     check_page(target)
-    plotly_script()  # a missing extra shall be told before the work
+    plotly_script()  # refuse a missing extra before the work
     count, episodes = replayable(result, worst)
     replays = rerun(result, episodes, controllers, workers, progress)
     write_text(_page(result, replays, count), target)
@@ -127,7 +127,7 @@ def packed(text: str) -> str:
 
 
 def _failures(result: BenchmarkResult) -> list[str]:
-    """Who failed or could not take part."""
+    """Contestants that failed or could not take part."""
     failures = []
     for name, one in result.summary["contestants"].items():
         failures += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
@@ -177,8 +177,8 @@ def command(result: BenchmarkResult) -> str:
     """The command that makes these results; contestants that were objects stand as `...`."""
     about = result.summary
     sources = {name: one["source"] or "..." for name, one in about["contestants"].items()}
-    who = [source if source == name else f"{name}={source}" for name, source in sources.items()]
-    words = ["shipgym", "benchmark", "--controllers", ",".join(who), "--suite", about["suite"]["name"]]
+    given = [source if source == name else f"{name}={source}" for name, source in sources.items()]
+    words = ["shipgym", "benchmark", "--controllers", ",".join(given), "--suite", about["suite"]["name"]]
     if len(about["tasks"]) < len(load_suite(about["suite"]["name"]).tasks):
         words += ["--tasks", ",".join(about["tasks"])]
     if about["seeds"]["count"] != N_EPISODES:

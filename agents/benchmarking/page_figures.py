@@ -31,7 +31,7 @@ SAMPLES = 240  # of a line at most
 
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Colour and dashes of each contestant; the oracle is black."""
+    """Colour and dashes of each contestant; those of the oracle are dark and solid."""
     others = [name for name in names if name != ORACLE]
     found = {
         name: (COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)])

@@ -33,7 +33,7 @@ def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
 
 
 def bests_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Who has the lowest mean cost in a task, the same to rounding; the oracle does not count."""
+    """Names of the lowest mean cost in a task, several where equal to rounding; the oracle does not count."""
     costs = {
         name: result.summary["tasks"][task][name]["cost"]["value"] for name in contestants_of(result, task)
     }

@@ -20,7 +20,7 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     Parameters
     ----------
     paths : sequence of str or Path
-        Episode files, of one ship or of several; the page lays them over each other.
+        Episode files, of one ship or of several; the page shows them together.
     out : str or Path
         The HTML file; one that exists is replaced.
 
@@ -64,27 +64,27 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
 
 
 def player(title: str, data: Any) -> str:
-    """The page about data of runs.
+    """The page that replays runs.
 
     Parameters
     ----------
     title : str
         Of the window.
     data : dict or str
-        `runs` and `quantities` (`agents.rollouts.replay_series`); or a mark in the place of their JSON.
+        `runs` and `quantities` (`agents.rollouts.replay_series`); or a placeholder for them.
 
     Returns
     -------
     str
         HTML that loads nothing.
     """
-    return render("agents.rollouts/template.html", title=title, data=data)
+    return render("agents.rollouts/replay.html", title=title, data=data)
 
 
 def names(paths: Sequence[Path]) -> list[str]:
-    """What to call files: their names without ending, with as many folders as tell them apart.
+    """Titles of episode files: names without ending, with as many folders as needed to be different.
 
-    One that is given twice is numbered.
+    A file that is given twice is numbered.
     """
     stems = [path.absolute().with_suffix("").parts for path in paths]
     deepest = max(len(stem) for stem in stems)
@@ -96,5 +96,5 @@ def names(paths: Sequence[Path]) -> list[str]:
 
 
 def _earlier(called: Sequence[str]) -> list[int]:
-    """How often each name stood before."""
+    """How often each name occurred before."""
     return [called[:i].count(name) for i, name in enumerate(called)]

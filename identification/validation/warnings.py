@@ -49,13 +49,13 @@ def model_warnings(fit: Fit) -> list[str]:
     if _steers_to_port(model):
         found.append(
             "with the rudder to starboard the identified ship turns to port: likely a wrong rudder_positive "
-            "in [conventions], or a wrong sign of heading and yaw rate; settle this before using the model"
+            "in [conventions], or a wrong sign of heading and yaw rate; correct this before using the model"
         )
     guard = provenance.get("guard", {})
     if "rejected" in guard:
         found.append(
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
-            "held back; predictions far from the recorded manoeuvres deserve caution"
+            "held back; predictions far from the recorded manoeuvres are doubtful"
         )
     found += exactly_collinear(fit) + _lost_headings(fit)
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
@@ -120,7 +120,7 @@ def _why_lost(model: ShipModel) -> str:
         stable = False
     if stable:
         return "likely the model is taken beyond the manoeuvres that it was fitted to"
-    return "a ship that does not hold a course by itself magnifies small errors"
+    return "a ship that is unstable on a straight course magnifies small errors"
 
 
 def _steers_to_port(model: ShipModel) -> bool:

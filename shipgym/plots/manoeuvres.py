@@ -177,7 +177,7 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
-    """Yaw rate of pull-outs over the time since the rudder was put amidships; a stable ship's meet.
+    """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
 
     Parameters
     ----------

@@ -116,7 +116,7 @@ def label(
 
 
 def compact(values: ArrayLike) -> NDArray[np.float32]:
-    """Values in single precision: half the size in a file, and as fine as any screen."""
+    """Values in single precision: half the size in a file, and finer than a pixel."""
     return np.asarray(values, dtype=np.float32)
 
 

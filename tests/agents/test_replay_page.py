@@ -116,7 +116,7 @@ def test_keys_step_play_and_go_to_the_ends(opened):
     stopped = opened.run("time")
     assert 0 < stopped < END
     assert ship(opened)[1] == pytest.approx(-5.0 * stopped)
-    assert f"{stopped:.1f} s" in opened.run("find('told').textContent")
+    assert f"{stopped:.1f} s" in opened.run("find('status').textContent")
 
 
 def test_play_ends_at_the_end(opened):
@@ -126,7 +126,7 @@ def test_play_ends_at_the_end(opened):
     assert opened.run("find('play').textContent").strip() == "Play"
 
 
-def test_readouts_tell_the_state(opened):
+def test_readouts_show_the_state(opened):
     slide(opened, 100.0)
     assert readout(opened, "speed") == "5.00 m/s"
     assert readout(opened, "heading") == f"{np.degrees(0.2):.1f} deg"
