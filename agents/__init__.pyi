@@ -23,7 +23,11 @@ from .controllers.scheduled_lq import ScheduledLQ as ScheduledLQ
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .policies.shield import Shielded as Shielded
 from .policies.shield import interventions as interventions
-from .rollouts.flight import Flights as Flights
-from .rollouts.flight import StepResponses as StepResponses
-from .rollouts.flight import fly as fly
-from .rollouts.flight import step_response as step_response
+from .rollouts.course_keeping import Episodes as Episodes
+from .rollouts.course_keeping import Flights as Flights
+from .rollouts.course_keeping import StepResponses as StepResponses
+from .rollouts.course_keeping import fly as fly
+from .rollouts.course_keeping import sail as sail
+from .rollouts.course_keeping import step_response as step_response
+from .rollouts.rollout import Rollout as Rollout
+from .rollouts.rollout import rollout as rollout

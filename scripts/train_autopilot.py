@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from agents import load_agent
-from agents.benchmarking.designs import design
-from agents.rollouts.flying import episode_costs
+from agents.controllers.designs import design
+from agents.rollouts.rollout import episode_costs
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
 

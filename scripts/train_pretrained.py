@@ -21,14 +21,14 @@ from typing import Any
 import numpy as np
 
 from agents.agent_file import load_agent
-from agents.benchmarking.direct_search import tuned
-from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
+from agents.controllers.designs import tuned
 from agents.policies.policy import LearnedPolicy
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 AGENTS = Path(__file__).parents[1] / "agents"
 PRETRAINED = AGENTS / "pretrained"

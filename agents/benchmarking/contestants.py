@@ -28,15 +28,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Controller, Policy
-from agents.controllers.registry import BUILT_IN, controller_class, controller_kinds, register_controller
+from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.controllers.registry import controller_class, controller_kinds, register_controller
+from agents.rollouts.rollout import check_fits
+from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 
-CLASSICAL = BUILT_IN
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 ORACLE = "oracle"
@@ -74,7 +74,7 @@ class Contestant:
         """
         made = tuple(_made(self.source, task, suite))
         for policy in made:
-            check_fits(policy, task, f"'{self.name}' on task '{task.name}'")
+            check_fits(policy, task.task, task.ship, f"'{self.name}' on task '{task.name}'")
         return made
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
@@ -85,7 +85,7 @@ class Contestant:
 
 
 def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
-    """Refuse, before anything is flown, files of agents that cannot be read, or fit none of the tasks.
+    """Refuse, before anything is run, files of agents that cannot be read, or fit none of the tasks.
 
     Raises
     ------
@@ -98,32 +98,18 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
         return
     agents: dict[Path, Policy] = {}
     refusals: list[str] = []
-    flying = 0
+    fitting = 0
     for task in tasks:
         for path in _files(one.source, task):
             if path not in agents:
                 agents[path] = load_agent(path)
             try:
-                check_fits(agents[path], task, f"'{path}' on task '{task.name}'")
-                flying += 1
+                check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
+                fitting += 1
             except InputError as error:
                 refusals.append(str(error))
-    if refusals and not flying:
+    if refusals and not fitting:
         raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
-
-
-def check_fits(policy: Any, task: BenchmarkTask, where: str) -> None:
-    """Refuse a controller made for other observations than a task shows.
-
-    Raises
-    ------
-    InputError
-        Naming the difference.
-    """
-    check = getattr(policy, "check_fits", None)
-    if check is not None:
-        shown = task.task.observed(task.ship)
-        check([one.name for one in shown], [one.scale for one in shown], where)
 
 
 def contestants(given: Any) -> tuple[Contestant, ...]:
@@ -280,8 +266,6 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
         led = controller_class(source).has_autopilot and not isinstance(task.task, PathFollowingTask)
         return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
-        from agents.benchmarking.direct_search import tuned
-
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)

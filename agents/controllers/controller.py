@@ -27,7 +27,7 @@ from agents.controllers.linear_loop import (
 from agents.controllers.memory import checked_observation, heading_error
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]

@@ -18,7 +18,7 @@ import numpy as np
 
 import shipgym
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
 LONGEST_IN_MESSAGE = 200  # characters

@@ -29,7 +29,7 @@ import numpy as np
 from agents.policies.policy import ORDERS, LearnedPolicy
 from agents.policies.weights_file import as_json
 from shipgym.errors import InputError
-from shipgym.whole_file import write_bytes
+from shipgym.files import write_bytes
 
 OPSET, IR_VERSION = 17, 8  # of 2022: what runs on ships is not of this year
 OPERATORS = {"relu": "Relu", "tanh": "Tanh"}

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.suite import ENVIRONMENTS, BenchmarkTask, load_suite
 from agents.controllers.controller import model_hash
+from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, load_suite
 from agents.training.settings import (
     ALGORITHMS,
     Settings,

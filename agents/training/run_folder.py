@@ -21,7 +21,7 @@ from agents.training.plan import Plan, check_same
 from agents.training.settings import present_names
 from shipgym.checks import check_keys, check_table, check_whole
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 FORMAT = 1
 RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"

@@ -19,8 +19,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.suite import ENVIRONMENTS, load_suite
 from agents.controllers.registry import controller_kinds
+from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
@@ -62,7 +62,7 @@ class Settings:
     #: Control intervals of a decision; a base goes on with its feedback in each of them.
     action_repeat: int = setting(at_least=1)
     #: Classical controller that the policy adds to: a kind, a controller's file that ends in .json, "none",
-    #: or "tuned", the best of those tuned for the suite's task (but `direct_search.NO_BASES`).
+    #: or "tuned", the best of those tuned for the suite's task (but `designs.NO_BASES`).
     base: str = setting()
     #: Share of the action's range by which it may differ from the base; 1 without a base.
     authority: float = setting(above=0.0, at_most=2.0)

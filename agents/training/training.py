@@ -23,7 +23,7 @@ from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 
 try:
     import torch

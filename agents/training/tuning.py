@@ -22,8 +22,7 @@ from agents.training.settings import changed
 from agents.verification.monte_carlo import HERE, Engine
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
-from shipgym.whole_file import write_text
+from shipgym.files import read_json, write_json, write_text
 
 try:
     import optuna

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 Floats = NDArray[np.float64]
 
 
-class Machine(Protocol):
+class Estimator(Protocol):
     """A linear estimator in scikit-learn's manner.
 
     Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the directions dropped),
@@ -40,7 +40,7 @@ class Machine(Protocol):
         ...
 
 
-def weights(machine: Machine, features: Floats) -> Floats:
-    """Weight of each sample, shape (n_samples,), 1 where the machine knows none."""
-    given: Floats | None = getattr(machine, "weights_", None)
+def weights(estimator: Estimator, features: Floats) -> Floats:
+    """Weight of each sample, shape (n_samples,), 1 where the estimator knows none."""
+    given: Floats | None = getattr(estimator, "weights_", None)
     return np.ones(len(features)) if given is None else given

@@ -1,4 +1,4 @@
-"""Search for settings: optimisers behind one signature, what they minimise, and their machine."""
+"""Search for settings: optimisers behind one signature, what they minimise, and their estimator."""
 
 from identification.estimators.tuned import TunedLSSVM
 from identification.search.bee_colony import ArtificialBeeColony

@@ -53,7 +53,7 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
 def fit_free_running(
     settings: TunedLSSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]
 ) -> dict[str, TunedLSSVM]:
-    """Machines of all equations, their C chosen together by the error of simulated trials.
+    """Estimators of all equations, their C chosen together by the error of simulated trials.
 
     Parameters
     ----------
@@ -90,9 +90,11 @@ def fit_free_running(
     search = optimiser.minimise(
         lambda candidates: np.array([error(x) for x in candidates]), bounds, settings.seed
     )
-    machines = {}
+    estimators = {}
     for k, q in enumerate(equations):
         own = replace(search, x=search.x[k : k + 1], course=search.course[:, k : k + 1])
-        machine = TunedLSSVM(**settings.get_params(deep=False))
-        machines[q] = machine.settle(samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own)
-    return machines
+        estimator = TunedLSSVM(**settings.get_params(deep=False))
+        estimators[q] = estimator.settle(
+            samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own
+        )
+    return estimators

@@ -56,9 +56,5 @@ def minimise(
         The same seed gives the same search.
     optimiser : {"abc", "pso", "grid", "de"} or Optimiser
         By name with its usual settings, or one with your own.
-
-    Returns
-    -------
-    SearchResult
     """
     return get_optimiser(optimiser).minimise(objective, bounds, seed)

@@ -66,7 +66,7 @@ class Scene:
     current : tuple of float or None
         Speed, m/s, and direction it sets towards, rad.
     readouts : mapping of str to str
-        Lines of text: what, and how much with its unit.
+        Lines of text: a quantity, and its value with the unit.
     """
 
     x: float
@@ -254,10 +254,10 @@ class Renderer:
         if not lines:
             return
         self._brush.panel(PANEL, (8.0, 8.0, 212.0, 12.0 + 19.0 * len(lines)))
-        for k, (what, much) in enumerate(lines):
+        for k, (label, value) in enumerate(lines):
             height = 15.0 + 19.0 * k
-            self._brush.text(what, (18.0, height), LEGEND.get(what, FAINT))
-            self._brush.text(much, (210.0, height), INK, "right")
+            self._brush.text(label, (18.0, height), LEGEND.get(label, FAINT))
+            self._brush.text(value, (210.0, height), INK, "right")
 
 
 class _Brush:

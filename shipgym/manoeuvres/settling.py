@@ -98,14 +98,15 @@ class Voyage:
     def rate_helmsman(self) -> Callable[[float], Sail]:
         """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
 
-        He is designed from the rudder's effect at service speed, and remembers his integral part.
+        The helmsman is designed from the rudder's effect at service speed; the integral part
+        carries over from leg to leg.
         """
         model, memory, passage = self.model, np.zeros(1), self.passage
         steer, shaft = passage.kernel("rate_steering").steer_rate, model.service_shaft_speed
         gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
         reset_time = HELMSMAN_RESET * self.length_time
 
-        def held(rate: float) -> Sail:
+        def at_rate(rate: float) -> Sail:
             def sail(states: Floats, commands: Floats) -> int:
                 orders = np.empty(len(commands))
                 reached: int = steer(
@@ -117,7 +118,7 @@ class Voyage:
 
             return sail
 
-        return held
+        return at_rate
 
     def settle(self, sail: Sail) -> Steady:
         """Sail until the motion no longer changes, 300 ship lengths at most."""

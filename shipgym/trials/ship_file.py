@@ -11,12 +11,12 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.files import check_readable, read_bytes
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
-from shipgym.trials.csv_reader import check_readable, read_bytes
 from shipgym.trials.identify_table import check_options
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
 from shipgym.trials.trial_import import Conventions
 
@@ -35,10 +35,8 @@ class TrialEntry:
         As written; the trial's name.
     path : Path
         The CSV file.
-    kind : str or None
-        The manoeuvre.
-    use : {"fit", "validate", "skip"}
-        What the trial is for.
+    kind, use
+        As in :class:`Trial`.
     columns : mapping or None
         Columns by channel as written; None: those named like channels.
     conventions : Conventions
@@ -113,30 +111,19 @@ class ShipFile:
         return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:
-        """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
-
-        Raises
-        ------
-        InputError
-            Naming the ship file and what is missing, where it cannot be estimated.
-        """
+        """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
         try:
             return self.particulars.completed()
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
-        """Read the trials.
+        """Read the trials, in the order of the file, each named by its ``file``.
 
         Parameters
         ----------
         use : {"fit", "validate", "skip"}, optional
             Only trials of this use; by default all but those to skip.
-
-        Returns
-        -------
-        list of Trial
-            In the order of the file, each named by its ``file``.
 
         Raises
         ------
@@ -149,18 +136,7 @@ class ShipFile:
         return [self._read(entry) for entry in wanted]
 
     def trial(self, file: str) -> Trial:
-        """Read one trial, whatever its use.
-
-        Parameters
-        ----------
-        file : str
-            As written in the ship file.
-
-        Raises
-        ------
-        InputError
-            If no trial has that file, and for anything wrong with it.
-        """
+        """Read one trial by its ``file``, whatever its use; as :meth:`trials`."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
         return self._read(self.entries[files.index(file)])
@@ -188,7 +164,7 @@ class ShipFile:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
-    data = read_bytes(path, "a ship file (TOML)")
+    data = read_bytes(path, "ship file (TOML)")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
@@ -247,7 +223,7 @@ def _entry(
     csv_path = path.parent / file
     if use != "skip":
         try:
-            check_readable(csv_path, "a CSV file")
+            check_readable(csv_path, "CSV file")
         except InputError as error:
             raise InputError(f"{where} file: {error}") from None
     return TrialEntry(

@@ -7,7 +7,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.benchmarking.suite import load_suite
+from agents.suites.suite import load_suite
 from agents.training.algorithms import sb3_arguments
 from agents.training.settings import ALGORITHMS, load_settings
 from shipgym import ShipVecEnv

@@ -9,10 +9,10 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, benchmark, check_controller, load_agent, register_controller
-from agents.benchmarking.suite import load_suite
 from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
+from agents.suites.suite import load_suite
 from agents.training.bases import design_base
 from shipgym import load_model
 from shipgym.errors import InputError

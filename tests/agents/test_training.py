@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from agents import load_agent
 from agents.cli import app
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import episode_costs
 from agents.training import training
 from agents.training.algorithms import make_agent, make_ships, set_deviation
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
