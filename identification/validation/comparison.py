@@ -18,7 +18,7 @@ from identification.validation.cross_validation import cross_validate
 from identification.validation.prediction import COMPARED
 from shipgym.errors import InputError
 from shipgym.json_file import write_json
-from shipgym.ships.grey_box import GREY_BOX
+from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.trial import Trial
 from shipgym.whole_file import write_text
 

@@ -19,7 +19,6 @@ from shipgym.kernels import voyage_rows as rows
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
-from shipgym.ships.orders import turns_astern
 from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
@@ -212,7 +211,7 @@ class Task(ABC):
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
-        return -1.0 if turns_astern(model) else 0.0
+        return -1.0 if model.turns_astern else 0.0
 
     def observed_of_task(self, model: ShipModel) -> tuple[Observed, ...]:
         """What the task itself adds to what is observed."""

@@ -13,7 +13,8 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.zigzags import number_of_steps
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 

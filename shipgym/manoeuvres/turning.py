@@ -12,7 +12,8 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, ship_length
 from shipgym.manoeuvres.zigzags import number_of_steps
 from shipgym.sea.conditions import Weather
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 

@@ -14,7 +14,8 @@ from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
 
@@ -98,12 +99,12 @@ def zigzag(
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
+    states = passage.states(model.service_state, n_steps)
     commands = np.empty(n_steps + 1)
     first = -angle if port_first else angle
-    reached, turns = passage.kernel("zigzag").zigzag(
+    reached, turns = passage.loop("zigzag")(
         states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside",
-        passage.sky, passage.words, passage.ship,
+        *passage.sea, passage.numbers,
     )  # fmt: skip
     times = dt * np.arange(n_steps + 1, dtype=float)
     if reached < n_steps:

@@ -16,7 +16,7 @@ from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.motions import wave_motion
 from shipgym.sea.waves import wave_filter
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
-from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.80665
@@ -45,12 +45,12 @@ def as_weather(weather: Weather | str | None, where: str, from_deg: float | None
         raise InputError(f"{where}: {reason}") from None
 
 
-def weather_column(model: ShipModel, weather: Weather, step: float, water_depth: float = np.inf) -> Floats:
+def weather_column(model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf) -> Floats:
     """Rows that tell a ship's weather, in the order of `shipgym.kernels.weather_rows`.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
         The ship; forces become accelerations by her inertia.
     weather : Weather
         Parts that are calm do nothing.
@@ -103,7 +103,7 @@ def _current(column: Floats, current: Current, step: float) -> None:
     _filter(column, rows.CURRENT_KEPT, GaussMarkov(current.time_constant, current.variation), step)
 
 
-def _wind(column: Floats, model: ShipModel, wind: Wind, step: float, mobility: Floats) -> None:
+def _wind(column: Floats, model: ManoeuvringModel, wind: Wind, step: float, mobility: Floats) -> None:
     column[_at(rows.WIND_SPEED)] = wind.speed
     column[_at(rows.WIND_FROM)] = _direction(wind.from_deg)
     _filter(column, rows.GUST_KEPT, gust_filter(wind), step)
@@ -114,7 +114,7 @@ def _wind(column: Floats, model: ShipModel, wind: Wind, step: float, mobility: F
     column[_at(rows.STILL_AIR)] = -surge.sum()  # of the wind she makes herself, at angle 0
 
 
-def _waves(column: Floats, model: ShipModel, waves: Waves, step: float, mobility: Floats) -> None:
+def _waves(column: Floats, model: ManoeuvringModel, waves: Waves, step: float, mobility: Floats) -> None:
     spectrum = wave_filter(waves)
     column[_at(rows.WAVES_FROM)] = _direction(waves.from_deg)
     column[_at(rows.WAVE_FREQUENCY)] = spectrum.peak_frequency

@@ -8,20 +8,23 @@ are converted back to the target first.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Any
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.specialise import Part
+from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import WITH_REFERENCE
+from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
 from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import CHANNEL, Term, read_terms
+from shipgym.ships.terms import CHANNEL, read_terms
 
 Floats = NDArray[np.float64]
 
@@ -45,7 +48,7 @@ class GreyBox(Structure):
 
     Attributes
     ----------
-    reference : ShipModel
+    reference : ManoeuvringModel
         The reference ship: with equations of its own or a table of terms, without heave or trim.
     shaft : bool
         Whether the target's shaft speed is known: then the reference ship's is that times the ratio of the
@@ -57,7 +60,7 @@ class GreyBox(Structure):
         For a table of forces, and for a reference ship that is a grey box itself or has no rudder.
     """
 
-    reference: ShipModel | None = None
+    reference: ManoeuvringModel | None = None
     shaft: bool = False
 
     def __post_init__(self) -> None:
@@ -65,7 +68,7 @@ class GreyBox(Structure):
         where = f"structure '{self.name}'"
         if self.reference is None:
             raise InputError(
-                f"{where}: no reference found, expected a ShipModel, or the name of a shipped model"
+                f"{where}: no reference found, expected a ManoeuvringModel, or the name of a shipped model"
             )
         if isinstance(self.reference.dynamics, GreyBox):
             raise InputError(
@@ -84,7 +87,7 @@ class GreyBox(Structure):
             )
 
     @property
-    def ship(self) -> ShipModel:
+    def ship(self) -> ManoeuvringModel:
         """The reference ship."""
         assert self.reference is not None
         return self.reference
@@ -109,25 +112,36 @@ class GreyBox(Structure):
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Names of the state, with roll where the reference ship rolls."""
+        """Names of the state, with roll or memory where the reference ship has it."""
         roll = ("p", "phi") if self.rolls else ()
-        return ("x", "y", "psi", "u", "v", "r", *roll, "delta")
+        memory = ("q",) if "q" in self.ship.state_names else ()
+        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
 
     @property
     def needs_shaft_speed(self) -> bool:
         """Whether the shaft speed at service speed has to be known."""
         return self.shaft or super().needs_shaft_speed
 
-    def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
-        """Source of the compiled accelerations; the coefficients of the terms are read at run time."""
-        return self._source
+    @property
+    def astern(self) -> bool:
+        """Whether the reference ship's shaft may turn astern."""
+        return self.ship.turns_astern
+
+    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+        """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
+        return _vessel(self.ship.vessel, self._source, len(self._terms), self.shaft, self.state_names, lag)
 
     @cached_property
     def _source(self) -> str:
-        """Written once, however many models share the grey box."""
-        from shipgym.engine.grey_box_source import grey_box_source
+        """Written once; an equation without terms is the reference ship's alone."""
+        return accelerations_source(self._sums, damped=False)
 
-        return grey_box_source(self)
+    def numbers(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
+        terms = super().numbers(coefficients, particulars, shaft_speed)
+        return np.concatenate([self.ship.ship_numbers(), terms])
 
     def converted_accelerations(
         self, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
@@ -146,7 +160,8 @@ class GreyBox(Structure):
         Returns
         -------
         dict of str to array of shape (n_samples,)
-            By equation `u`, `v`, `r`: m/s^2 and rad/s^2 of the target.
+            By equation `u`, `v`, `r`, and `q` where the reference ship has a memory of yaw: SI units of the
+            target.
         """
         ship = self.ship
         fast = ship.particulars["speed"] / particulars["speed"]
@@ -156,100 +171,84 @@ class GreyBox(Structure):
         n = np.full_like(u, ship.service_shaft_speed)
         if self.shaft:
             n = np.asarray(channels["n"], dtype=float) * (ship.service_shaft_speed / shaft_speed)
-        scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "delta": 1.0}
+        scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "q": quick**2, "delta": 1.0}
         values = {name: scale[name] * np.asarray(channels.get(name, zero), dtype=float) for name in scale}
         values["n"] = n
         states = np.stack([values.get(name, zero) for name in ship.state_names], axis=-1)
         commands = np.stack([values[name] for name in ship.command_names], axis=-1)
         rates = ship.derivatives(states, commands)
-        back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": 1.0 / (quick * quick)}
-        return {q: rates[:, ship.state_names.index(q)] * back[q] for q in back}
+        back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": quick**-2, "q": quick**-3}
+        return {q: rates[:, ship.state_names.index(q)] * back[q] for q in back if q in ship.state_names}
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""
-        from shipgym.ships.model_file import model_fields
-
-        return {**super().to_dict(), "shaft": self.shaft, "reference": model_fields(self.ship)}
+        return {**super().to_dict(), "shaft": self.shaft, "reference": self.ship.to_dict()}
 
 
-def grey_box(
-    reference: str | ShipModel,
-    equations: Mapping[str, str | tuple[Term, ...]] | None = None,
-    shaft: bool | None = None,
-    name: str = GREY_BOX,
-) -> GreyBox:
-    """A reference ship plus a table of terms.
+class GreyBoxCoefficients(NamedTuple):
+    """Stands for the record of a grey box's coefficients."""
 
-    Parameters
-    ----------
-    reference : str or ShipModel
-        A shipped model's name, the path of a model file, or a model.
-    equations : mapping of str to str or Terms, optional
-        Terms by equation `u`, `v`, `r` in units of service speed (`read_terms`); by default Mei's: du (the
-        speed above service speed), v, r, delta and a constant, in all three.
-    shaft : bool, optional
-        Whether the target's shaft speed is known; by default if the reference ship knows one.
-    name : str
-        Of the structure.
-
-    Returns
-    -------
-    GreyBox
-
-    Raises
-    ------
-    InputError
-        For a reference that does not exist or cannot be one, or a table that cannot be computed.
-    """
-    from shipgym.ships.catalogue import load_model
-
-    ship = reference if isinstance(reference, ShipModel) else load_model(reference)
-    table = {
-        q: read_terms(terms) if isinstance(terms, str) else tuple(terms)
-        for q, terms in (equations or dict.fromkeys("uvr", LINEAR)).items()
-    }
-    stripped = replace(ship, covariance=None, envelope=None, provenance=None)
-    known = "n" in ship.command_names if shaft is None else shaft
-    return GreyBox(name, SOURCE, table, "service", "acceleration", stripped, known)
+    known: Ship  # the reference ship
+    reference: Any  # her coefficients
+    terms: Any  # coefficients of the terms
 
 
-def converted_model(
-    reference: str | ShipModel | GreyBox,
-    particulars: Particulars,
-    steering: SteeringGear,
-    service_shaft_speed: float = 0.0,
-    name: str | None = None,
-) -> ShipModel:
-    """The bare reference ship as a model of another ship: a grey box whose terms are all zero.
+KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
 
-    Parameters
-    ----------
-    reference : str, ShipModel or GreyBox
-        As in `grey_box`.
-    particulars : Particulars
-        Of the target, with its service speed.
-    steering : SteeringGear
-        Of the target.
-    service_shaft_speed : float
-        Of the target, 1/s; 0: not known, and the reference ship's is taken as at service speed.
-    name : str, optional
-        By default the target's.
 
-    Returns
-    -------
-    ShipModel
-    """
-    box = reference
-    if not isinstance(box, GreyBox):
-        box = grey_box(box)
-        box = replace(box, shaft=box.shaft and service_shaft_speed > 0.0)
-    return ShipModel(
-        name=particulars.name if name is None else name,
-        structure=box.name,
-        particulars=particulars,
-        steering=steering,
-        coefficients=dict.fromkeys(box.coefficient_names, 0.0),
-        own_table=box,
-        service_shaft_speed=service_shaft_speed,
-        provenance={"source": box.source, "reference": box.ship.name},
+def reference_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
+    """A part: the reference ship's."""
+
+
+def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
+    """A part: the sum of the terms."""
+
+
+def accelerations(
+    motion: Motion, c: GreyBoxCoefficients, ship: Ship
+) -> tuple[float, float, float, float, float]:
+    """The reference ship's at the converted state, converted back, and the terms."""
+    fast = c.known.speed / ship.speed
+    quick = fast * ship.length / c.known.length
+    at = Motion(
+        x=0.0,
+        y=0.0,
+        psi=0.0,
+        u=fast * motion.u,
+        v=fast * motion.v,
+        r=quick * motion.r,
+        p=quick * motion.p,
+        phi=motion.phi,
+        q=quick * quick * motion.q,
+        delta=motion.delta,
+        n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
     )
+    surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
+    udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
+    linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)
+    return (
+        udot + linear * surge,
+        vdot + linear * sway,
+        rdot + angular * yaw,
+        angular * roll,
+        angular * memory / quick,
+    )
+
+
+@cache
+def _vessel(
+    reference: Vessel, source: str, n_terms: int, shaft: bool, state_names: tuple[str, ...], lag: bool
+) -> Vessel:
+    """Functions of the reference ship, the terms and their sum."""
+    terms = coefficients_record(n_terms, "GreyBoxTerms")
+    fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
+    parts = {
+        **reference.functions,
+        "accelerations": Part(accelerations),
+        "reference_accelerations": reference.functions["accelerations"],
+        "term_accelerations": Part(accelerations_function(source)),
+        "KNOWS_SHAFT": shaft,
+    }
+    parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
+    record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
+    return Vessel("a grey box", state_names, record, parts, lag)
