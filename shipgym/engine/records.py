@@ -7,6 +7,7 @@ row. Field order is row order, so that nobody writes a row number.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, get_type_hints
@@ -21,9 +22,10 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
-def field_types(record: Record) -> dict[str, Any]:
-    """Types of a record's fields, without what they are annotated with."""
-    return {name: hint for name, hint in get_type_hints(record).items() if name in record._fields}  # type: ignore[attr-defined]
+def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
+    """Types of a record's fields, with or without what they are annotated with."""
+    namespace = vars(sys.modules[record.__module__])
+    return get_type_hints(record, globalns=namespace, include_extras=notes)
 
 
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:

@@ -9,12 +9,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
-from typing import Any, get_args, get_type_hints
+from typing import Any, get_args
 
 import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, did_you_mean, quoted
-from shipgym.engine.records import Record, is_record, leaves
+from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen, Setting
 
@@ -83,7 +83,7 @@ class TaskDefinition:
     @cached_property
     def flags(self) -> tuple[str, ...]:
         """Reported fields that are true or false."""
-        kinds = get_type_hints(self.State)
+        kinds = field_types(self.State)
         return tuple(name for name in self.reported if kinds[name] is bool)
 
     @cached_property
@@ -107,7 +107,7 @@ class TaskDefinition:
 
 def _annotated(record: Record, kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
     """What the fields of a record are annotated with, by their paths."""
-    for name, hint in get_type_hints(record, include_extras=True).items():
+    for name, hint in field_types(record, notes=True).items():
         base = get_args(hint)[0] if get_args(hint) else hint
         if is_record(base):
             yield from _annotated(base, kind, f"{prefix}{name}.")
@@ -118,7 +118,7 @@ def _annotated(record: Record, kind: type, prefix: str = "") -> Iterator[tuple[s
 
 def _keywords(record: Record) -> Iterator[tuple[str, Setting]]:
     """Keywords of a record of settings: its fields, and those of records within it that have defaults."""
-    for name, hint in get_type_hints(record, include_extras=True).items():
+    for name, hint in field_types(record, notes=True).items():
         kind = get_args(hint)[0] if get_args(hint) else hint
         notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Setting)]
         if is_record(kind) and kind._field_defaults:
@@ -132,7 +132,7 @@ def _made(
 ) -> Any:
     """A record of settings, the given ones in place of its defaults."""
     values = {}
-    for name, hint in get_type_hints(record).items():
+    for name, hint in field_types(record).items():
         default = record._field_defaults[name]  # type: ignore[attr-defined]
         if is_record(hint) and hint._field_defaults:
             values[name] = _made(hint, options, bounds, listed)

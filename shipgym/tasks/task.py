@@ -16,7 +16,6 @@ from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
-from shipgym.ships.orders import turns_astern
 from shipgym.tasks.definition import TaskDefinition, read_definition
 
 Floats = NDArray[np.float64]
@@ -217,7 +216,7 @@ class Task:
 
     def least_shaft(self, model: ShipModel) -> float:
         """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
-        return -1.0 if turns_astern(model) else 0.0
+        return -1.0 if model.turns_astern else 0.0
 
     @cached_property
     def info_names(self) -> tuple[str, ...]:
