@@ -25,7 +25,6 @@ from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import is_course_stable
-from shipgym.ships.model_file import model_fields, read_model
 
 if TYPE_CHECKING:
     from agents.controllers.controller import Controller
@@ -156,7 +155,7 @@ def draw_jobs(
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
     common = {
-        "model": model_fields(replace(model, covariance=None)),
+        "model": replace(model, covariance=None).to_dict(),
         "controllers": [controller.to_dict() for controller in controllers],
     }
     return [
@@ -175,7 +174,7 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     from agents.controllers.controller_file import read_controller
     from agents.rollouts.course_keeping import sail
 
-    model = read_model(job["model"], "model")
+    model = ShipModel.from_dict(job["model"])
     draws = [
         replace(model, name=name, coefficients=dict(zip(model.coefficients, values, strict=True)))
         for name, values in zip(job["names"], job["coefficients"], strict=True)

@@ -7,11 +7,11 @@ import warnings
 
 import numpy as np
 import pytest
+from shipgym.engine.generator import accelerations_source
+from shipgym.kernels import trigonometry
 
 import shipgym
 from shipgym.engine import compiled
-from shipgym.engine.generator import accelerations_source
-from shipgym.kernels import trigonometry
 from tests.shipgym.outer import outer
 
 sin_cos, wrap = outer(trigonometry.sin_cos), outer(trigonometry.wrap)
