@@ -19,8 +19,8 @@ small_sin_cos, small_cosine = outer(trigonometry.small_sin_cos), outer(trigonome
 
 FLY = """
 import numpy as np, shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine
-engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2)
+from shipgym.envs.engine import Engine
+engine = Engine(shipgym.load_model("mariner"), 2)
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
