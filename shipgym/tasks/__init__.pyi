@@ -1,6 +1,6 @@
-from shipgym.tasks.definition import TaskDefinition as TaskDefinition
-from shipgym.tasks.definition import read_definition as read_definition
-from shipgym.tasks.task import Task as Task
-from shipgym.tasks.task import control_interval as control_interval
-from shipgym.tasks.task import course_keeping_task as course_keeping_task
-from shipgym.tasks.task import path_following_task as path_following_task
+from .definition import TaskDefinition as TaskDefinition
+from .definition import read_definition as read_definition
+from .task import Task as Task
+from .task import control_interval as control_interval
+from .task import course_keeping_task as course_keeping_task
+from .task import path_following_task as path_following_task
