@@ -163,13 +163,13 @@ def autopilot_command(
     model is unstable; the report then says so.
     """
     from agents.cli.terminal import progress_bars
+    from agents.engines.jobs import JobEngine
     from agents.verification.chain import build_autopilot
-    from agents.verification.monte_carlo import Engine
 
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
-            where=Engine(engine, workers, address),
+            where=JobEngine(engine, workers, address),
         )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
 

@@ -63,15 +63,15 @@ def tune_command(
     same command goes on with the trials that were not done.
     """
     from agents.cli.terminal import progress_bars
+    from agents.engines.jobs import JobEngine
     from agents.training.plan import Given, make_plan
     from agents.training.settings import parsed_settings
     from agents.training.tuning import evaluated_evenly, tune
-    from agents.verification.monte_carlo import Engine
 
     fixed = parsed_settings(set_ or ())
     own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
     options = parsed_settings(environment_options or (), "--option")
-    where = Engine(engine, workers, address)
+    where = JobEngine(engine, workers, address)
     where.check()
     plan = make_plan(
         Given(algorithm, env, model, sea, task, options, settings, own, seed, randomise, threads=1)

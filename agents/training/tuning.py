@@ -16,10 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from agents.engines.jobs import run_jobs
+from agents.engines.jobs import HERE, JobEngine, run_jobs
 from agents.training.plan import Plan, check_same
 from agents.training.settings import changed
-from agents.verification.monte_carlo import HERE, Engine
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json, write_text
@@ -88,7 +87,7 @@ def tune(
     trials: int = 20,
     *,
     fixed: Sequence[str] = (),
-    where: Engine = HERE,
+    where: JobEngine = HERE,
     progress: Callable[[int, int, float | None], None] | None = None,
     training: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> Tuning:
@@ -105,7 +104,7 @@ def tune(
         In all, those done before among them.
     fixed : sequence of str
         Settings that are left as they are.
-    where : Engine
+    where : JobEngine
         Where trials are trained; the results are the same.
     progress : callable, optional
         Called with the trials done, their total and the best cost.
