@@ -10,6 +10,7 @@ from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import check_fits, episode_costs
 from agents.suites.suite import load_suite
 from agents.training.plan import Given, make_plan
+from agents.training.settings import make_settings
 
 SUITE = load_suite()
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode
@@ -32,7 +33,9 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
     assert record["task"] == task.name
     assert f"--task {task.name} --seed {record['seed']}" in record["command"]
     commanded = make_plan(Given("ppo", task=task.name, seed=record["seed"])).configuration()
-    assert {name: record[name] for name in commanded} == commanded
+    recorded = {name: record[name] for name in commanded}
+    recorded["settings"] = make_settings("ppo", record["settings"]).to_dict()  # older names are read too
+    assert recorded == commanded
     held_out = {run["seed"]: run["held_out_cost"] for run in record["runs"]}
     assert record["seed"] == min(held_out, key=held_out.get)
     for run in record["runs"]:
