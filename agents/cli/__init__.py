@@ -171,10 +171,10 @@ def autopilot_command(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
             where=JobEngine(engine, workers, address),
         )  # fmt: skip
-    _told(result, out / "report.html", draws, as_json)
+    _print_result(result, out / "report.html", draws, as_json)
 
 
-def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
     """Print the result of the chain; fail for an unstable model."""
     from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.cli.terminal import out as console

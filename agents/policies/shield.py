@@ -128,9 +128,9 @@ class Shielded:
     Attributes
     ----------
     policy : Policy
-        Who steers; any, also one that was learned.
+        The policy that steers; any, also a learned one.
     fallback : Controller
-        Who takes over: the rudder alone, a shaft stays with the policy.
+        Takes over the rudder; the shaft stays with the policy.
     dt : float
         Control interval, s.
     envelope : Envelope or None
@@ -174,7 +174,7 @@ class Shielded:
         model : ShipModel
             The ship; if it has an envelope the shield knows it.
         policy : Policy
-            Who steers.
+            The policy that steers.
         fallback : Controller, optional
             By default `LQ.from_model(model)`.
         dt : float, optional
