@@ -30,6 +30,7 @@ from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
 
 if TYPE_CHECKING:
+    from agents.cli.standard_trials import StandardTrials
     from agents.verification.result import AutopilotResult
 
 app = typer.Typer(
@@ -93,8 +94,7 @@ def trials_command(
     indices of an identified model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
-    from agents.cli.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json, progress_bars
     from agents.cli.trials_page import check_page, write_page
     from shipgym.ships import load_model
 
@@ -110,7 +110,15 @@ def trials_command(
         write_page(ship, found, out)
     if as_json:
         print_json({"model": ship.name, "seed": seed, **found.to_dict()})
-        return
+    else:
+        _print_trials(found, out)
+
+
+def _print_trials(found: StandardTrials, page: Path | None) -> None:
+    """Print tables of the standard manoeuvres, and where the page was written."""
+    from agents.cli.terminal import criteria_table, manoeuvre_table, warn
+    from agents.cli.terminal import out as console
+
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
     if found.criteria:
@@ -122,8 +130,8 @@ def trials_command(
             console.print(f"{name}: {criterion.note}", soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
-    if out is not None:
-        console.print(f"\nwritten: {out}", soft_wrap=True)
+    if page is not None:
+        console.print(f"\nwritten: {page}", soft_wrap=True)
 
 
 @app.command("autopilot")

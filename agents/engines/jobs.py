@@ -81,12 +81,9 @@ def run_jobs(
     Raises
     ------
     InputError
-        For wrong arguments; for a cluster that does not answer; or, naming the job, if it says that its
-        input is wrong.
-    JobError
-        Naming the job, if it raises anything else.
-    WorkerDiedError
-        Naming the job, if its worker dies more often than `retries`.
+        For wrong arguments, a cluster that does not answer, or wrong input that a job reports.
+    JobError, WorkerDiedError
+        Naming the job, if it raises anything else, or its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
     check_whole(retries, "retries", at_least=0)
@@ -94,21 +91,16 @@ def run_jobs(
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
-    found: dict[str, dict[str, Any]] = {}
-    if kept is not None:
-        found = {text: packed for text in copies if (packed := kept.load(text)) is not None}
+    found = {} if kept is None else kept.load_all(copies)
 
-    def tell() -> None:
-        if progress is not None:
-            progress(sum(copies[text] for text in found), len(texts))
-
-    tell()
+    tell = progress or (lambda done, total: None)
+    tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]
     for text, outcome in _outcomes(function, pending, engine, workers, address, retries):
         found[text] = check_outcome(outcome, f"job {texts.index(text)} {shortened(text)}")
         if kept is not None:
             kept.save(text, outcome)
-        tell()
+        tell(sum(copies[text] for text in found), len(texts))
     return [unpack(found[text]["value"]) for text in texts]
 
 

@@ -111,10 +111,6 @@ def tune(
     training : callable, optional
         In the place of `train_trial`: a job in, cost, curve and how it ended out.
 
-    Returns
-    -------
-    Tuning
-
     Raises
     ------
     InputError
@@ -130,9 +126,8 @@ def tune(
 
         def tell(done: int, _: int, before: int = first) -> None:
             if progress is not None:
-                progress(
-                    before + done, trials, min((t.cost for t in found if t.cost is not None), default=None)
-                )
+                best = min((trial.cost for trial in found if trial.cost is not None), default=None)
+                progress(before + done, trials, best)
 
         results = run_jobs(
             training or train_trial,
