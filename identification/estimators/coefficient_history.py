@@ -83,10 +83,6 @@ def coefficient_history(
     **sampling
         `samples`, `window`, `gear`, `smooth` of `build_samples`.
 
-    Returns
-    -------
-    CoefficientHistory
-
     Raises
     ------
     InputError

@@ -17,18 +17,36 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.estimators.linear import LinearRegressor, settings
 from identification.estimators.lssvm import LSSVM
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
 
 
-class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class Recursion(LinearRegressor):
     """What the recursive methods share; samples are taken in time order, without intercept.
+
+    Parameters
+    ----------
+    forgetting : float
+        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient of the
+        least-squares forms becomes less certain than it was at the start, so that nothing winds up while the
+        ship sails straight.
+    C : float
+        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
+    scale : bool or array-like of shape (n_features,)
+        Divide the regressors by their root mean square, or by given values.
+    start_samples : int
+        Samples from which LS-SVR makes the start; 0 starts from zero.
+    start_interval : int
+        Take every n-th sample for it.
+    start_C : float
+        Weight of the errors of that LS-SVR.
 
     Attributes
     ----------
@@ -45,12 +63,12 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         What the regressors are divided by inside.
     """
 
-    forgetting: float
-    scale: bool | ArrayLike
-    C: float
-    start_samples: int
-    start_interval: int
-    start_C: float  # noqa: N815
+    forgetting: float = 1.0
+    C: float = 1e6
+    scale: bool | ArrayLike = True
+    start_samples: int = 0
+    start_interval: int = 1
+    start_C: float = 1e6  # noqa: N815
 
     def __sklearn_tags__(self) -> Any:
         """A recursion has no intercept, which some of scikit-learn's test data would need."""
@@ -59,19 +77,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return tags
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Run over samples in time order, from the beginning.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
+        """Run over samples of shape (n_samples, n_features), in time order, from the beginning."""
         self.fit_history(X, y)
         return self
 
@@ -120,10 +126,6 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         y : float or array-like of shape (n_samples,) or (n_samples, n_signals)
             What they explain.
 
-        Returns
-        -------
-        self
-
         Raises
         ------
         InputError
@@ -157,29 +159,12 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         unscaled: Floats = self._P / np.multiply.outer(self.scale_, self.scale_)
         return unscaled[0] if len(unscaled) == 1 else unscaled
 
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self, "coef_")
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_
-        return prediction
-
     def _check(self) -> None:
         check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
         check_number(self.C, "C", above=0.0)
         check_number(self.start_C, "start_C", above=0.0)
-        _whole(self.start_samples, "start_samples", 0)
-        _whole(self.start_interval, "start_interval", 1)
+        check_whole(self.start_samples, "start_samples", at_least=0)
+        check_whole(self.start_interval, "start_interval", at_least=1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Zero coefficients with the covariance C, in scales that the samples give."""
@@ -235,8 +220,8 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             self.weights_.sum() - float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C))), 1.0
         )
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
-        spread = (scaled.T * self.weights_**2) @ scaled
-        self.covariance_ = self.noise_variance_ * (inverse @ spread @ inverse) / unscale
+        middle = (scaled.T * self.weights_**2) @ scaled
+        self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
 
     @abstractmethod
     def _begin_memory(self, features: Floats) -> None: ...
@@ -245,58 +230,16 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
 
 
-class MultiInnovationLeastSquares(Recursion):
-    """Multi-innovation least squares: each step corrects by the last few innovations together.
+class _LeastSquares(Recursion):
+    """Least squares that correct by the last few innovations together."""
 
-    Parameters
-    ----------
-    innovations : int
-        How many samples each step uses.
-    omega : float
-        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
-    inverse_free : bool
-        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
-        the matrix of innovations solved (MILS).
-    forgetting : float
-        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient becomes less
-        certain than it was at the start, so that nothing winds up while the ship sails straight.
-    C : float
-        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
-    scale : bool or array-like of shape (n_features,)
-        Divide the regressors by their root mean square, or by given values.
-    start_samples : int
-        Samples from which LS-SVR makes the start; 0 starts from zero.
-    start_interval : int
-        Take every so manieth sample for it.
-    start_C : float
-        Of that LS-SVR.
-    """
-
-    def __init__(
-        self,
-        innovations: int = 5,
-        omega: float = 0.0,
-        inverse_free: bool = True,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.innovations = innovations
-        self.omega = omega
-        self.inverse_free = inverse_free
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    innovations: int = 1
+    omega: float = 0.0
+    inverse_free: bool = True
 
     def _check(self) -> None:
         super()._check()
-        _whole(self.innovations, "innovations", 1)
+        check_whole(self.innovations, "innovations", at_least=1)
         check_number(self.omega, "omega", at_least=0.0)
 
     def _begin_memory(self, features: Floats) -> None:
@@ -323,36 +266,36 @@ class MultiInnovationLeastSquares(Recursion):
         super()._summarise(features, targets, multiplicity * used)
 
 
-class RecursiveLeastSquares(MultiInnovationLeastSquares):
+class RecursiveLeastSquares(_LeastSquares):
     """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
+
+    Its parameters are those of `Recursion`.
+    """
+
+
+@settings()
+class MultiInnovationLeastSquares(_LeastSquares):
+    """Multi-innovation least squares: each step corrects by the last few innovations together.
 
     Parameters
     ----------
     forgetting, C, scale, start_samples, start_interval, start_C
-        As in `MultiInnovationLeastSquares`.
+        As in `Recursion`.
+    innovations : int
+        How many samples each step uses.
+    omega : float
+        Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
+    inverse_free : bool
+        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
+        the matrix of innovations solved (MILS).
     """
 
-    innovations = 1
-    omega = 0.0
-    inverse_free = True
-
-    def __init__(
-        self,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    innovations: int = 5
+    omega: float = 0.0
+    inverse_free: bool = True
 
 
+@settings()
 class StochasticGradient(Recursion):
     """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
 
@@ -361,33 +304,14 @@ class StochasticGradient(Recursion):
 
     Parameters
     ----------
+    forgetting, C, scale, start_samples, start_interval, start_C
+        As in `Recursion`; here the sum of squares that divides the steps forgets, and C is that of the ridge
+        in `inverse_moment_`.
     omega : float
-        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
-    forgetting : float
-        Factor by which the sum of squares that divides the steps forgets; 1 as printed.
-    C : float
-        Of the ridge in `inverse_moment_`.
-    scale, start_samples, start_interval, start_C
-        As in `MultiInnovationLeastSquares`.
+        Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     """
 
-    def __init__(
-        self,
-        omega: float = 0.0,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.omega = omega
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    omega: float = 0.0
 
     def _check(self) -> None:
         super()._check()
@@ -425,8 +349,3 @@ def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
             "phi, y: a value that is not finite found, expected numbers; repair the samples first"
         )
     return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets
-
-
-def _whole(value: Any, where: str, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{where}: {value!r} found, expected a whole number of at least {least}")

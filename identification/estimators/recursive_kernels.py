@@ -105,10 +105,10 @@ def matrix_updates(
             errors = y[low : t + 1, s] - theta[s] @ Phi
             for i in range(errors.size):
                 errors[i] = innovation(errors[i], omega)
-            spread = P[s] @ Phi
-            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ spread, np.ascontiguousarray(spread.T)).T
+            PPhi = P[s] @ Phi
+            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ PPhi, np.ascontiguousarray(PPhi.T)).T
             theta[s] += np.ascontiguousarray(L) @ errors
-            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(spread.T)
+            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(PPhi.T)
             P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
             history[t - first, s] = theta[s]
 

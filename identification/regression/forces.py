@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from identification.estimators.estimator import Estimator
+from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import on_one_thread
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -94,10 +95,6 @@ def force_regression(
         Length, water density; mass, centre of gravity and yaw gyradius where `model_inertia`.
     model_inertia : bool
         Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`); it is taken out.
-
-    Returns
-    -------
-    ForceRegression
 
     Raises
     ------
@@ -270,17 +267,17 @@ def identify_forces(
     Returns
     -------
     ShipModel
-        With covariance of the coefficients, errors taken as white; its provenance holds R^2 of X, Y, N.
+        With covariance of the coefficients, for white errors; its provenance holds R^2 of X, Y, N.
 
     Raises
     ------
     InputError
         For a structure of free-running trials, and what `force_regression` refuses.
     """
-    from identification.estimators.methods import get_method
-
     table = get_structure(structure)
     check_choice(method, METHODS, "method")
+    if rank is not None and method != "tls-svm":
+        raise InputError(f"rank: {rank} found with method {method!r}, which keeps all; choose 'tls-svm'")
     if not isinstance(table, SharedStructure):
         raise InputError(
             f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
@@ -289,8 +286,17 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, table, particulars, model_inertia)
-    estimator = get_method(method).estimator(**({} if rank is None else {"rank": rank}))
+    estimator = TruncatedLSSVM(
+        selection="full" if method == "ls" else "l-curve", rank=rank, fit_intercept=False
+    )
     coefficients, covariance = fit_forces(regression, estimator)
+    provenance = {
+        "structure": structure,
+        "method": method,
+        "rank": estimator.rank_,
+        "r_squared": regression.r_squared(coefficients),
+        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
+    }
     return ShipModel(
         name=particulars.name if name is None else name,
         structure=structure,
@@ -298,11 +304,5 @@ def identify_forces(
         steering=steering or SteeringGear(),
         coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
         covariance=covariance,
-        provenance={
-            "structure": structure,
-            "method": method,
-            "rank": int(getattr(estimator, "rank_", len(coefficients))),
-            "r_squared": regression.r_squared(coefficients),
-            "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
-        },
+        provenance=provenance,
     )

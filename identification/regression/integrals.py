@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
 def step_integrals(
-    t: Floats, channels: Channels, equations: Sequence[str], terms: Terms, euler: bool
+    t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, euler: bool
 ) -> Integrals:
     """Integrals over each step by the value at its start or by the trapezoid rule, and their first moments.
 
@@ -37,7 +37,7 @@ def step_integrals(
 
 
 def spline_integrals(
-    t: Floats, channels: Channels, equations: Sequence[str], terms: Terms, rudder: Rudder
+    t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, rudder: Rudder
 ) -> Integrals:
     """Integrals over each step by Gauss quadrature on splines through the samples.
 
@@ -47,7 +47,7 @@ def spline_integrals(
         s.
     channels : mapping of str to array of shape (n_samples,)
         By name.
-    equations : sequence of str
+    equations : iterable of str
         Whose terms are integrated.
     terms : callable
         The terms of an equation from the channels.
@@ -98,10 +98,6 @@ def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
         s and the unit of the channel.
     rudder : Rudder
         With the corners.
-
-    Returns
-    -------
-    BSpline
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.regression.gear import estimated_gear
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
+from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
@@ -20,7 +20,7 @@ from shipgym.ships.grey_box import GREY_BOX
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
@@ -59,10 +59,6 @@ def pose(
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
-    Returns
-    -------
-    Problem
-
     Raises
     ------
     InputError
@@ -82,8 +78,8 @@ def pose(
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     regression = structure_samples(
-        used, table, ship, options.samples, options.window, steering,
-        options.preprocessing or options.smooth, shaft,
+        used, table, ship, samples=options.samples, window=options.window, gear=steering,
+        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering

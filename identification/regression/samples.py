@@ -20,7 +20,7 @@ from scipy.ndimage import median_filter
 from identification.regression import preprocess
 from identification.regression.integrals import (
     Channels,
-    Terms,
+    Integrals,
     spline_integrals,
     step_integrals,
     twice_integrated,
@@ -121,10 +121,6 @@ def build_samples(
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
 
-    Returns
-    -------
-    Samples
-
     Raises
     ------
     InputError
@@ -136,24 +132,8 @@ def build_samples(
         check_whole(window, "window", at_least=1, hint="in sampling steps")
     preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
     check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
-    parts = []
-    for index, trial in enumerate(trials):
-        if window is not None and window >= len(trial):
-            raise InputError(
-                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
-                f"{window} steps; give a smaller window"
-            )
-
-        def terms(equation: str, channels: Channels) -> Floats:
-            return structure.features(equation, channels, particulars, shaft_speed)
-
-        pieces = between_gaps(trial, particulars, FEWEST_SAMPLES if window is None else window + 1)
-        steps = default_window(max(pieces, key=len), particulars) if window is None else window
-        parts += [
-            _one_trial(piece, index, structure, terms, samples, steps, gear, preprocessing)
-            for piece in pieces
-            if len(piece) > steps
-        ]
+    sampling = _Sampling(structure, particulars, samples, window, gear, preprocessing, shaft_speed)
+    parts = [part for index, trial in enumerate(trials) for part in sampling.parts(trial, index)]
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
@@ -162,6 +142,60 @@ def build_samples(
         np.concatenate([part.trial for part in parts]),
         max(part.window for part in parts),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampling:
+    """How a trial becomes rows of the regression; arguments of `build_samples`, checked."""
+
+    structure: Structure
+    particulars: Particulars
+    samples: str
+    window: int | None
+    gear: SteeringGear | None
+    preprocessing: str
+    shaft_speed: float
+
+    def parts(self, trial: Trial, index: int) -> list[Samples]:
+        """The rows of a trial, of each piece between gaps."""
+        if self.window is not None and self.window >= len(trial):
+            raise InputError(
+                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
+                f"{self.window} steps; give a smaller window"
+            )
+        fewest = FEWEST_SAMPLES if self.window is None else self.window + 1
+        pieces = between_gaps(trial, self.particulars, fewest)
+        window = self.window or default_window(max(pieces, key=len), self.particulars)
+        return [self._part(piece, index, window) for piece in pieces if len(piece) > window]
+
+    def _part(self, trial: Trial, index: int, window: int) -> Samples:
+        t, equations = trial.t, self.structure.equations
+        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.preprocessing)
+        integrals, moments = self._integrals(trial, channels)
+        if "q" in integrals:
+            memory = twice_integrated(t, integrals.pop("q"), moments["q"])
+            integrals["r"] = np.hstack([integrals["r"], memory])
+        first = np.arange(0, len(t) - window, max(window // 2, 1))
+        last = first + window
+        features, targets = {}, {}
+        for q, steps in integrals.items():
+            summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+            features[q] = steps if window == 1 else summed[last] - summed[first]
+            targets[q] = channels[q][last] - channels[q][first]
+        part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+        return without_memory(part) if "q" in equations else part
+
+    def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
+        """Integrals of the terms over each step, and their moments."""
+        t, equations = trial.t, self.structure.equations
+        if self.samples != "spline":
+            return step_integrals(t, channels, equations, self._terms, self.samples == "euler")
+        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
+        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], self.gear)
+        return spline_integrals(t, channels, equations, self._terms, rudder)
+
+    def _terms(self, equation: str, channels: Channels) -> Floats:
+        return self.structure.features(equation, channels, self.particulars, self.shaft_speed)
 
 
 def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
@@ -237,38 +271,6 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
             needed += 1
             ratio = preprocess.noise_ratio(trial.t, trial[channel], needed)
     return needed
-
-
-def _one_trial(
-    trial: Trial,
-    index: int,
-    structure: Structure,
-    terms: Terms,
-    samples: str,
-    window: int,
-    gear: SteeringGear | None,
-    preprocessing: str,
-) -> Samples:
-    t = trial.t
-    channels = preprocess.smoothed_channels(trial, structure.required_channels, preprocessing)
-    if samples == "spline":
-        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
-        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)
-        integrals, moments = spline_integrals(t, channels, structure.equations, terms, rudder)
-    else:
-        integrals, moments = step_integrals(t, channels, structure.equations, terms, samples == "euler")
-    if "q" in integrals:
-        memory = twice_integrated(t, integrals.pop("q"), moments["q"])
-        integrals["r"] = np.hstack([integrals["r"], memory])
-    first = np.arange(0, len(t) - window, max(window // 2, 1))
-    last = first + window
-    features, targets = {}, {}
-    for q, steps in integrals.items():
-        summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-        features[q] = steps if window == 1 else summed[last] - summed[first]
-        targets[q] = channels[q][last] - channels[q][first]
-    part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
-    return without_memory(part) if "q" in structure.equations else part
 
 
 def without_memory(part: Samples) -> Samples:

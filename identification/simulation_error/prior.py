@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.estimators.methods import Estimators, FitTask, Method
+from identification.estimators.methods import Method
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
@@ -41,7 +41,7 @@ BLOCKS = 5  # of time, into which a single trial is cut
 #: Virtual trials of a reference ship: rudder and heading of zigzags, rudder of turns, degrees.
 ZIGZAGS = ((10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False))
 TURNS = (35.0, -35.0, 15.0, -15.0)
-LONG, STEP = 20.0, 0.05  # ship lengths at service speed
+DURATION_LENGTHS, STEP_LENGTHS = 20.0, 0.05  # of the virtual trials, ship lengths at service speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +88,6 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         A model, its name or file; "auto" for the shipped one most like the target.
     blank : ShipModel
         The target but for its coefficients.
-
-    Returns
-    -------
-    Prior
 
     Raises
     ------
@@ -143,7 +139,7 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
         With the channel n.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
-    timing = {"duration": LONG * travel, "dt": STEP * travel}
+    timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
     runs = [zigzag(model, min(rudder, limit), heading, port, **timing) for rudder, heading, port in ZIGZAGS]
     runs += [turning_circle(model, float(np.clip(rudder, -limit, limit)), **timing) for rudder in TURNS]
@@ -174,10 +170,6 @@ def with_prior(
         The target but for its coefficients.
     folds : {"trials", "largest-rudder"}
         What the strength is chosen by (`choose_strength`).
-
-    Returns
-    -------
-    Method
 
     Raises
     ------
@@ -252,10 +244,6 @@ def fit_toward(
         From 0, which is the method as it is, to infinity, which is the prior.
     task : FitTask
         With the regression.
-
-    Returns
-    -------
-    dict of str to Estimator
     """
     if strength == 0.0:
         return method.fit(make, task)
@@ -321,8 +309,8 @@ def choose_strength(
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     excess = errors - errors[best]
-    spread = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
-    as_good = np.flatnonzero(excess.mean(axis=1) <= spread)
+    standard_error = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
+    as_good = np.flatnonzero(excess.mean(axis=1) <= standard_error)
     return float(STRENGTHS[int(as_good[-1])]), {
         f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)
     }

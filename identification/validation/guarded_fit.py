@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.estimators.estimator import Estimator
-from identification.estimators.methods import FitTask, Method, fit_held
+from identification.estimators.estimator import Estimator, FitTask
+from identification.estimators.methods import Method, fit_held
 from identification.regression.coefficients import with_accelerations
 from identification.validation.guard import STRENGTHS, hard_turn_features, reasons_unstable
 from shipgym.ships import ShipModel

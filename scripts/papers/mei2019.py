@@ -40,7 +40,7 @@ TABLE_4 = {
 }
 KVLCC2 = (0.90, 5.52, 2.79, 40.1, 1 / 48.7)
 SHIPPED = {"Mariner": "mariner", "Tanker": TANKER, "SR108": "container"}  # those of Table 4 that are here
-ALIKE = 0.02  # what rounding of Table 4 may change of a correlation
+ROUNDING = 0.02  # what rounding of Table 4 may change of a correlation
 
 HARD = 35.0  # rudder of the turns, degrees
 #: Measured by MARIN: overshoots of the 20/20, advance and tactical diameter at +35 degrees. The paper prints
@@ -84,8 +84,8 @@ def selection_rows() -> Iterator[Row]:
             printed,
             found[name],
             ours.get(SHIPPED.get(name, "")),
-            f"their way within {ALIKE:g}",
-            abs(found[name] - printed) < ALIKE,
+            f"their way within {ROUNDING:g}",
+            abs(found[name] - printed) < ROUNDING,
             "the table is rounded; at best: the ships that are here, with sqrt(g L)/V0 in place of L/V0"
             if name in SHIPPED
             else "the table is rounded; this ship is not here",

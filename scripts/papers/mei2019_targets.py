@@ -30,7 +30,7 @@ TANKER = "tanker"
 CANDIDATES = ("mariner", "container", TANKER, "kvlcc2")  # for the virtual ship: all but herself
 ZIGZAGS = ((10.0, False), (10.0, True), (20.0, False), (20.0, True))  # rudder and heading, port first
 SHOWN = "20-starboard"  # the zigzag of Table 5 and of figures 6 and 7
-FINE = 4  # steps of the simulation by sample
+STEPS_PER_SAMPLE = 4
 TURN, ZIGZAG = 15.0, 20.0  # ship lengths at service speed that are simulated
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "kvlcc2_marin"
@@ -112,7 +112,9 @@ def virtual() -> Target:
     second = float(np.sqrt(ship.particulars.length / load_model("kvlcc2").particulars.length))
     trials = tuple(
         _recorded(
-            zigzag(ship, angle, angle, duration=600.0 * second, dt=second / FINE, port_first=port),
+            zigzag(
+                ship, angle, angle, duration=600.0 * second, dt=second / STEPS_PER_SAMPLE, port_first=port
+            ),
             ship,
             f"{angle:g}-{'port' if port else 'starboard'}",
         )
@@ -123,9 +125,11 @@ def virtual() -> Target:
 
 def _recorded(run: Trial, ship: ShipModel, name: str) -> Trial:
     """What the paper's towing tank records: every so many steps, no orders, the shaft speed."""
-    channels = {c: run[c][::FINE] for c in ("x", "y", "psi", "u", "v", "r", "delta")}
+    channels = {c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")}
     channels["n"] = np.full(len(channels["u"]), ship.service_shaft_speed)
-    return Trial(run.t[::FINE], channels, name=name, kind=run.kind, length=ship.particulars.length)
+    return Trial(
+        run.t[::STEPS_PER_SAMPLE], channels, name=name, kind=run.kind, length=ship.particulars.length
+    )
 
 
 @cache

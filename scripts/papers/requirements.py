@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
 from identification.regression.samples import Samples, build_samples
 from identification.result import IdentificationResult
-from identification.search import TunedLSSVM
 from identification.search.objectives import held_out_error, time_blocks
 from papers.row import Paper, Requirement, Row
 from shipgym.manoeuvres import zigzag
@@ -31,7 +31,7 @@ DURATION, INTERVAL = 900.0, 0.5  # s
 SEED = 2018
 Z95 = 1.959963985
 C = 1e6
-OUTLIERS, SIZE = 20, 10.0  # every so manieth sample, by so many standard deviations of the target
+OUTLIERS, SIZE = 20, 10.0  # every 20th sample, by 10 standard deviations of the target
 SEARCHES, SEEDS = ("abc", "pso", "de"), 10
 LARGE, SMALL = 2**16, 2**13  # samples
 REPEATS = 10  # of timings, of which the best counts
@@ -87,7 +87,7 @@ REQUIREMENTS = (
         "The regressors of one trial have full rank and no coefficient's interval holds 0, where the thesis' "
         "four terms of surge and seven of steering drift; collinear terms are named, and the next manoeuvre "
         "is advised.",
-        (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_found_back",
+        (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_recovered",
          f"{_LSSVM}::test_collinear_terms_are_named",
          "tests/identification/test_experiment.py::test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit"),
         ("cao2015, Tables 2 to 4", "xu2020, Table 11", "song2020, Tables 3-3 and 3-4"),

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction
-from identification.estimators.dense_dual import dense_dual_multipliers
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.regression.forces import FORCES, ForceRegression, fit_forces, force_variances
+from papers.dense_dual import dense_dual_multipliers
 from papers.row import Paper, Row
 from papers.xu2020_tank import (
     NOISE,
@@ -239,7 +239,7 @@ def _loss_row(table: int) -> Row:
 
 
 def coefficient_rows() -> Iterator[Row]:
-    """Table 11 found back: by the last step of each force, and from X, Y and N together."""
+    """Table 11 recovered: by the last step of each force, and from X, Y and N together."""
     found = usual_fit()
     for name, value in TABLE_11.items():
         off = 100.0 * abs(found.joint[name] / value - 1.0)

@@ -93,7 +93,7 @@ def run(data: Data) -> Section:
             [[f"{s:g}", number(errors[s]), *turn_cells(turns(_at(hsva, s)))] for s in STRENGTHS],
         ),
         strength=f"{strength:g}",
-        judged=judged(found[best]),
+        verdict=verdict(found[best]),
     )
     return Section(
         "KVLCC2, MARIN's runs from HSVA's zigzags", text, {"real_ships_b.svg": painter(found, marin.runs)}
@@ -107,7 +107,7 @@ def _at(hsva: MeasuredShip, strength: float) -> ShipModel:
 MEASURED_ROW = ["measured (Mei 2019)", *(number(value, 2) for value in MEASURED), "-", "-"]
 
 
-def judged(model: ShipModel) -> str:
+def verdict(model: ShipModel) -> str:
     """The errors of the turn to starboard against the aims, in words."""
     turn = turns(model)[0]
     if turn is None or turn.advance_lengths is None or turn.tactical_diameter_lengths is None:
@@ -179,7 +179,7 @@ Turning circles with 35 degrees of rudder from straight ahead at service speed, 
 The refinement fits what the model simulates in segments of 8 ship lengths; the reference ship's turns stay
 inside its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
 
-{judged} The measured values printed for -35 repeat those of +35 and are not used; measured circles are not
+{verdict} The measured values printed for -35 repeat those of +35 and are not used; measured circles are not
 among the data here.
 
 The pull, {strength}, is found as in (a), each of the six runs predicted from the five others. How the turn

@@ -18,7 +18,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 MEASURES = ("r, deg/s", "heading, deg", "1st overshoot, deg", "2nd overshoot, deg")
-LONG = 25.0  # of a turn, ship lengths at service speed
+DURATION_LENGTHS = 25.0  # of a turn, ship lengths at service speed
 
 
 def zigzag_errors(model: ShipModel, trial: Trial) -> Floats:
@@ -49,7 +49,7 @@ def turns(model: ShipModel, rudder_deg: float = 35.0) -> list[TurningIndices | N
     found: list[TurningIndices | None] = []
     for side in (rudder_deg, -rudder_deg):
         try:
-            circle = turning_circle(model, side, LONG * travel, 0.02 * travel)
+            circle = turning_circle(model, side, DURATION_LENGTHS * travel, 0.02 * travel)
         except UnstableModelError:
             found.append(None)
             continue

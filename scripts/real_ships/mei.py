@@ -87,12 +87,12 @@ def run(data: Data) -> Section:
                 MEASURED_ROW,
             ],
         ),
-        spread=spread(ship),
+        differences=differences(ship),
     )
     return Section("KVLCC2, RM-SVM on MARIN's four zigzags", text, {"real_ships_c.svg": shown(ship, fitted)})
 
 
-def spread(ship: MeasuredShip) -> str:
+def differences(ship: MeasuredShip) -> str:
     """How far the runs to either side agree."""
     sides = []
     for angle in (10, 20):
@@ -127,7 +127,7 @@ Turning circles with 35 degrees of rudder, ship lengths:
 {turns}
 
 **Limits.** The overshoots that the paper prints as measured are not those of this record. First
-overshoots to starboard and to port, measured, degrees: {spread}. The linear correction of RM-SVM is
+overshoots to starboard and to port, measured, degrees: {differences}. The linear correction of RM-SVM is
 fitted where the zigzags are; in the steady turn it is extrapolated, and may make the turn worse than the
 bare reference ship.
 

@@ -10,7 +10,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.estimators.rm_svm import NEARLY, RMSVM
+from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import correlations, select_reference, similarity_vector
@@ -177,7 +177,7 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
     for weight in weights:
         learnt = fit(target, trials, **settings, C=weight, hold_out=["starboard-20"])
         errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
-    least = next(w for w, e in zip(weights, errors, strict=True) if e <= NEARLY * min(errors))
+    least = next(w for w, e in zip(weights, errors, strict=True) if e <= ERROR_TOLERANCE * min(errors))
     assert provenance["search"]["r"]["C"] == least
 
 

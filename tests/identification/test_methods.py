@@ -157,9 +157,10 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
         ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
         ({"method": "svr", "C": float("inf")}, "C: inf"),
         (
-            {"method": "ls", "rank": 3, "depth": 2},
-            "settings: rank, depth found, which method 'ls'",
+            {"method": "ls", "rank": 3, "epsilon": 0.1},
+            "settings: epsilon, rank found, which method 'ls'",
         ),
+        ({"depth": 2}, "depth: identify has no such option"),
     ],
 )
 def test_wrong_settings_are_named(

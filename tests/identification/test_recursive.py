@@ -75,7 +75,9 @@ def test_with_forgetting_rls_is_exponentially_weighted_least_squares() -> None:
 def test_tmils_is_mils_without_the_inverse(innovations: int, forgetting: float) -> None:
     X, y = regression()
     with_inverse, without = (
-        MultiInnovationLeastSquares(innovations, 0.0, inverse_free, forgetting).fit_history(X, y)
+        MultiInnovationLeastSquares(
+            forgetting, innovations=innovations, inverse_free=inverse_free
+        ).fit_history(X, y)
         for inverse_free in (False, True)
     )
     np.testing.assert_allclose(without[10:], with_inverse[10:], rtol=1e-6)
@@ -85,7 +87,10 @@ def test_tmils_is_mils_without_the_inverse(innovations: int, forgetting: float) 
 
 def test_samples_one_by_one_are_samples_at_once() -> None:
     X, y = regression()
-    for estimator in (MultiInnovationLeastSquares(4, 0.5), StochasticGradient(0.5, 0.98)):
+    for estimator in (
+        MultiInnovationLeastSquares(innovations=4, omega=0.5),
+        StochasticGradient(0.98, omega=0.5),
+    ):
         at_once = type(estimator)(**estimator.get_params()).update(X[:50], y[:50]).update(X[50:], y[50:])
         estimator.update(X[:50], y[:50])
         for phi, target in zip(X[50:], y[50:], strict=True):
@@ -107,7 +112,7 @@ def test_signals_side_by_side_are_signals_alone() -> None:
 @pytest.mark.parametrize("omega", [0.0, 0.5])
 def test_the_stochastic_gradient_converges_with_forgetting(omega: float) -> None:
     X, y = regression(4000, noise=0.0)
-    estimator = StochasticGradient(omega, forgetting=0.95)
+    estimator = StochasticGradient(omega=omega, forgetting=0.95)
     course = estimator.fit_history(X, y)
     errors = np.max(np.abs(course / TRUTH - 1.0), axis=1)
     assert errors[-1] < 1e-4
@@ -119,7 +124,7 @@ def test_a_nonlinear_innovation_bounds_what_an_outlier_does() -> None:
     X, y = regression(600)
     y[500] += 50.0 * np.std(y)
     linear, bounded = (
-        np.abs(MultiInnovationLeastSquares(3, omega).fit(X, y).coef_ / TRUTH - 1.0).max()
+        np.abs(MultiInnovationLeastSquares(innovations=3, omega=omega).fit(X, y).coef_ / TRUTH - 1.0).max()
         for omega in (0.0, 1.0)
     )
     assert bounded < 0.2 * linear

@@ -132,7 +132,7 @@ def errors(found: Floats) -> Floats:
 
 
 def from_pairs(count: int, interval: int, noisy: bool) -> Floats:
-    """The six parameters by LS-SVR from so many pairs of samples, every so manieth of the record."""
+    """The six parameters by LS-SVR from a number of pairs of samples, every n-th of the record."""
     found = []
     for X, y in regressions(zigzag_trial(noisy)).values():
         rows = slice(0, count * interval, interval)

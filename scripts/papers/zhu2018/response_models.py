@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
-from identification.search import TunedLSSVM
 from papers.row import Row
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
@@ -40,7 +40,7 @@ OUTLIERS = {"outlier_probability": 0.05, "outlier_size": 4.0 * DEGREE}  # in wha
 WINDOW = 2  # samples over which the form is integrated: two, to average the noise, in a lag of about one
 LAGS = 20
 SMALL_STEP = 0.1  # of predictions, s
-FASTEST = 1.0  # yaw rate at which a form that runs away is held, rad/s
+LARGEST_YAW_RATE = 1.0  # yaw rate at which a form that runs away is held, rad/s
 PRINTED = {
     ("LS", "linear"): (0.1960, 1.1657),
     ("LS-SVR", "linear"): (0.1921, 1.0524),
@@ -158,7 +158,7 @@ def residuals(form: Form, trial: Trial) -> Floats:
     path, now = np.empty(len(times)), float(trial["r"][0])
     for k, delta in enumerate(np.interp(times, trial.t, trial["delta"]).tolist()):
         path[k] = now
-        now = min(max(now + SMALL_STEP * form.rate(now, delta), -FASTEST), FASTEST)
+        now = min(max(now + SMALL_STEP * form.rate(now, delta), -LARGEST_YAW_RATE), LARGEST_YAW_RATE)
     return np.asarray(trial["r"] - path[::steps])
 
 
