@@ -24,7 +24,7 @@ from __future__ import annotations
 import platform
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -104,6 +104,8 @@ class BenchmarkResult:
     def save(self, folder: str | Path | None) -> BenchmarkResult:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
 
+        Returns the result with the hash of `episodes.parquet` in its summary.
+
         Raises
         ------
         InputError
@@ -119,8 +121,9 @@ class BenchmarkResult:
             raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
         write_episodes(self.episodes, target / EPISODES)
         about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
-        write_json({**self.summary, "episodes": about}, target / RESULTS)
-        return self
+        saved = replace(self, summary={**self.summary, "episodes": about})
+        write_json(saved.summary, target / RESULTS)
+        return saved
 
 
 def check_new(folder: Path, resume: bool) -> Path:

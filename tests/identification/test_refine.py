@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, build_samples, identify
-from identification.estimators.methods import FitTask, get_method
+from identification.estimators.estimator import FitTask
+from identification.estimators.methods import get_method
 from identification.simulation_error.refine import Refinement, refine
 from identification.simulation_error.segments import Shooter, compared_channels, cut
 from identification.validation.guarded_fit import guarded_fit

@@ -13,7 +13,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.search import TunedLSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.validation.prediction import predict
 from papers.row import Row
 from papers.zhu2018.container_ship import (
