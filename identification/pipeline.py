@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from identification.estimators.methods import FitTask, Method, get_method
+from identification.estimators.estimator import FitTask
+from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics
@@ -93,7 +94,7 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
         return fit, None
-    refined = refine(fit, task.samples, task.trials, refinement, _memory(task.blank.particulars))
+    refined = refine(fit, task, refinement, _memory(task.blank.particulars))
     return refined.fit, refined
 
 

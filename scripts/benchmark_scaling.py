@@ -100,15 +100,15 @@ def benchmark_table() -> None:
 
     tasks = [task.name for task in load_suite().tasks[:4]]
 
-    def fly(episodes: int, workers: int) -> None:
+    def run(episodes: int, workers: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
             benchmark("pid,lq", "shipgym-v1", tasks, f"{folder}/results", workers, episodes=episodes)
 
-    fly(1, 1)  # compiles
+    run(1, 1)  # compiles
     head("shipgym benchmark --controllers pid,lq, four tasks")
     for episodes in (10, 100):
         for workers in WORKERS:
-            row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: fly(e, w))
+            row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: run(e, w))
 
 
 def tasks_table() -> None:

@@ -22,12 +22,12 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from numpy_ships import numpy_step
+from papers.dense_dual import dense_dual_solution
 from rich.console import Console
 from rich.table import Table
 
 import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
-from identification.estimators.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
 from shipgym.envs.registration import TASKS
 from shipgym.kernels import layout
@@ -132,13 +132,13 @@ def single_environment(n_steps: int = 1000) -> Row:
     env.reset(seed=0)
     action = np.zeros(1, dtype=np.float32)
 
-    def fly() -> None:
+    def run() -> None:
         for _ in range(n_steps):
             _, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
                 env.reset()
 
-    compiled = n_steps / best_time(fly, SHORT_REPEATS)
+    compiled = n_steps / best_time(run, SHORT_REPEATS)
     (plain,) = run_python(STEPS_IN_PYTHON, MODEL, NUMBA_DISABLE_JIT="1")
     return Row(
         "single environment, gymnasium.make",

@@ -18,7 +18,7 @@ from shipgym.engine.compiled import CACHE_VARIABLE
 
 NEEDED = (
     "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
-    "joblib", "safetensors", "lazy-loader",
+    "threadpoolctl", "safetensors", "jinja2", "joblib", "lazy-loader",
 )  # fmt: skip
 EXTRAS = {
     "report": ("plotly",),

@@ -2,8 +2,7 @@
 
 With a linear kernel this is ridge regression with a free intercept. One singular value
 decomposition of the centred and scaled features, X = U S V', gives the coefficients for every C:
-V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system, which
-`dense_dual` keeps as printed.
+V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system.
 """
 
 from __future__ import annotations

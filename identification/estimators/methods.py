@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from sklearn.base import clone
 
 from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -21,35 +21,13 @@ from identification.estimators.recursive import (
     StochasticGradient,
 )
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
+from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples
-from identification.search import TunedLSSVM
 from identification.search.free_running import fit_free_running
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Estimators = dict[str, Estimator]
-
-
-@dataclass(frozen=True, eq=False)
-class FitTask:
-    """All that a method may look at.
-
-    Attributes
-    ----------
-    samples : Samples
-        The regression of each equation.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those behind the samples.
-    """
-
-    samples: Samples
-    blank: ShipModel
-    trials: Sequence[Trial]
 
 
 def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
@@ -125,15 +103,11 @@ def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     template, samples = make(), task.samples
     assert isinstance(template, TunedLSSVM)
     if template.objective == "free-running":
-        return dict(fit_free_running(template, samples, task.blank, task.trials))
+        return dict(fit_free_running(template, task))
     return {
         q: clone(template).fit(samples.features[q], samples.targets[q], samples.trial)
         for q in samples.features
     }
-
-
-def _fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    return fit_rm_svm(cast("Callable[[], RMSVM]", make), task.samples, task.blank, task.trials)
 
 
 _TLS_SVM = partial(TruncatedLSSVM, fit_intercept=False)
@@ -158,12 +132,12 @@ METHODS = {
         Method("mils", _MILS, regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _TLS_SVM, refined=True),
-        Method("rm-svm", RMSVM, fit=_fit_rm_svm),
+        Method("rm-svm", RMSVM, fit=fit_rm_svm),
     )
 }
 
 #: Estimators that look at more than the samples of one equation.
-FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: _fit_rm_svm}
+FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
 
 
 def get_method(method: str | Any) -> Method:
@@ -197,17 +171,9 @@ def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
     """Estimators whose terms are held back by what they do in a hard turn.
 
-    Ridge regression in which each feature is scaled by its size in a hard turn over a window: the
-    penalty falls on what is invisible in the data and large in the turn.
-
-    Parameters
-    ----------
-    samples : Samples
-        The regression.
-    sizes : dict of str to array of shape (n_terms,)
-        Size of each term in a hard turn (`guard.hard_turn_features`).
-    strength : float
-        Of the penalty, relative to the terms' contribution in the hard turn.
+    Ridge regression in which each feature is scaled by its size in a hard turn (`guard.hard_turn_features`)
+    over a window: the penalty falls on what is invisible in the data and large in the turn. Its strength is
+    relative to the terms' contribution there.
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)

@@ -20,9 +20,9 @@ from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
 from sklearn.utils.validation import validate_data
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, settings
-from identification.regression.samples import Samples
+from identification.regression.coefficients import with_accelerations
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
@@ -33,7 +33,6 @@ from shipgym.ships import GreyBox, ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Estimators = dict[str, Estimator]
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
@@ -176,21 +175,15 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
             return np.asarray(both.coef_, dtype=float).ravel()
 
 
-def fit_rm_svm(
-    make: Callable[[], RMSVM], samples: Samples, blank: ShipModel, trials: Sequence[Trial]
-) -> Estimators:
+def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
     Parameters
     ----------
     make : callable
-        Makes an unfitted estimator with the settings asked for.
-    samples : Samples
-        The regression (`grey_box.structure_samples`).
-    blank : ShipModel
-        The bare reference ship as a model of the target.
-    trials : sequence of Trial
-        Those behind the samples.
+        Makes an unfitted `RMSVM` with the settings asked for.
+    task : FitTask
+        Its model is the bare reference ship as a model of the target.
 
     Returns
     -------
@@ -202,15 +195,16 @@ def fit_rm_svm(
     InputError
         For a model without a reference ship.
     """
-    asked = make()
+    asked, samples = make(), task.samples
+    assert isinstance(asked, RMSVM)
     asked.check()
-    if not isinstance(blank.table, GreyBox):
+    if not isinstance(task.blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
+            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected structure 'grey-box', "
             "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
             "file; or choose another method, such as 'tls-svm'"
         )
-    tuner = _Tuner(asked, samples, blank, trials)
+    tuner = _Tuner(asked, task)
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
     estimators: Estimators = {}
@@ -226,10 +220,9 @@ def fit_rm_svm(
 class _Tuner:
     """Fits with different settings, and simulations with what they give."""
 
-    def __init__(self, asked: RMSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]) -> None:
-        self.asked, self.blank, self.trials = asked, blank, trials
-        self.samples = samples
-        self.thin = max(1, -(-len(samples) // MOST_ROWS))
+    def __init__(self, asked: RMSVM, task: FitTask) -> None:
+        self.asked, self.samples, self.blank, self.trials = asked, task.samples, task.blank, task.trials
+        self.thin = max(1, -(-len(task.samples) // MOST_ROWS))
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
@@ -246,15 +239,9 @@ class _Tuner:
 
     def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
-        table = self.blank.table
-        fits = [
-            self.fitted(q, weight, band, rows).coef_
-            for q, band in zip(self.samples.features, bands, strict=True)
-        ]
-        matrix = table.acceleration_matrix(self.blank.particulars, self.blank.service_shaft_speed)
-        values = np.linalg.solve(matrix, np.concatenate(fits))
-        return replace(
-            self.blank, coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True))
+        equations = zip(self.samples.features, bands, strict=True)
+        return with_accelerations(
+            self.blank, {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
         )
 
     def weight(self) -> float:
@@ -313,18 +300,7 @@ class _Tuner:
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
     """How far the heading of an open-loop simulation is from the measured one.
 
-    Parameters
-    ----------
-    model : ShipModel
-    trial : Trial
-        With the heading.
-    objective : {"rmse", "correlation"}
-        Root mean square, rad, or 1 less Pearson's correlation.
-
-    Returns
-    -------
-    float
-        Infinite where the model runs away.
+    Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the model runs away.
     """
     prediction = predict(model, trial)
     if prediction is None:

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.lssvm import LSSVM
+from identification.search import get_optimiser
 from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
-from identification.search.optimisers import get_optimiser
 from identification.search.search import Optimiser
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError

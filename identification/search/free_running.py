@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.estimator import FitTask
+from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
 from identification.regression.decomposition import decompose
-from identification.regression.samples import Samples
-from identification.search import TunedLSSVM, get_optimiser
+from identification.search import get_optimiser
 from identification.validation.prediction import predict
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
@@ -25,17 +26,7 @@ RAN_AWAY = 1e3  # counts as an error of so many times the motion
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The candidate.
-    trials : sequence of Trial
-        With u, v, r, psi and the rudder.
-
-    Returns
-    -------
-    float
-        0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
+    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
     """
     errors = []
     for trial in trials:
@@ -50,27 +41,22 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     return float(np.mean(np.minimum(errors, RAN_AWAY)))
 
 
-def fit_free_running(
-    settings: TunedLSSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]
-) -> dict[str, TunedLSSVM]:
+def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSVM]:
     """Estimators of all equations, their C chosen together by the error of simulated trials.
 
     Parameters
     ----------
     settings : TunedLSSVM
         Not fitted; gives optimiser, bounds, seed and scale.
-    samples : Samples
-        The regression.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those to simulate.
+    task : FitTask
+        Its trials are simulated.
 
     Returns
     -------
     dict of str to TunedLSSVM
         By equation; the variables of their common search are log10 C in the order of the equations.
     """
+    samples, blank, trials = task.samples, task.blank, task.trials
     equations = blank.table.regressed
     whitened = {
         q: decompose(samples.features[q], samples.targets[q], settings.scale, settings.fit_intercept)

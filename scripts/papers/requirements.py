@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
 from identification.regression.samples import Samples, build_samples
 from identification.result import IdentificationResult
-from identification.search import TunedLSSVM
 from identification.search.objectives import held_out_error, time_blocks
 from papers.row import Paper, Requirement, Row
 from shipgym.manoeuvres import zigzag

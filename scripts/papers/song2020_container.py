@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.recursive import MultiInnovationLeastSquares
+from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
-from identification.search import TunedLSSVM
 from papers.row import Row
 from shipgym.kernels import container as own
 from shipgym.manoeuvres import zigzag, zigzag_indices

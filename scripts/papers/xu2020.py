@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction
-from identification.estimators.dense_dual import dense_dual_multipliers
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.regression.forces import FORCES, ForceRegression, fit_forces, force_variances
+from papers.dense_dual import dense_dual_multipliers
 from papers.row import Paper, Row
 from papers.xu2020_tank import (
     NOISE,

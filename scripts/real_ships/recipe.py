@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from identification.estimators.methods import FitTask, get_method
+from identification.estimators.estimator import FitTask
+from identification.estimators.methods import get_method
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult

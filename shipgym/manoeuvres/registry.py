@@ -65,15 +65,7 @@ class Variants(Protocol):
 
 @dataclass(frozen=True)
 class Family:
-    """Manoeuvres of one kind, which share a section of the page that `shipgym trials` writes.
-
-    Attributes
-    ----------
-    title : str
-        Heading of the section.
-    variants : callable
-        From a ship and the depth of the water, m, to her manoeuvres of this family by name.
-    """
+    """Manoeuvres of one kind, which share a section of the page that `shipgym trials` writes."""
 
     title: str
     variants: Variants

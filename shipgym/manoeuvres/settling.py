@@ -39,19 +39,10 @@ class Steady:
 
 
 class Voyage:
-    """A manoeuvre in the making: one leg after the other, from straight ahead at service speed.
+    """A manoeuvre in the making: one leg after the other, from service speed or a given state.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    dt : float or None
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    conditions : Conditions
-        Depth of the water and weather. In weather the motion is never steady: legs that wait for it last
-        their longest.
-    state : array of shape (n_state,), optional
-        Where to start.
+    Samples are dt apart, s; by default a fortieth of the time to travel one ship length. In weather the
+    motion is never steady: legs that wait for it last their longest.
     """
 
     def __init__(

@@ -27,31 +27,15 @@ _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
 
 @dataclass(frozen=True)
 class TrialEntry:
-    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables.
+    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables."""
 
-    Attributes
-    ----------
-    file : str
-        As written; the trial's name.
-    path : Path
-        The CSV file.
-    kind, use
-        As in :class:`Trial`.
-    columns : mapping or None
-        Columns by channel as written; None: those named like channels.
-    conventions : Conventions
-        Signs, frame, origin and repair.
-    where : str
-        Start of messages: ``"ship.toml: [[trials]] 2"``.
-    """
-
-    file: str
-    path: Path
+    file: str  # as written; the trial's name
+    path: Path  # of the CSV file
     kind: str | None
     use: str
-    columns: Mapping[str, Any] | None
+    columns: Mapping[str, Any] | None  # by channel as written; None: those named like channels
     conventions: Conventions
-    where: str
+    where: str  # start of messages: "ship.toml: [[trials]] 2"
 
 
 @dataclass(frozen=True)

@@ -32,28 +32,10 @@ LONGEST_HOLE_STEPS = 20.0
 
 @dataclass(frozen=True)
 class Conventions:
-    """Signs, frame and origin of a file, and how missing values are treated.
+    """Signs, frame and origin of a file, and how missing values are treated: as in `Trial.from_csv`.
 
-    Parameters
-    ----------
-    rudder_positive : {"starboard", "port"}
-        Side to which a positive rudder angle of the file steers.
-    velocity_frame : {"body", "earth"}
-        Frame of columns u and v; "earth": north and east.
-    origin : {"midship", "cg"}
-        Point whose position and velocity the file holds.
-    xg : float, optional
-        Centre of gravity forward of midship, m; needed with origin "cg".
-    repair : {"interpolate"}, optional
-        How missing values are filled; None: they are refused. Holes of more than 10 rows and 20 time
-        steps are refused in any case.
-    where : str, optional
-        Start of the messages, such as ``"ship.toml: [conventions]"``.
-
-    Raises
-    ------
-    InputError
-        For an unknown word, or origin "cg" without `xg`.
+    With `repair`, holes of more than 10 rows and 20 time steps are refused all the same; `where` begins the
+    messages, such as ``"ship.toml: [conventions]"``.
     """
 
     rudder_positive: str = "starboard"
@@ -115,20 +97,9 @@ def to_project_conventions(
 ) -> tuple[dict[str, Array], frozenset[str]]:
     """Convert signs, frame and origin, and derive the channels that follow from others; also their names.
 
-    The yaw rate is derived from the heading, surge and sway from position and heading, the heading (relative
-    to the start) from the yaw rate where no position is recorded
-    (`shipgym.trials.derivatives.time_derivative`).
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    recorded : mapping of str to ndarray of shape (n_samples,)
-        In SI units with the file's conventions; the heading without jumps.
-    conventions : Conventions
-        The file's conventions.
-    where : str
-        Start of the messages.
+    The recorded channels are in SI units with the file's conventions, the heading without jumps, of shape
+    (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
+    heading, the heading (relative to the start) from the yaw rate where no position is recorded.
     """
     channels = dict(recorded)
     derived: set[str] = set()

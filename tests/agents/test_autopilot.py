@@ -4,7 +4,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, LineOfSight, fly
+from agents import LQ, LineOfSight, sail
 from agents.cli.terminal import ranking_table
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
@@ -58,7 +58,7 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     guest = random_policy(result.model, base=LQ.from_model(result.model), authority=0.01)
     found = verify(result.model, 24, 1, guests=[guest])
     told = verification_metrics(found)["controllers"]
-    alone = fly(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
+    alone = sail(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
     assert told["learned"]["cost_mean"] == pytest.approx(alone.cost.mean(), rel=1e-6)
     assert told["learned"]["gains"] is told["learned"]["margins"] is None
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from papers.dense_dual import dense_dual_solution, dense_truncated_solution
 from scipy.linalg import solve
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
@@ -11,7 +12,6 @@ from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.dense_dual import dense_dual_solution, dense_truncated_solution
 from identification.regression.decomposition import decompose_triangle, triangle
 from shipgym import InputError
 

@@ -91,6 +91,8 @@ def test_a_trial_gives_its_channels_read_only():
     assert trial["t"] is trial.t
     assert "r" in trial
     assert "v" not in trial
+    with pytest.raises(AttributeError, match="immutable"):
+        trial.use = "fit"
     assert list(trial.channels) == ["r", "psi"]
     with pytest.raises(ValueError, match="read-only"):
         trial["r"][0] = 5.0

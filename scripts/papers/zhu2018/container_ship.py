@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
-from identification.search import TunedLSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.validation.prediction import predict
 from papers.row import Row
 from papers.zhu2018.fits import (
@@ -299,7 +299,7 @@ def time_rows() -> Iterator[Row]:
                 best,
                 f"below {FAST:g}",
                 best < FAST,
-                f"the same search, by one decomposition; least of {REPEATS} on this estimator",
+                f"the same search, by one decomposition; least of {REPEATS} on this machine",
             )
 
 

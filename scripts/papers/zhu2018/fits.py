@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
 from identification.regression.samples import Samples, build_samples
-from identification.search import TunedLSSVM
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.structures import ZHU, accelerations
 from shipgym.trials.trial import Trial

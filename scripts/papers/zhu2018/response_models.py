@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
-from identification.search import TunedLSSVM
 from papers.row import Row
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel

@@ -13,7 +13,7 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.search import TunedLSSVM
+from identification.estimators.tuned import TunedLSSVM
 from identification.validation.prediction import predict
 from papers.row import Row
 from papers.zhu2018.container_ship import (
@@ -142,7 +142,7 @@ def time_rows() -> Iterator[Row]:
             found,
             f"below {FAST:g}",
             found < FAST,
-            f"the thesis shows a picture; least of {FINE_REPEATS} on this estimator",
+            f"the thesis shows a picture; least of {FINE_REPEATS} on this machine",
         )
     for method in SEARCHES:
         few, many = (seconds(count, method) for count in TIMED)
