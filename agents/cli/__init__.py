@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import (
-    FAILED,
-    Address,
-    EngineName,
-    Json,
-    ShipFileArgument,
-    Workers,
-    answered,
-    fail,
-)
+from agents.cli.command import FAILED, Address, EngineName, Json, ShipFileArgument, Workers, answered, fail
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.identify_options import takes_identify_options

@@ -212,11 +212,7 @@ class Shielded:
         """The state with which an episode begins: None, whatever the number of ships."""
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, ShieldState]:
         """See `Policy.predict`: the policy's commands, or those with the fallback's rudder."""
         given = np.asarray(observation)
