@@ -25,10 +25,10 @@ from agents.controllers.linear_loop import (
     sample_ship,
 )
 from agents.controllers.memory import checked_observation, heading_error
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
 Floats = NDArray[np.float64]
 Action = NDArray[np.float32]

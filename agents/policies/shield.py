@@ -31,10 +31,9 @@ from agents.controllers.memory import Flags, Floats, begun
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
-from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import Envelope, ShipModel
+from shipgym.tasks.task import OBSERVATION_NAMES, control_interval
 
 # what is remembered of each ship
 STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)

@@ -7,11 +7,11 @@ import warnings
 
 import numpy as np
 import pytest
+from shipgym.engine.generator import accelerations_source
+from shipgym.kernels import trigonometry
 
 import shipgym
 from shipgym.engine import compiled
-from shipgym.engine.generator import accelerations_source
-from shipgym.kernels import trigonometry
 from tests.shipgym.outer import outer
 
 sin_cos, wrap = outer(trigonometry.sin_cos), outer(trigonometry.wrap)
@@ -19,8 +19,8 @@ small_sin_cos, small_cosine = outer(trigonometry.small_sin_cos), outer(trigonome
 
 FLY = """
 import numpy as np, shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine
-engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2)
+from shipgym.envs.engine import Engine
+engine = Engine(shipgym.load_model("mariner"), 2)
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))

@@ -5,10 +5,10 @@ import math
 import numba
 import numpy as np
 import pytest
-
-import shipgym
 from shipgym.kernels import layout
 from shipgym.kernels.trigonometry import arctan, arctan2, exponential
+
+import shipgym
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2")
 

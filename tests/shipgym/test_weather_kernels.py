@@ -8,17 +8,17 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from shipgym.kernels import random
 
 import shipgym
 from shipgym import InputError, manoeuvres
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.kernels import random
+from shipgym.envs.engine import Engine
 from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.simulate import open_loop, simulate
+from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer
 
@@ -275,7 +275,7 @@ def test_voyages_in_weather_go_on_from_leg_to_leg():
 
 
 def engine(model, lanes, sea="rough", **task):
-    return CourseKeepingEngine(model, lanes, CourseKeepingTask(sea, **task))
+    return Engine(model, lanes, course_keeping_task(sea, **task))
 
 
 def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
@@ -350,9 +350,9 @@ def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
 
 FLY = """
 import numpy as np, shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2, CourseKeepingTask("rough"))
+from shipgym.envs.engine import Engine
+from shipgym.tasks.task import course_keeping_task
+engine = Engine(shipgym.load_model("mariner"), 2, course_keeping_task("rough"))
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
@@ -379,6 +379,6 @@ def test_wrong_weather(mariner):
     with pytest.raises(InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"):
         ahead(mariner, "rugh", 2)
     with pytest.raises(InputError, match="sea: 7 found"):
-        CourseKeepingTask(7)
+        course_keeping_task(7)
     with pytest.raises(InputError, match="seed: -1 found"):
         ahead(mariner, "rough", 2, seed=-1)
