@@ -16,7 +16,7 @@ from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
 RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
-MODELS = ("reference_model", "prior")  # options that may name a model's file
+MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
 
 
 def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[str, Any]:

@@ -82,10 +82,10 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
             console.print(result.summary(), markup=False, soft_wrap=True)
             console.print(prediction_table(result))
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
-    _judge(result)
+    _check_stable(result)
 
 
-def _judge(result: IdentificationResult) -> None:
+def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
     from identification.validation.warnings import model_warnings, why_unstable
@@ -207,4 +207,4 @@ def reduce_command(
         console.print(prediction_table(found.reduced, "with the terms left"))
         count = fields["terms"]
         console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
-    _judge(found.reduced)
+    _check_stable(found.reduced)

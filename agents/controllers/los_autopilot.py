@@ -133,11 +133,7 @@ class Guided(Controller):
         """
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
         given = checked_observation(observation, self.observes).copy()

@@ -157,11 +157,7 @@ class LearnedPolicy:
         """The state with which an episode begins: None, whatever the number of ships."""
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
 

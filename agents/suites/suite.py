@@ -21,7 +21,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +45,7 @@ ENVIRONMENTS: Mapping[str, tuple[str, str]] = {
 FIRST_SEED = 1_000_000
 N_EPISODES = 100
 DEFAULT_SUITE = "shipgym-v1"
+FOLDER = Path(__file__).parent
 FIELDS = ("environment", "model", "why", "sea", "options")
 
 
@@ -103,17 +103,7 @@ class BenchmarkTask:
         return FIRST_SEED + np.arange(N_EPISODES)
 
     def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
-        """Many ships at once under this task, by default with its own ship.
-
-        Parameters
-        ----------
-        num_envs : int
-            Number of ships.
-        model : ShipModel, optional
-            Another ship for the same task.
-        threads : int
-            Of the kernels.
-        """
+        """Many ships at once under this task, by default with its own ship."""
         ship, task, variety = self.parts
         return Engine(ship if model is None else model, num_envs, task, variety, threads=threads)
 
@@ -141,23 +131,18 @@ class Suite:
         InputError
             For an unknown name, with the nearest known one.
         """
-        for task in self.tasks:
-            if task.name == name:
-                return task
-        known = [task.name for task in self.tasks]
-        raise InputError(
-            f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
-            f"{did_you_mean(name, known)}"
-        )
+        known = {task.name: task for task in self.tasks}
+        if name not in known:
+            raise InputError(
+                f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
+                f"{did_you_mean(name, known)}"
+            )
+        return known[name]
 
 
 def list_suites() -> list[str]:
     """Names of the shipped suites."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in files("agents").joinpath("suites").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 @lru_cache(maxsize=4)
@@ -173,24 +158,18 @@ def load_suite(name: str = DEFAULT_SUITE) -> Suite:
 
 
 def suite_hash(name: str = DEFAULT_SUITE) -> str:
-    """SHA-256 of the file of a shipped suite.
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-    """
+    """SHA-256 of the file of a shipped suite; an InputError for an unknown name."""
     return hashlib.sha256(_suite_text(name).encode()).hexdigest()
 
 
 def suite_file(name: str, what: str) -> Path:
     """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
-    return Path(str(files("agents").joinpath("suites", f"{name}-{what}.json")))
+    return FOLDER / f"{name}-{what}.json"
 
 
 def _suite_text(name: str) -> str:
     check_choice(name, list_suites(), "suite")
-    return files("agents").joinpath("suites", f"{name}.toml").read_text(encoding="utf-8")
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def parse_suite(text: str, where: str) -> Suite:

@@ -2,7 +2,7 @@
 
 The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 
-    [defaults]                          # every setting of the algorithm, to learn from nothing
+    [defaults]                          # every setting of the algorithm, to learn from scratch
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
     [suite]                             # those that differ on every task of the suite
     [tasks.mariner-rough]               # those that differ on one of them
@@ -249,7 +249,7 @@ def load_settings(
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        nothing.
+        scratch.
 
     Raises
     ------

@@ -13,11 +13,12 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.lq import LQ
 from agents.controllers.pid import PID
+from agents.engines.jobs import HERE, JobEngine
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import check_folder, whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
-from agents.verification.monte_carlo import HERE, Engine, monte_carlo
+from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
@@ -50,7 +51,7 @@ def build_autopilot(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
@@ -73,7 +74,7 @@ def build_autopilot(
         Files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`).
     progress : callable, optional
         Called as the work goes on.
-    where : Engine
+    where : JobEngine
         Where the models drawn are worked on; the results are the same.
 
     Raises
@@ -119,7 +120,7 @@ def examine(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
     _tell(progress, "reading trials", 0, 1)
@@ -147,7 +148,7 @@ def verify(
     draws: int,
     seed: int,
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
 ) -> Verification:
     """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.

@@ -204,23 +204,10 @@ def forward_selection(
 def reduce(
     samples: Samples, structure: Structure, direction: str = "backward", tolerance: float = 1e-3
 ) -> dict[str, Reduction]:
-    """Reduce each equation of a structure.
+    """Reduce each equation of a structure by elimination ("backward") or selection ("forward").
 
-    Parameters
-    ----------
-    samples : Samples
-        The regression, built for the structure.
-    structure : Structure
-        Names the terms.
-    direction : {"backward", "forward"}
-        Elimination or selection.
-    tolerance : float
-        Of the held-out R2.
-
-    Returns
-    -------
-    dict of str to Reduction
-        By equation, with the coefficients of the features in SI units.
+    Returns the reductions by equation, with the coefficients of the features in SI units; the tolerance is
+    that of the held-out R2.
     """
     check_choice(direction, ("backward", "forward"), "direction")
     run = backward_elimination if direction == "backward" else forward_selection
@@ -231,21 +218,9 @@ def reduce(
 
 
 def reduced_structure(structure: Structure, reductions: dict[str, Reduction], name: str) -> Structure:
-    """The structure with the terms that were chosen.
+    """The structure, by a name of its own, with the terms that were chosen; register it to identify it.
 
-    Parameters
-    ----------
-    structure : Structure
-        That was reduced.
-    reductions : dict of str to Reduction
-        From `reduce`.
-    name : str
-        Of the new structure; register it to identify it (`shipgym.register_structure`).
-
-    Returns
-    -------
-    Structure
-        Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
+    Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
     """
     kept = {
         q: {t.name for t, label in zip(structure.terms(q), structure.names(q), strict=True)

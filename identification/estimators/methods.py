@@ -171,17 +171,9 @@ def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
     """Estimators whose terms are held back by what they do in a hard turn.
 
-    Ridge regression in which each feature is scaled by its size in a hard turn over a window: the
-    penalty falls on what is invisible in the data and large in the turn.
-
-    Parameters
-    ----------
-    samples : Samples
-        The regression.
-    sizes : dict of str to array of shape (n_terms,)
-        Size of each term in a hard turn (`guard.hard_turn_features`).
-    strength : float
-        Of the penalty, relative to the terms' contribution in the hard turn.
+    Ridge regression in which each feature is scaled by its size in a hard turn (`guard.hard_turn_features`)
+    over a window: the penalty falls on what is invisible in the data and large in the turn. Its strength is
+    relative to the terms' contribution there.
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)

@@ -26,17 +26,7 @@ RAN_AWAY = 1e3  # counts as an error of so many times the motion
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The candidate.
-    trials : sequence of Trial
-        With u, v, r, psi and the rudder.
-
-    Returns
-    -------
-    float
-        0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
+    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
     """
     errors = []
     for trial in trials:

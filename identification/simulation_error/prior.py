@@ -82,12 +82,8 @@ def formula_prior(formula: str, blank: ShipModel) -> Prior:
 def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     """The prior of a reference ship: its virtual trials at the target's scale, in the target's structure.
 
-    Parameters
-    ----------
-    reference : str or ShipModel
-        A model, its name or file; "auto" for the shipped one most like the target.
-    blank : ShipModel
-        The target but for its coefficients.
+    A model, its name or file, or "auto" for the shipped one most like the target, which is complete but for
+    its coefficients.
 
     Raises
     ------
@@ -127,17 +123,7 @@ def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:
-    """Zigzags and turning circles to both sides, up to the rudder's limit.
-
-    Parameters
-    ----------
-    model : ShipModel
-
-    Returns
-    -------
-    list of Trial
-        With the channel n.
-    """
+    """Zigzags and turning circles to both sides, up to the rudder's limit, with the channel n."""
     travel = model.particulars["length"] / model.particulars["speed"]
     timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
@@ -231,19 +217,9 @@ def _steady_strength(
 def fit_toward(
     make: Callable[[], Estimator], method: Method, prior: Prior, strength: float, task: FitTask
 ) -> Estimators:
-    """Estimators pulled toward a prior with a given strength.
+    """Estimators, made by `make`, pulled toward a prior with a given strength.
 
-    Parameters
-    ----------
-    make : callable
-        Makes an unfitted estimator.
-    method : Method
-        Fits them where there is no pull.
-    prior : Prior
-    strength : float
-        From 0, which is the method as it is, to infinity, which is the prior.
-    task : FitTask
-        With the regression.
+    From 0, where the method fits as it is, to infinity, which is the prior.
     """
     if strength == 0.0:
         return method.fit(make, task)
@@ -282,24 +258,12 @@ def _held(
 def choose_strength(
     make: Callable[[], Estimator], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
 ) -> tuple[float, dict[str, float]]:
-    """The strongest pull that is as good as the best on samples held out.
+    """The strongest pull that is as good as the best on samples held out, and the error of each strength.
 
     Held out are the trials one by one, or blocks of time of a single trial, or each of those with the largest
     rudder by a fit to all that have less. As good: within one standard error of the best (Breiman et al.
-    1984), because what the prior is for, hard turns, is in none of them.
-
-    Parameters
-    ----------
-    make, method, prior, task
-        As in `fit_toward`.
-    folds : {"trials", "largest-rudder"}
-        What is held out.
-
-    Returns
-    -------
-    strength : float
-    scores : dict of str to float
-        Mean square error held out, by that of no change at all, for each strength.
+    1984), because what the prior is for, hard turns, is in none of them. Errors are mean squares by that of
+    no change at all.
     """
     splits = list(_folds(task, folds))
     errors = np.array([

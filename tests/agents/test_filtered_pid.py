@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents import PID, FilteredPID, check_controller, fly, load_agent, step_response
+from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
 from agents.controllers.filtered_pid import LEAD, TURN, notch_band
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -54,7 +54,9 @@ def test_a_gentler_reference_needs_less_rudder(filtered):
 
 
 def test_with_the_reference_it_costs_less_than_the_plain_pid(filtered):
-    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(16)) for pilot in (filtered, PID.from_model(MARINER)))
+    ours, theirs = (
+        sail(pilot, MARINER, seeds=np.arange(16)) for pilot in (filtered, PID.from_model(MARINER))
+    )
     assert ours.cost.mean() < theirs.cost.mean()
 
 
@@ -85,7 +87,7 @@ def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
 def test_the_wave_filter_spares_the_rudder(filtered):
     deaf = FilteredPID.from_model(MARINER, wave_period=9.0)
     task = course_keeping_task(sea="moderate")
-    ours, theirs = (fly(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
+    ours, theirs = (sail(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
     assert ours.rudder_travel_deg_min.mean() < 0.7 * theirs.rudder_travel_deg_min.mean()
     assert ours.cost.mean() < theirs.cost.mean()
     assert 35.0 < deaf.margins.phase_margin_deg < filtered.margins.phase_margin_deg

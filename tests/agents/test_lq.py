@@ -8,7 +8,7 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents import LQ, fly, step_response
+from agents import LQ, sail, step_response
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
@@ -112,9 +112,9 @@ def test_a_course_change_ends_on_the_course_with_little_overshoot():
 )
 def test_ships_hard_to_steer_are_kept_on_course(model):
     lq = LQ.from_model(model)
-    flights = fly(lq, model, seeds=np.arange(32))
-    assert not flights.terminated.any()
-    assert flights.cost.mean() < 70.0
+    episodes = sail(lq, model, seeds=np.arange(32))
+    assert not episodes.terminated.any()
+    assert episodes.cost.mean() < 70.0
     step = step_response(lq, model, duration=60.0 * LENGTH_TIME)
     assert np.degrees(step.heading[0, -200:]) == pytest.approx(20.0, abs=0.1)
 

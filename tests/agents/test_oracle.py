@@ -82,7 +82,7 @@ def test_it_never_costs_more_than_its_start_and_knows_the_state_behind_the_noise
     task = course_keeping_task(sea="rough", noise=5.0, course_change_deg=5.0, episode_steps=120)
     found = run_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), QUICK)
     assert np.all(found.costs < found.start_costs)
-    coarse = OracleSettings(candidates=4, elites=2, iterations=1, passes=1, spread=3.0)
+    coarse = OracleSettings(candidates=4, elites=2, iterations=1, passes=1, deviation=3.0)
     found = run_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), coarse)
     assert np.all(found.costs <= found.start_costs)
 

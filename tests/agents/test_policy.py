@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, LQG, LearnedPolicy, check_controller, fly
+from agents import LQ, LQG, LearnedPolicy, check_controller, sail
 from agents.policies.policy import ORDERS, Memory, order_numbers
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -119,7 +119,7 @@ def test_the_network_adds_its_part_to_the_base():
     np.testing.assert_array_equal(policy.predict(SEEN)[0], np.clip(base + np.float32(0.3) * part, -1.0, 1.0))
     silent = tuple((0.0 * weight, 0.0 * bias) for weight, bias in policy.network.layers)
     quiet = replace(policy, network=replace(policy.network, layers=silent))
-    np.testing.assert_array_equal(fly(quiet, MARINER).cost, fly(LQ_MARINER, MARINER).cost)
+    np.testing.assert_array_equal(sail(quiet, MARINER).cost, sail(LQ_MARINER, MARINER).cost)
 
 
 @pytest.mark.parametrize("more", [{}, {"action": "rudder-discrete"}, *WITH_MEMORY.values()], ids=list)
@@ -143,7 +143,7 @@ def path_policy():
 def test_a_policy_fits_what_it_learned_with():
     random_policy().check_fits_model(MARINER)
     path_policy().check_fits_model(MARINER)
-    assert fly(random_policy(), MARINER, course_keeping_task(episode_steps=5)).cost > 0.0
+    assert sail(random_policy(), MARINER, course_keeping_task(episode_steps=5)).cost > 0.0
 
 
 def test_another_environment_is_refused_with_the_difference():
@@ -151,9 +151,9 @@ def test_another_environment_is_refused_with_the_difference():
     with pytest.raises(InputError, match=r"model 'mariner': the scale of 'yaw_rate' is .* policy 'learned'"):
         random_policy().check_fits_model(other)
     with pytest.raises(InputError, match="the scale of 'yaw_rate'"):
-        fly(random_policy(), load_model("kvlcc2"))
+        sail(random_policy(), load_model("kvlcc2"))
     with pytest.raises(InputError, match=r"8 observations found, expected 13; .*: cross_track, course_error"):
-        fly(path_policy(), MARINER)
+        sail(path_policy(), MARINER)
     with pytest.raises(
         InputError, match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last"
     ):
