@@ -20,7 +20,15 @@ if TYPE_CHECKING:
     from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
     from shipgym.manoeuvres import towing_tank
     from shipgym.sea.conditions import Current, Waves, Weather, Wind, sea_states
-    from shipgym.ships import ShipModel, list_models, list_structures, load_model, register_structure
+    from shipgym.ships import (
+        ShipEquations,
+        ShipModel,
+        list_models,
+        list_structures,
+        load_model,
+        register_ship_equations,
+        register_structure,
+    )
     from shipgym.ships.checker import ModelCheck, check_ship_model
     from shipgym.ships.particulars import Particulars
     from shipgym.ships.scaling import scale_model
@@ -39,6 +47,7 @@ _HOME = {
     "ModelCheck": "shipgym.ships.checker",
     "Particulars": "shipgym.ships.particulars",
     "RecordEpisode": "shipgym.envs.recording",
+    "ShipEquations": "shipgym.ships",
     "ShipFile": "shipgym.trials.ship_file",
     "ShipModel": "shipgym.ships",
     "ShipVecEnv": "shipgym.envs.sb3",
@@ -54,6 +63,7 @@ _HOME = {
     "list_models": "shipgym.ships",
     "list_structures": "shipgym.ships",
     "load_model": "shipgym.ships",
+    "register_ship_equations": "shipgym.ships",
     "register_structure": "shipgym.ships",
     "scale_model": "shipgym.ships.scaling",
     "straight_line_stability": "shipgym.ships.stability",
@@ -75,6 +85,7 @@ __all__ = [
     "ModelCheck",
     "Particulars",
     "RecordEpisode",
+    "ShipEquations",
     "ShipFile",
     "ShipModel",
     "ShipVecEnv",
@@ -92,6 +103,7 @@ __all__ = [
     "load_model",
     "manoeuvres",
     "plots",
+    "register_ship_equations",
     "register_structure",
     "scale_model",
     "sea_states",

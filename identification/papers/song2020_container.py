@@ -18,8 +18,8 @@ from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.papers.row import Row
 from identification.pipeline import identify
 from identification.search import TunedLSSVM
-from shipgym.ships import container as own
 from shipgym.manoeuvres import zigzag, zigzag_indices
+from shipgym.ships import container as own
 from shipgym.ships import load_model
 from shipgym.ships.inertia import inertia
 from shipgym.ships.terms import read_terms

@@ -14,8 +14,7 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions
-from shipgym.ships.conditions import Seed
+from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 

@@ -12,9 +12,8 @@ from shipgym.manoeuvres.excitation import shaft_of
 from shipgym.manoeuvres.execution import distance_sailed, ship_length
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions
+from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.equations import ShipEquations
-from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 

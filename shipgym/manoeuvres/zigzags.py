@@ -13,8 +13,7 @@ from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage
-from shipgym.ships.conditions import Seed
+from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial

@@ -45,7 +45,9 @@ def as_weather(weather: Weather | str | None, where: str, from_deg: float | None
         raise InputError(f"{where}: {reason}") from None
 
 
-def weather_column(model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf) -> Floats:
+def weather_column(
+    model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf
+) -> Floats:
     """Rows that tell a ship's weather, in the order of `shipgym.kernels.weather_rows`.
 
     Parameters

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS, check_channel
 
