@@ -1,6 +1,6 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
-The machine code of a loop lies in the cache under a name that hashes everything it depends on: the bytecode of
+The machine code of a loop lies in the cache under a name that hashes all that it depends on: the bytecode of
 the loop and of every function put into it, the fields of their records, the versions of Python and Numba, and
 the processor. A file that is there is right, whoever made it and when; so a cache that was filled beforehand
 and may only be read is used as it is.
@@ -12,7 +12,6 @@ import os
 import re
 import sys
 import warnings
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from pathlib import Path
@@ -20,7 +19,7 @@ from typing import Any
 
 from platformdirs import user_cache_path
 
-from shipgym.engine.specialise import PHYSICS, Part, Parts, Specialisation, fingerprint
+from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
 from shipgym.errors import InputError
 
 CACHE_VARIABLE = "SHIPGYM_CACHE"
@@ -59,7 +58,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     from shipgym.engine.disk_cache import DiskCache
 
     copy = Specialisation(parts, tag, numba.njit).copy(loop)
-    dispatcher = numba.njit(nogil=True, **PHYSICS)(copy)
+    dispatcher = numba.njit(nogil=True, **SEMANTICS)(copy)
     folder = _folder()
     if folder is None:
         _compile(dispatcher, signature, what)
@@ -79,8 +78,14 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
 
     if not quiet:
         _announce(what)
+    from numba.core.compiler_lock import global_compiler_lock
+
+    from shipgym.engine.lean_numba import lean
+
+    name = dispatcher.py_func.__qualname__
     try:
-        dispatcher.compile(signature)
+        with global_compiler_lock, lean(name.rpartition("_")[2], name):
+            dispatcher.compile(signature)
     except numba.core.errors.NumbaError as error:
         raise InputError(explanation(error, what)) from None
 
@@ -140,6 +145,3 @@ def _lock(path: Path) -> AbstractContextManager[Any]:
     from filelock import FileLock
 
     return FileLock(path) if os.access(path.parent, os.W_OK) else nullcontext()
-
-
-__all__ = ["Callable", "Part", "compiled"]

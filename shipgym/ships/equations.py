@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.specialise import Part
+from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars

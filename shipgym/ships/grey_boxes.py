@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.specialise import Part
+from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel

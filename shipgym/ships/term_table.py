@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_text, quoted
-from shipgym.engine.specialise import Part
+from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars

@@ -5,7 +5,8 @@ from typing import Any
 
 from numba import njit
 
-from shipgym.engine.specialise import Part, Specialisation
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import Specialisation
 
 
 def outer(function: Callable[..., Any]) -> Callable[..., Any]:

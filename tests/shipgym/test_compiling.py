@@ -14,7 +14,8 @@ import pytest
 import shipgym
 from shipgym.engine import compiling, mathematics
 from shipgym.engine.loops import LOOPS, ship_loop
-from shipgym.engine.specialise import Part, fingerprint
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import fingerprint
 from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
 from shipgym.ships.term_functions import Sum, accelerations_source
 from shipgym.ships.terms import Term

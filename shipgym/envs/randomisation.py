@@ -1,4 +1,4 @@
-"""The ships of which an environment gives each episode one: draws from a posterior, an ensemble, ranges."""
+"""Domain randomisation: the ships of which an environment gives each episode one."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ POOL_SIZE = 256  # ships drawn from what is continuous
 POOL_SEED = 20260101
 N_SPEEDS = 9  # approach speeds, evenly over their range
 Range = tuple[float, float]
-SmallFleet = list[tuple[ShipModel, Weather]]
+Pool = list[tuple[ShipModel, Weather]]
 
 
 @dataclass(frozen=True)
-class Variety:
+class Randomisation:
     """What differs from episode to episode beside task and sea.
 
     Attributes
     ----------
-    model_uncertainty : {None, "posterior"}
-        Whether each episode's ship is drawn from the identified covariance.
+    model_uncertainty : {None, "covariance"}
+        Whether each episode's ship is drawn from the identified covariance ("posterior" is taken too).
     ensemble : sequence of str, Path or ShipModel
         Further models of the same structure, of which each episode has one.
     speed_range : tuple of float or None
@@ -47,7 +47,7 @@ class Variety:
 
     def __post_init__(self) -> None:
         if self.model_uncertainty is not None:
-            check_choice(self.model_uncertainty, ("posterior",), "model_uncertainty")
+            check_choice(self.model_uncertainty, ("covariance", "posterior"), "model_uncertainty")
         if isinstance(self.ensemble, str | Path | ShipModel):
             raise InputError(f"ensemble: {self.ensemble!r} found, expected a list of models")
         for name in ("speed_range", "loading_range"):
@@ -61,11 +61,11 @@ class Variety:
 
     @classmethod
     def take_from(cls, options: Mapping[str, Any]) -> tuple[Self, dict[str, Any]]:
-        """The variety that is named among an environment's options, and the others."""
+        """What is randomised among an environment's options, and the others."""
         own = {key: value for key, value in options.items() if key in cls.names()}
         return cls(**own), {key: value for key, value in options.items() if key not in own}
 
-    def ships(self, model: ShipModel, seas: Sequence[Weather]) -> SmallFleet:
+    def ships(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
         """Ship and sea of the pool that episodes are drawn from; a single one where nothing differs.
 
         Parameters
@@ -86,7 +86,7 @@ class Variety:
         """
         models = [model, *(one if isinstance(one, ShipModel) else load_model(one) for one in self.ensemble)]
         for other in models[1:]:
-            if other.accelerations_source != model.accelerations_source:
+            if other.vessel is not model.vessel:
                 raise InputError(
                     f"ensemble: {other.name!r} has other equations than {model.name!r}, expected models of "
                     "one structure; make an environment for each"

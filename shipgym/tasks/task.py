@@ -1,36 +1,26 @@
-"""What the tasks of all environments have in common: the sea, the commands, what is seen, and its price."""
+"""A task with its options: what is asked of an autopilot, in which sea, by which commands, with which sensors."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
-from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
+from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
-from shipgym.kernels import layout
-from shipgym.kernels import voyage_rows as rows
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
-from shipgym.trials.sensors import SEA_TRIAL
+from shipgym.tasks.definition import TaskDefinition, read_definition
 
 Floats = NDArray[np.float64]
 Sea = str | Weather
 
-HEADING_SCALE = np.radians(30.0)  # heading error and rudder angle that cost 1 and RUDDER_WEIGHT a step
-RUDDER_WEIGHT = 0.1  # Norrbin 1972
-RATE_WEIGHT = 0.01  # on the rudder rate in HEADING_SCALE per ship length sailed
-ROLL_SCALE = np.radians(30.0)  # heel that costs `roll_weight` a step, and is seen as 1
-ROLL_RATE_SCALE = 0.1  # rad/s, seen as 1
-INTEGRAL_ZONE = np.radians(10.0)  # the error is integrated only within this
-INTEGRAL_LENGTHS = 10.0  # the integral's scale: INTEGRAL_ZONE for so many ship lengths
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
 STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
 
@@ -38,11 +28,6 @@ ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 MEASUREMENTS = ("raw", "filtered")
-
-COMMON_INFO = (
-    "heading_error", "envelope_distance", "extrapolating",
-    "reward_rudder", "reward_rudder_rate", "reward_roll", "reward_envelope", "reward_end",
-)  # fmt: skip
 
 
 class Observed(NamedTuple):
@@ -53,26 +38,30 @@ class Observed(NamedTuple):
     name : str
         Of the quantity.
     low, high : float
-        Bounds of what is seen.
+        Bounds of the observation.
     scale : float
         Physical value of 1, SI units.
-    row : int
-        Where the kernels keep it.
+    path : str
+        Where it stands in the task's `Observation`.
     """
 
     name: str
     low: float
     high: float
     scale: float
-    row: int
+    path: str
 
 
 @dataclass(frozen=True)
-class Task(ABC):
+class Task:
     """What is asked of an autopilot.
 
     Attributes
     ----------
+    definition : TaskDefinition
+        Records and functions of the task.
+    settings : NamedTuple
+        Its settings.
     sea : {"calm", "slight", "moderate", "rough"}, Weather, or a sequence of them
         Sea state, whose wind and waves come from a direction drawn for each episode, or any weather; of
         several one is drawn for each episode.
@@ -89,10 +78,6 @@ class Task(ABC):
         shaft whose propeller is known ahead only is stopped by an order astern.
     roll : bool
         Whether roll angle and rate are observed.
-    roll_weight : float
-        Cost of a step with 30 degrees of heel.
-    envelope_weight : float
-        Cost of a step in which the model extrapolates.
     noise : float
         Noise of heading, yaw rate, speeds and position, in multiples of a sea trial's sensors (`SEA_TRIAL`).
     measurement : {"raw", "filtered"}
@@ -102,21 +87,18 @@ class Task(ABC):
         m; for ships that know shallow water.
     """
 
+    definition: TaskDefinition
+    settings: Any
     sea: Sea | Sequence[Sea] = "calm"
     dt: float | None = None
     episode_steps: int = 600
     max_envelope_distance: float = 5.0
     action: str = "rudder"
     roll: bool = False
-    roll_weight: float = 0.0
-    envelope_weight: float = 0.0
     noise: float = 0.0
     measurement: str = "raw"
     water_depth: float = float("inf")
-
-    kernel: ClassVar[str] = ""  # file of its task in `shipgym.kernels`
-    info_names: ClassVar[tuple[str, ...]] = COMMON_INFO
-    flags: ClassVar[frozenset[str]] = frozenset({"extrapolating"})
+    options: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
         if not self.seas:
@@ -127,20 +109,39 @@ class Task(ABC):
         check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
         check_choice(self.action, ACTIONS, "action")
         check_choice(self.measurement, MEASUREMENTS, "measurement")
-        for name in ("roll_weight", "envelope_weight", "noise"):
-            check_number(getattr(self, name), name, at_least=0.0)
+        check_number(self.noise, "noise", at_least=0.0)
 
     @classmethod
-    def from_options(cls, options: Mapping[str, Any]) -> Self:
-        """A task by keywords.
+    def of(cls, definition: Any, **options: Any) -> Self:
+        """A task by keywords: those of all tasks, and the settings of its own.
 
         Raises
         ------
         InputError
             For a keyword that it does not have, or a value out of range.
         """
-        check_keys(options, [item.name for item in fields(cls)], f"{cls.__name__} options")
-        return cls(**options)
+        task = read_definition(definition, options.pop("reward", None))
+        check_keys(options, cls.option_names(task), f"{task.name} options")
+        own = {name: value for name, value in options.items() if name in task.settings}
+        common = {name: value for name, value in options.items() if name not in own}
+        return cls(
+            task, task.make_settings(own), **{"episode_steps": task.episode_steps, **common}, options=options
+        )
+
+    @classmethod
+    def option_names(cls, definition: TaskDefinition) -> tuple[str, ...]:
+        """Keywords of a task."""
+        common = [item.name for item in fields(cls)[2:] if item.name != "options"]
+        return (*definition.settings, *common)
+
+    def changed(self, **options: Any) -> Task:
+        """The same task with other options."""
+        return Task.of(self.definition, **{**self.options, **options})
+
+    @property
+    def name(self) -> str:
+        """Of the task."""
+        return self.definition.name
 
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
@@ -185,24 +186,28 @@ class Task(ABC):
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
+        self.definition.check(self.settings, model)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
-        length, speed = model.particulars["length"], model.particulars["speed"]
-        limit = model.steering.limit
-        integral = INTEGRAL_ZONE * INTEGRAL_LENGTHS * length / speed
-        at = layout.offsets(rows.OBSERVED, rows.N_STEERING)
-        steering = (
-            Observed("heading_error_sin", -1.0, 1.0, 1.0, at[0]),
-            Observed("heading_error_cos", -1.0, 1.0, 1.0, at[1]),
-            Observed("yaw_rate", -5.0, 5.0, speed / length, at[2]),
-            Observed("sway", -2.0, 2.0, speed, at[3]),
-            Observed("surge", -2.0, 3.0, speed, at[4]),
-            Observed("rudder", -1.0, 1.0, limit, at[5]),
-            Observed("last_command", -1.0, 1.0, limit, at[6]),
-            Observed("heading_error_integral", -1.0, 1.0, integral, at[7]),
+        ship = ship_of(model, self.water_depth)
+        shown = self._options(model)
+        return tuple(
+            Observed(path.rpartition(".")[2], seen.low, seen.high, self.scale(path, ship), path)
+            for path, seen in self.definition.seen.items()
+            if seen.option in shown
         )
-        return steering + self.observed_of_task(model) + self._observed_extras(model)
+
+    def _options(self, model: ShipModel) -> tuple[str, ...]:
+        """Options that show a quantity."""
+        shaft = self.action == "rudder-shaft"
+        speed = shaft and "n" in model.state_names
+        return ("", *["roll"] * self.roll, *["shaft"] * shaft, *["shaft speed"] * speed)
+
+    def scale(self, path: str, ship: Ship) -> float:
+        """Physical value of an observation of 1."""
+        scale = self.definition.seen[path].scale
+        return float(scale(ship, self.settings)) if callable(scale) else float(scale)
 
     @property
     def n_commands(self) -> int:
@@ -213,71 +218,45 @@ class Task(ABC):
         """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
         return -1.0 if model.turns_astern else 0.0
 
-    def observed_of_task(self, model: ShipModel) -> tuple[Observed, ...]:
-        """What the task itself adds to what is observed."""
-        return ()
+    @cached_property
+    def info_names(self) -> tuple[str, ...]:
+        """What `info` has."""
+        parts = [f"reward_{name}" for name in (*self.definition.reward_names, "end")]
+        return (*self.definition.reported, "envelope_distance", "extrapolating", *parts)
 
-    def _observed_extras(self, model: ShipModel) -> tuple[Observed, ...]:
-        extras: tuple[Observed, ...] = ()
-        if self.roll:
-            extras += (
-                Observed("roll", -3.0, 3.0, ROLL_SCALE, rows.ROLL_SEEN),
-                Observed("roll_rate", -5.0, 5.0, ROLL_RATE_SCALE, rows.ROLL_RATE_SEEN),
-            )
-        if self.action == "rudder-shaft":
-            shaft = model.service_shaft_speed
-            if "n" in model.state_names:
-                extras += (Observed("shaft_speed", -2.0, 2.0, shaft, rows.SHAFT_SEEN),)
-            extras += (Observed("last_shaft_command", -1.0, 1.0, shaft, rows.SHAFT_COMMAND_SEEN),)
-        return extras
-
-    def settings(self, model: ShipModel) -> Floats:
-        """The task as the kernels read it."""
-        listed = self.listed(model)
-        settings = np.zeros(rows.LIST + len(listed))
-        settings[rows.DT] = self.interval(model)
-        settings[rows.SUBSTEPS] = self.substeps(model)
-        settings[rows.TIME_LIMIT] = self.episode_steps
-        settings[rows.LARGEST_DISTANCE] = self.max_envelope_distance
-        settings[rows.HEADING_SCALE] = HEADING_SCALE
-        settings[rows.RUDDER_WEIGHT] = RUDDER_WEIGHT
-        settings[rows.RATE_WEIGHT] = RATE_WEIGHT
-        settings[rows.ROLL_WEIGHT], settings[rows.ROLL_SCALE] = self.roll_weight, ROLL_SCALE
-        settings[rows.ENVELOPE_WEIGHT] = self.envelope_weight
-        settings[rows.INTEGRAL_ZONE] = INTEGRAL_ZONE
-        settings[rows.INTEGRAL_LENGTHS] = INTEGRAL_LENGTHS
-        settings[rows.NOISE] = self.noise > 0.0
-        deviations = [SEA_TRIAL[name].noise for name in ("psi", "r", "u", "x")]
-        settings[rows.NOISE_PSI : rows.NOISE_POSITION + 1] = self.noise * np.array(deviations)
-        settings[rows.WAVE_FILTERED] = self.measurement == "filtered"
-        shown = [quantity.row for quantity in self.observed(model)]
-        settings[rows.N_SHOWN] = len(shown)
-        settings[rows.SHOWN : rows.SHOWN + len(shown)] = shown
-        own = self.own_settings(model)
-        settings[rows.TASK_SETTINGS : rows.TASK_SETTINGS + len(own)] = own
-        settings[rows.LEAST_SHAFT] = self.least_shaft(model)
-        settings[rows.N_LIST], settings[rows.LIST :] = len(listed), listed
-        return settings
-
-    @abstractmethod
-    def own_settings(self, model: ShipModel) -> Sequence[float]:
-        """Settings of the task's own kernel, in its order."""
-
-    def listed(self, model: ShipModel) -> Sequence[float]:
-        """Numbers of any count that the task's own kernel reads."""
-        return ()
-
-    def episode_rows(self) -> int:
-        """Rows of the state that last over an episode."""
-        return 0
+    @cached_property
+    def flags(self) -> frozenset[str]:
+        """What of it is true or false."""
+        return frozenset({"extrapolating", *self.definition.flags})
 
     @property
     def reward_parts(self) -> tuple[str, ...]:
         """Names of the parts of the reward among those of `info`."""
         return tuple(name for name in self.info_names if name.startswith("reward_"))
 
+    def __getattr__(self, name: str) -> Any:
+        """A setting by its name."""
+        if name.startswith("_") or name in ("definition", "settings", "seas"):
+            raise AttributeError(name)
+        for record in (self.settings, *(value for value in self.settings if hasattr(value, "_fields"))):
+            if name in record._fields:
+                return getattr(record, name)
+        raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
 
-NO_OPTIONS: Mapping[str, Any] = MappingProxyType({})
+
+def ship_of(model: ShipModel, water_depth: float = float("inf")) -> Ship:
+    """What every ship has beside her coefficients, as a record."""
+    gear, p = model.steering, model.particulars
+    return Ship(
+        length=p["length"],
+        speed=p["speed"],
+        rudder_limit=gear.limit,
+        rudder_rate=gear.rate,
+        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+        shaft=float(model.service_shaft_speed),
+        water_depth=water_depth,
+        scale_speed=p["speed"],
+    )
 
 
 def control_interval(model: ShipModel) -> float:
