@@ -91,7 +91,7 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
 
 
 def explanation(error: Exception, what: str) -> str:
-    """Numba's reason in one sentence, with the function and the line it is about, those of the innermost call."""
+    """Numba's reason in one sentence, with the function and the line of the innermost call."""
     text = str(error)
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")

@@ -9,8 +9,8 @@ from typing import Any
 
 from shipgym.engine import batches, passages, rate_steering, segments, trajectories, zigzag
 from shipgym.engine.compiling import compiled
-from shipgym.engine.records import LANES
 from shipgym.engine.parts import Part
+from shipgym.engine.records import LANES
 from shipgym.engine.vessel import Vessel
 
 SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parameters

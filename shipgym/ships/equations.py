@@ -24,8 +24,8 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.parts import Part
+from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
@@ -125,8 +125,8 @@ class ShipEquations:
             raise InputError(f"{where}: {at.name} ({at.filename}, line {at.lineno}): {reason}") from error
         if not isinstance(found, tuple) or len(found) != len(RATES):
             raise InputError(
-                f"{where}: accelerations returns {found!r}, expected five numbers: udot, vdot, rdot, pdot, qdot, "
-                "0 for those that the ship does not have"
+                f"{where}: accelerations returns {found!r}, expected five numbers: udot, vdot, rdot, pdot, "
+                "qdot, 0 for those that the ship does not have"
             )
         for name, value in zip((*RATES, "shaft_acceleration"), (*found, shaft or 0.0), strict=True):
             if not isinstance(value, (int, float)):

@@ -49,7 +49,10 @@ def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_pat
     np.testing.assert_array_equal(again.ship_numbers(), model.ship_numbers())
     assert again.vessel is model.vessel
     (tmp_path / "tug.pickle").write_bytes(pickle.dumps(model))
-    code = "import pickle, sys; print(pickle.load(open(sys.argv[1], 'rb')).simulate([[0.1, 2.3]] * 20, 0.5)['r'][-1])"
+    code = (
+        "import pickle, sys; tug = pickle.load(open(sys.argv[1], 'rb')); "
+        "print(tug.simulate([[0.1, 2.3]] * 20, 0.5)['r'][-1])"
+    )
     told = subprocess.run(
         [sys.executable, "-c", code, tmp_path / "tug.pickle"], capture_output=True, text=True, check=True
     )

@@ -8,11 +8,11 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 
 import shipgym
 from shipgym import InputError, manoeuvres
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.engine import random
 from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
 from shipgym.sea.drift import wave_drift
