@@ -6,8 +6,10 @@ VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
 PACKAGES := shipgym identification agents
+# the measured runs of real ships, which are not part of the project.
+DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak docs clean
+.PHONY: demo test lint format type bench soak evidence docs clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -31,6 +33,13 @@ bench: $(VENV)/dev-installed
 
 soak: $(VENV)/dev-installed
 	$(BIN)/python scripts/soak.py
+
+# what the pages of docs/ claim, run again
+evidence: $(VENV)/dev-installed
+	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md
+	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
+	$(BIN)/python scripts/oracle.py --again --from-agents
+	$(BIN)/python scripts/transfer.py --data $(DATA)
 
 docs: $(VENV)/docs-installed
 	$(BIN)/mkdocs build --strict

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -52,36 +51,6 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
     elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:
         chosen.pop("reference_model", None)  # of the structure that the ship file names
     return chosen
-
-
-def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, Any]:
-    """Options of the command line: those with a name of their own, which go first, and those of `--set`."""
-    return parsed_options(texts) | {name: value for name, value in named.items() if value is not None}
-
-
-def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
-    """Options written as on the command line, `name=value` with a value as in the ship file.
-
-    Raises
-    ------
-    InputError
-        For one that is not, or has no such name.
-    """
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, value = text.partition("=")
-        if not sign or not name.strip():
-            raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
-        found[name.strip()] = _value(value.strip())
-    return check_options(found, "--set")
-
-
-def _value(text: str) -> Any:
-    """A value of TOML; what is none is a text without quotes."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 def trials_of(ship: ShipFile, settings: Mapping[str, Any]) -> tuple[list[Trial], dict[str, Any]]:

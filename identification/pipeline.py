@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from identification.estimators.methods import get_method
+from identification.estimators.estimator import FitTask
+from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
-from identification.options import Options
+from identification.options import Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics
 from identification.regression.problem import Problem, pose
 from identification.regression.samples import Samples
@@ -22,7 +23,6 @@ from identification.simulation_error.refine import Refined, refine, split_settin
 from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from identification.validation.diagnostics import diagnose
-from identification.validation.folds import TRIALS
 from identification.validation.guarded_fit import GuardedFit, guarded_fit
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
@@ -43,93 +43,82 @@ def identify(
     samples: str = "spline",
     particulars: Particulars | Mapping[str, Any] | None = None,
     steering: SteeringGear | None = None,
-    *,
-    service_shaft_speed: float | None = None,
-    name: str | None = None,
-    window: int | None = None,
-    smooth: bool = True,
-    preprocessing: str | None = None,
-    repair: bool = False,
-    uncertainty: str = "analytic",
-    guarded: bool = True,
-    hold_out: Sequence[str] = (),
-    reference_model: str | ShipModel | None = None,
-    prior: str | ShipModel | None = None,
-    prior_strength: float | None = None,
-    prior_folds: str = TRIALS,
-    **settings: Any,
+    **options: Any,
 ) -> IdentificationResult:
     """Identify a manoeuvring model from recorded trials.
 
-    Trials marked `validate` are predicted, and influence no coefficient. `Options` tells of each option that
-    is not told of here.
+    Trials marked `validate` are predicted, and influence no coefficient.
 
     Parameters
     ----------
     trials : sequence of Trial
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and n for structures
         that know the shaft speed.
+    structure : str
+        Terms of the model: a name of `shipgym.list_structures`.
+    method : str or estimator
+        A name of `identification.estimators.methods.METHODS`, or an object with scikit-learn's interface,
+        `fit(X, y)` that sets `coef_`, of which each equation gets a copy.
+    samples : {"spline", "integral", "euler"}
+        How the samples become a regression.
     particulars : Particulars or mapping
         Of the ship; at least the length, and, for structures of forces, what is needed to estimate mass and
         added mass. The service speed is estimated from the start of the trials where absent.
     steering : SteeringGear, optional
         Estimated from the rudders of the trials where absent.
-    **settings
-        Of the machine: `rank`, `selection`, `C`, `scale`, `robust`; `objective`, `bounds`, `folds`, `seed`,
-        `optimiser` of a search; of `output-error` also those of `refine.Refinement`.
-
-    Returns
-    -------
-    IdentificationResult
+    **options
+        The other fields of `Options`: of the identification, and settings of the method.
 
     Raises
     ------
     InputError
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
-    get_method(method)
-    options = Options(
-        structure, method, samples, service_shaft_speed=service_shaft_speed, name=name, window=window,
-        smooth=smooth, preprocessing=preprocessing, repair=repair, uncertainty=uncertainty, guarded=guarded,
-        hold_out=hold_out, reference_model=reference_model, prior=prior, prior_strength=prior_strength,
-        prior_folds=prior_folds,
-    )  # fmt: skip
-    problem = pose(trials, structure, samples, particulars, steering, **options.posed())
-    call = options.call(settings, problem.trials, particulars, steering)
-    return _identified(options, settings, problem, steering is None, call)
-
-
-def _identified(
-    options: Options,
-    settings: Mapping[str, Any],
-    problem: Problem,
-    steering_estimated: bool,
-    call: dict[str, Any],
-) -> IdentificationResult:
-    """Fit, guard, refine, and judge by the trials."""
-    chosen, blank = get_method(options.method), problem.blank
-    regression, used = problem.samples, problem.used
-    if options.prior is not None:
-        chosen = with_prior(chosen, options.prior, options.prior_strength, blank, options.prior_folds)
-    refinement, of_machine = split_settings(settings) if chosen.refined else (None, settings)
-    fit = guarded_fit(chosen, of_machine, regression, blank, used, options.guarded)
-    refined = refine(fit, regression, used, refinement, _memory(blank.particulars)) if refinement else None
-    fit = refined.fit if refined else fit
-    provenance = {
-        "structure": options.structure,
-        "method": options.method,
-        "samples": options.samples,
-        "settings": options.asked(of_machine),
-        "steering": "estimated" if steering_estimated else "given",
-        **_reference(problem),
-        **({"prior": _name(options.prior), **_prior_found(fit)} if options.prior is not None else {}),
-        **_origin(fit, regression, used),
-        **({"refinement": refined.report} if refined else {}),
-        **({"uncertainty": options.uncertainty} if options.uncertainty != "analytic" else {}),
-    }
-    covariance = _covariance(fit, regression, blank, refined, options.uncertainty)
+    asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    chosen = get_method(method)
+    problem = pose(trials, asked, particulars, steering)
+    fit, refined = _fitted(chosen, asked, problem)
+    covariance = _covariance(fit, problem.samples, problem.blank, refined, asked.uncertainty)
+    provenance = _provenance(asked, chosen, fit, refined, problem)
+    provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
-    return _judged(model, fit, problem, call)
+    return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
+
+
+def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
+    """Fit, guard and refine."""
+    task = FitTask(problem.samples, problem.blank, problem.used)
+    if options.prior is not None:
+        method = with_prior(method, options.prior, options.prior_strength, task.blank, options.prior_folds)
+    refinement, settings = split_settings(options.settings(), method.refined)
+    fit = guarded_fit(method, settings, task, options.guarded)
+    if refinement is None:
+        return fit, None
+    refined = refine(fit, task.samples, task.trials, refinement, _memory(task.blank.particulars))
+    return refined.fit, refined
+
+
+def _provenance(
+    options: Options, method: Method, fit: GuardedFit, refined: Refined | None, problem: Problem
+) -> dict[str, Any]:
+    """How a model came about, for its file."""
+    _, of_method = split_settings(options.settings(), method.refined)
+    found: dict[str, Any] = {
+        "structure": options.structure,
+        "method": method.name,
+        "samples": options.samples,
+        "settings": provenance_settings(options, of_method),
+        **_reference(problem),
+        **_origin(fit, problem.samples, problem.used),
+    }
+    if options.prior is not None:
+        prior = next(iter(getattr(estimator, "prior_", {}) for estimator in fit.estimators.values()), {})
+        found |= {"prior": name_of(options.prior), **prior}
+    if refined is not None:
+        found["refinement"] = refined.report
+    if options.uncertainty != "analytic":
+        found["uncertainty"] = options.uncertainty
+    return found
 
 
 def _memory(ship: Particulars) -> float:
@@ -144,8 +133,8 @@ def _covariance(
     ship = blank.particulars
     memory, bootstrap = _memory(ship), uncertainty == "bootstrap"
     if refined is None or refined.covariance is None:
-        by_machines = bootstrap_covariance if bootstrap else joint_covariance
-        covariance = by_machines(fit.machines, regression, memory)
+        by_estimators = bootstrap_covariance if bootstrap else joint_covariance
+        covariance = by_estimators(fit.estimators, regression, memory)
     elif bootstrap:
         covariance = influence_covariance(refined.influences, max(round(memory / refined.width), 1))
     else:
@@ -160,7 +149,7 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
     return {
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": regression.window,
-        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.machines.items()},
+        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
         **_searched(fit),
         "guard": fit.report,
         "stable": fit.stable,
@@ -174,11 +163,11 @@ def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict
 
 def _searched(fit: GuardedFit) -> dict[str, Any]:
     """What a search chose for each equation; nothing for methods that do not search."""
-    chosen = {q: m.chosen_ for q, m in fit.machines.items() if hasattr(m, "chosen_")}
+    chosen = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
     return {"search": chosen} if chosen else {}
 
 
-def _judged(
+def _evaluated(
     model: ShipModel, fit: GuardedFit, problem: Problem, call: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its predictions of all trials that are not skipped, and its diagnostics."""
@@ -195,13 +184,13 @@ def _judged(
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
-        diagnostics=diagnose(fit.machines, problem.samples, model.table),
+        diagnostics=diagnose(fit.estimators, problem.samples, model.table),
         predictions=predictions,
         trials=trials,
         samples=problem.samples,
-        machines=fit.machines,
+        estimators=fit.estimators,
         settings=call,
-        searches={q: search for q, m in fit.machines.items() if (search := getattr(m, "search_", None))},
+        searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )
 
 
@@ -220,12 +209,3 @@ def _reference(problem: Problem) -> dict[str, Any]:
     if not isinstance(box, GreyBox):
         return {}
     return {"reference": {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}}
-
-
-def _name(model: str | ShipModel) -> str:
-    return model.name if isinstance(model, ShipModel) else model
-
-
-def _prior_found(fit: GuardedFit) -> dict[str, Any]:
-    """Strength of the prior and what it was, from the machines."""
-    return next(iter(getattr(machine, "prior_", {}) for machine in fit.machines.values()), {})

@@ -1,24 +1,18 @@
-"""What `identify` returns: a model, how it came about, and its summary, figures and files."""
+"""What `identify` returns: a fit with its summary, figures and files."""
 
 from __future__ import annotations
 
 import tempfile
 import warnings
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from identification.estimators.estimator import Machine
-from identification.regression.samples import Samples
-from identification.search import SearchResult
-from identification.validation.diagnostics import EquationDiagnostics
+from identification.fit import Fit
+from identification.report.figures import all_figures
+from identification.report.page import report_page
+from identification.report.summary import summary_table
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
-from shipgym.whole_file import write_text
+from shipgym.files import write_json, write_text
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -27,59 +21,8 @@ if TYPE_CHECKING:
 FILES = ("model.json", "metrics.json", "settings.json", "report.html")
 
 
-@dataclass(frozen=True, eq=False)
-class IdentificationResult:
-    """An identified model and how it came about.
-
-    Attributes
-    ----------
-    model : ShipModel
-        With covariance, envelope and provenance.
-    stable : bool
-        Whether the model passed every simulation of the guard and sails every recorded trial, those held out
-        too; if not, its predictions are not to be used. Its file says the same.
-    metrics : dict
-        For each trial by its name the errors of the open-loop prediction and the manoeuvre's indices.
-    diagnostics : dict of str to EquationDiagnostics
-        Of each equation: those of `u`, `v`, `r` that the structure has.
-    predictions : dict of str to Trial or None
-        The open-loop predictions by trial; None where the model ran away.
-    trials : tuple of Trial
-        Those predicted, as they were given, marked "fit" or "validate".
-    samples : Samples
-        The regression.
-    machines : dict of str to Machine
-        Fitted to it, by equation.
-    settings : dict
-        The arguments that `identify` was called with, defaults among them, as JSON knows them.
-    searches : dict of str to SearchResult
-        How the settings of each equation were found, for methods that search: log10 C, or
-        the insensitive band of RM-SVM.
-    """
-
-    model: ShipModel
-    stable: bool
-    metrics: dict[str, Any]
-    diagnostics: dict[str, EquationDiagnostics]
-    predictions: dict[str, Trial | None]
-    trials: tuple[Trial, ...]
-    samples: Samples
-    machines: dict[str, Machine]
-    settings: dict[str, Any]
-    searches: dict[str, SearchResult] = field(default_factory=dict)
-
-    @property
-    def coefficients(self) -> dict[str, float]:
-        """Coefficients by name, in the normalisation of the structure, rudder positive to starboard."""
-        return self.model.coefficients
-
-    @property
-    def standard_errors(self) -> dict[str, float]:
-        """Standard error of each coefficient, in its units."""
-        covariance = self.model.covariance
-        if covariance is None:
-            return dict.fromkeys(self.coefficients, float("nan"))
-        return dict(zip(self.coefficients, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+class IdentificationResult(Fit):
+    """An identified model and how it came about; `Fit` lists its attributes."""
 
     def summary(self) -> str:
         """Table of all coefficients and of the inertia they are based on.
@@ -90,8 +33,6 @@ class IdentificationResult:
             Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was
             not given is marked as estimated.
         """
-        from identification.report.summary import summary_table
-
         return summary_table(self)
 
     def plots(self) -> dict[str, Figure]:
@@ -109,8 +50,6 @@ class IdentificationResult:
         InputError
             If plotly is not installed.
         """
-        from identification.report.figures import all_figures
-
         return all_figures(self)
 
     def save(self, folder: str | Path) -> None:
@@ -137,7 +76,7 @@ class IdentificationResult:
                 for name in FILES:
                     if (Path(draft) / name).exists():
                         (Path(draft) / name).replace(folder / name)
-                    else:  # an earlier one would tell of another model
+                    else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:
             raise InputError(
@@ -145,8 +84,6 @@ class IdentificationResult:
             ) from error
 
     def _write(self, folder: Path) -> None:
-        from identification.report import report_page
-
         self.model.save(folder / "model.json")
         write_json(self.metrics, folder / "metrics.json")
         write_json(self.settings, folder / "settings.json")

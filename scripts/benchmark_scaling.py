@@ -66,7 +66,7 @@ def monte_carlo_table() -> None:
 
 def environments_table() -> None:
     """Steps of the vector environment, by ships and threads."""
-    from agents.benchmarking.suite import load_suite
+    from agents.suites.suite import load_suite
 
     task = load_suite().tasks[0]
     print(f"\nSteps of the environment, task {task.name}\n")
@@ -95,7 +95,7 @@ def environments_table() -> None:
 def benchmark_table() -> None:
     """PID and LQ through some tasks of the suite, by episodes and workers."""
     from agents.benchmarking.run import benchmark
-    from agents.benchmarking.suite import load_suite
+    from agents.suites.suite import load_suite
 
     tasks = [task.name for task in load_suite().tasks[:4]]
 

@@ -22,12 +22,12 @@ import numpy as np
 import typer
 from numpy.typing import NDArray
 from numpy_ships import numpy_step
+from papers.dense_dual import dense_dual_solution
 from rich.console import Console
 from rich.table import Table
 
 import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
-from identification.estimators.dense_dual import dense_dual_solution
 from shipgym.checks import check_choice
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES

@@ -1,4 +1,4 @@
-"""Train an autopilot by PPO on paths, keep it in a file, and fly it beside classical ones.
+"""Train an autopilot by PPO on paths, keep it in a file, and compare it with classical ones.
 
 python scripts/train_autopilot.py FOLDER
 """
@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from agents import load_agent
-from agents.benchmarking.designs import design
-from agents.rollouts.flying import episode_costs
+from agents.controllers.designs import design
+from agents.rollouts.rollout import episode_costs
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
 
@@ -26,7 +26,7 @@ def tell(now: Progress) -> None:
 
 
 def main(folder: Path) -> None:
-    """Train, or go on with a training that was stopped, then compare on episodes that nobody has seen."""
+    """Train, or go on with a training that was stopped, then compare on new episodes."""
     plan = make_plan(Given("ppo", environment="path-following", model="mariner", threads=2))
     train(plan, folder, resume=folder.exists(), tell=tell)
     task = plan.task

@@ -11,6 +11,7 @@ A contestant is named on the command line as
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
     a.json+b.json              training runs, one by one
     my_module:factory          a function of one's own: given a `BenchmarkTask`, it returns a controller
+    my_module:Mine             a class of one's own, a subclass of `agents.Controller`
     name=...                   any of these under a name of one's own
 """
 
@@ -27,16 +28,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Controller, Policy
-from agents.controllers.controller_file import controller_content
-from agents.controllers.los_autopilot import LAWS
+from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.controllers.registry import controller_class, controller_kinds, register_controller
+from agents.rollouts.rollout import check_fits
+from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 
-CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 ORACLE = "oracle"
@@ -74,7 +74,7 @@ class Contestant:
         """
         made = tuple(_made(self.source, task, suite))
         for policy in made:
-            check_fits(policy, task, f"'{self.name}' on task '{task.name}'")
+            check_fits(policy, task.task, task.ship, f"'{self.name}' on task '{task.name}'")
         return made
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
@@ -85,7 +85,7 @@ class Contestant:
 
 
 def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
-    """Refuse, before anything is flown, files of agents that cannot be read, or fit none of the tasks.
+    """Refuse, before anything is run, files of agents that cannot be read, or fit none of the tasks.
 
     Raises
     ------
@@ -98,32 +98,18 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
         return
     agents: dict[Path, Policy] = {}
     refusals: list[str] = []
-    flying = 0
+    fitting = 0
     for task in tasks:
         for path in _files(one.source, task):
             if path not in agents:
                 agents[path] = load_agent(path)
             try:
-                check_fits(agents[path], task, f"'{path}' on task '{task.name}'")
-                flying += 1
+                check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
+                fitting += 1
             except InputError as error:
                 refusals.append(str(error))
-    if refusals and not flying:
+    if refusals and not fitting:
         raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
-
-
-def check_fits(policy: Any, task: BenchmarkTask, where: str) -> None:
-    """Refuse a controller made for other observations than a task shows.
-
-    Raises
-    ------
-    InputError
-        Naming the difference.
-    """
-    check = getattr(policy, "check_fits", None)
-    if check is not None:
-        shown = task.task.observed(task.ship)
-        check([one.name for one in shown], [one.scale for one in shown], where)
 
 
 def contestants(given: Any) -> tuple[Contestant, ...]:
@@ -197,7 +183,7 @@ def _check_object(source: Any, name: str) -> None:
 
 def _check_text(text: str) -> None:
     """Refuse what is neither a name, nor a file, nor a function."""
-    known = (*CLASSICAL, *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+    known = (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
     if text in known:
         return
     if _is_factory(text):
@@ -239,8 +225,14 @@ def _factory(text: str) -> Any:
         raise InputError(
             f"controllers: '{text}' cannot be imported ({error}); expected module:function"
         ) from None
+    if _is_controller_class(found):
+        return register_controller(found)
     _check_object(found, text)
     return found
+
+
+def _is_controller_class(found: Any) -> bool:
+    return isinstance(found, type) and issubclass(found, Controller)
 
 
 def _matches(pattern: str) -> list[Path]:
@@ -254,7 +246,7 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
     if _is_factory(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
-    if text in CLASSICAL or text == ORACLE or text.startswith(TUNED):
+    if text in controller_kinds() or text == ORACLE or text.startswith(TUNED):
         return []
     return [path for one in text.split("+") for path in _matches(one.replace("{task}", task.name))]
 
@@ -270,15 +262,15 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not isinstance(source, str):
         runs = source if isinstance(source, Sequence) else [source]
         return [run if hasattr(run, "predict") else _from_factory(run, task) for run in runs]
-    if source in CLASSICAL:
-        on_path = isinstance(task.task, PathFollowingTask)
-        return [design("lq" if source in LAWS and not on_path else source, task)]
+    if source in controller_kinds():
+        led = controller_class(source).has_autopilot and not isinstance(task.task, PathFollowingTask)
+        return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
-        from agents.benchmarking.direct_search import tuned
-
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
         found = _factory(source)
+        if _is_controller_class(found):
+            return [design(found.kind, task)]
         return [found if hasattr(found, "predict") else _from_factory(found, task)]
     from agents.agent_file import load_agent
 
@@ -318,7 +310,7 @@ def policy_hash(policy: Policy) -> str | None:
     if not isinstance(policy, Controller):
         return None
     try:
-        content = controller_content(policy)
+        content = policy.to_dict()
     except (AttributeError, InputError):  # guidance over a user's own autopilot
         return None
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -1,9 +1,9 @@
 """Settings of the classical controllers, found for each task by direct search on its cost.
 
-Every controller has the same budget: `EVALUATIONS` settings, each flown on the same `EPISODES` episodes,
+Every controller has the same budget: `EVALUATIONS` settings, each tried on the same `EPISODES` episodes,
 whose seeds are never scored. The search is Nelder and Mead's, over logarithms of the settings of
 `from_model`, and begins with the design's own; so what is found is never worse on those episodes than the
-design. Settings whose loop is unstable or has too little margin are refused without being flown.
+design. Settings whose loop is unstable or has too little margin are refused untried.
 
 Source: Nelder & Mead 1965, A simplex method for function minimization, Computer Journal 7 (scipy.optimize).
 """
@@ -12,35 +12,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.resources import files
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.designs import INNER, design, no_path
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
-from agents.controllers.los_autopilot import CRITICAL, LAWS
-from agents.rollouts.flying import episode_costs
-from shipgym.checks import check_choice, check_table, check_whole
+from agents.controllers.designs import CLASSICAL, INNER, design, no_path
+from agents.controllers.los_autopilot import CRITICAL
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import BenchmarkTask
+from shipgym.checks import check_choice, check_whole
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
 
 Floats = NDArray[np.float64]
 
-#: Controllers that are tuned, in an order in which those come first that others build on.
-CLASSICAL = ("pid", "pid-filtered", "lq", "lq-scheduled", "lqg", "mpc", "lq-adaptive", "los", "ilos", "alos")
-#: Of these, no bases for policies unless asked for by name, being slow: MPC, which needs an extra too, solves
-#: for one ship after the other, and adaptive LQ learns beside whoever learns; an action takes them 64 and
-#: 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
-NO_BASES = ("mpc", "lq-adaptive")
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
+LAWS = ("los", "ilos", "alos")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 
@@ -239,56 +230,3 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     if kind not in ("pid-filtered", "lqg") or waves is None:
         return [own]
     return [own, [*own, Setting("wave_period", waves.peak_period, 0.3, 3.0)]]
-
-
-def tuned_file(suite: str) -> Path:
-    """Where the settings found for a suite are."""
-    return Path(str(files("agents").joinpath("suites", f"{suite}-tuned.json")))
-
-
-def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
-    """Settings found for a suite.
-
-    Returns
-    -------
-    dict
-        By task and controller: `settings`, `cost`, `start_cost`, `evaluations`, as in `Tuned`.
-
-    Raises
-    ------
-    InputError
-        If the suite has none, or the file is broken.
-    """
-    path = tuned_file(suite)
-    content = read_json(path, "file of tuned settings", "make it again with scripts/tune_controllers.py")
-    tasks = check_table(content.get("tasks"), f"{path}: tasks")
-    return {name: dict(check_table(found, f"{path}: tasks.{name}")) for name, found in tasks.items()}
-
-
-def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
-    """A classical controller with the settings found for a task.
-
-    Parameters
-    ----------
-    kind : str
-        Of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`.
-    task : BenchmarkTask
-    suite : str
-        Its name.
-
-    Raises
-    ------
-    InputError
-        If there are no such settings.
-    """
-    found = load_tuned(suite).get(task.name, {})
-    without = {"best": (), "base": NO_BASES}.get(kind)
-    if without is not None:
-        costs = {name: float(one["cost"]) for name, one in found.items() if name not in without}
-        kind = min(costs, key=costs.__getitem__, default=kind)
-    if kind not in found:
-        raise InputError(
-            f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
-            f"{', '.join(found) or 'none'}"
-        )
-    return design(kind, task, found[kind]["settings"])

@@ -12,26 +12,26 @@ from numpy.typing import NDArray
 from agents.benchmarking.contestants import ORACLE
 from agents.benchmarking.results import BenchmarkResult
 from shipgym.envs.episode import Episode
-from shipgym.plots import GRID, INK, MUTED, axis, compact, graph_objects, layout, line, subplots, translucent
+from shipgym.plots import INK, MUTED, axis, compact, graph_objects, label, layout, line, subplots, translucent
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 Floats = NDArray[np.float64]
 
-# those of the replay player
+# as in the replay player (chart.html)
 COLOURS = (
     "#1d5f9a", "#c2500c", "#0f766e", "#8b3fb8", "#946200", "#b5245c", "#48566a", "#4d7010",
     "#5566d6", "#7a4b2a", "#0891b2", "#8f8a00",
 )  # fmt: skip
 DASHES = ("solid", "dash", "dot")
 MARGIN = {"l": 58, "r": 14, "t": 14, "b": 44}
-LOGARITHMIC = 20.0  # ratio of costs from which on their axis is logarithmic
+LOGARITHMIC = 20.0  # ratio of the largest to the smallest cost from which on their axis is logarithmic
 SAMPLES = 240  # of a line at most
 
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Colour and dashes of each contestant; the oracle is black."""
+    """Colour and dashes of each contestant; those of the oracle are dark and solid."""
     others = [name for name in names if name != ORACLE]
     found = {
         name: (COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)])
@@ -42,7 +42,7 @@ def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 def scores_figure(result: BenchmarkResult) -> Figure:
     """Scores with their intervals, the best on top; relative costs where there are no scores."""
-    go, look = graph_objects(), styles(result.ranking)
+    go, style = graph_objects(), styles(result.ranking)
     figure = go.Figure()
     scored = bool(result.summary["reference"])
     for entry in result.summary["ranking"]:
@@ -54,7 +54,7 @@ def scores_figure(result: BenchmarkResult) -> Figure:
         figure.add_trace(
             go.Scatter(
                 x=[value], y=[entry["name"]], name=entry["name"], mode="markers",
-                marker={"color": look[entry["name"]][0], "size": 10},
+                marker={"color": style[entry["name"]][0], "size": 10},
                 error_x={"array": [high - value], "arrayminus": [value - low], "thickness": 2.2},
                 hovertemplate="%{x:.3f}<extra>%{y}</extra>",
             )
@@ -66,47 +66,47 @@ def scores_figure(result: BenchmarkResult) -> Figure:
         "score: best PID 0, oracle 1" if scored else "cost relative to the lowest, geometric mean over tasks"
     )
     figure.update_layout(_layout(30 * len(result.ranking) + 70, hovermode="closest"))
-    figure.update_xaxes(axis(title))
-    figure.update_yaxes(axis("", autorange="reversed", automargin=True, showgrid=True))
+    label(figure, title, axis(autorange="reversed", automargin=True, showgrid=True))
     return figure
 
 
 def profile_figure(profile: Mapping[str, Any], names: Sequence[str]) -> Figure:
     """Share of episodes that score more than a threshold."""
-    figure, look = graph_objects().Figure(), styles(names)
+    figure, style = graph_objects().Figure(), styles(names)
     for name in names:
         if name in profile["shares"]:
             share = 100.0 * np.asarray(profile["shares"][name])
-            figure.add_trace(_line(profile["thresholds"], share, name, look[name], 2.0))
+            figure.add_trace(_line(profile["thresholds"], share, name, style[name], 2.0))
     for value in (0.0, 1.0):
         figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": "dot"})
     figure.update_layout(_layout(380))
-    figure.update_xaxes(axis("score of an episode: best PID 0, oracle 1"))
-    figure.update_yaxes(axis("episodes that score more, %", range=[-2, 102]))
+    shares_axis = axis("episodes that score more, %", range=[-2, 102])
+    label(figure, "score of an episode: best PID 0, oracle 1", shares_axis)
     return figure
 
 
 def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     """Box of the costs of the episodes of a task for each contestant, and each episode as a dot."""
-    go, look = graph_objects(), styles(result.ranking)
+    go, style = graph_objects(), styles(result.ranking)
     figure = go.Figure()
-    who = [name for name in result.ranking if name in result.summary["tasks"][task]]
-    every = np.concatenate([np.zeros(0), *(result.figures(name, task).ravel() for name in who)])
-    for name in who:
-        colour, costs = look[name][0], result.figures(name, task).ravel()
+    names = [name for name in result.ranking if name in result.summary["tasks"][task]]
+    costs = np.concatenate([np.zeros(0), *(result.figures(name, task).ravel() for name in names)])
+    for name in names:
+        colour = style[name][0]
         figure.add_trace(
             go.Box(
-                x=compact(costs), name=name, orientation="h", boxpoints="all", jitter=0.7, pointpos=0.0,
+                x=compact(result.figures(name, task).ravel()), name=name, orientation="h",
+                boxpoints="all", jitter=0.7, pointpos=0.0,
                 marker={"color": translucent(colour, 0.35), "size": 3}, line={"color": colour, "width": 1.5},
                 fillcolor=translucent(colour, 0.1), hoverinfo="x",
             )
         )  # fmt: skip
-    least, most = (every.min(), every.max()) if len(every) else (0.0, 0.0)
+    least, most = (costs.min(), costs.max()) if len(costs) else (0.0, 0.0)
     kind = "log" if least > 0.0 and most > LOGARITHMIC * least else "linear"
-    figure.update_layout(_layout(34 * len(who) + 70, hovermode="closest"))
-    marks = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
-    figure.update_xaxes(axis("cost of an episode", type=kind, **marks))
-    figure.update_yaxes(axis("", autorange="reversed", automargin=True))
+    figure.update_layout(_layout(34 * len(names) + 70, hovermode="closest"))
+    marks: dict[str, Any] = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
+    costs_axis = axis("cost of an episode", type=kind, **marks)
+    label(figure, costs_axis, axis(autorange="reversed", automargin=True))
     return figure
 
 
@@ -118,7 +118,7 @@ def _one_two_five(least: float, most: float) -> list[float]:
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
     """Paths over ground of contestants in one episode, the path to follow and its corridor."""
-    go, look = graph_objects(), styles(names)
+    go, style = graph_objects(), styles(names)
     figure = go.Figure()
     first = next(iter(episodes.values()))
     if first.waypoints is not None:
@@ -137,10 +137,9 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
         )  # fmt: skip
     for name, episode in episodes.items():
         at = _thinned(episode.n_steps)
-        figure.add_trace(_line(episode.states["y"][at], episode.states["x"][at], name, look[name], 1.8))
+        figure.add_trace(_line(episode.states["y"][at], episode.states["x"][at], name, style[name], 1.8))
     figure.update_layout(_layout(480, hovermode="closest"))
-    figure.update_xaxes(axis("east, m"))
-    figure.update_yaxes(axis("north, m", scaleanchor="x", scaleratio=1))
+    label(figure, "east, m", axis("north, m", scaleanchor="x", scaleratio=1))
     return figure
 
 
@@ -158,7 +157,7 @@ def _corridor(waypoints: Floats, half: float) -> list[Floats]:
 
 def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
     """What contestants did over time in one episode: cross-track error, or heading, and the rudder."""
-    look = styles(names)
+    style = styles(names)
     figure = subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.58, 0.42])
     first = max(episodes.values(), key=lambda episode: episode.n_steps)
     path = first.waypoints is not None
@@ -166,41 +165,41 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
         at = _thinned(episode.n_steps)
         t = episode.dt * at
         upper = episode.info["cross_track"] if path else np.degrees(np.unwrap(episode.states["psi"]))
-        figure.add_trace(_line(t, upper[at], name, look[name], 1.7), row=1, col=1)
+        figure.add_trace(_line(t, upper[at], name, style[name], 1.7), row=1, col=1)
         figure.add_trace(
-            _line(t, np.degrees(episode.states["delta"])[at], name, look[name], 1.2), row=2, col=1
+            _line(t, np.degrees(episode.states["delta"])[at], name, style[name], 1.2), row=2, col=1
         )
     if path and first.corridor:
         for bound in (-first.corridor, first.corridor):
             figure.add_hline(y=bound, line={"color": "#2f6b3c", "width": 1.2, "dash": "dash"}, row=1, col=1)
     elif not path:
         t = first.dt * np.arange(first.n_steps + 1)
-        course = np.degrees(_beside(first.states["set_point"], np.unwrap(first.states["psi"])))
+        course = np.degrees(_unwrapped(first.states["set_point"], np.unwrap(first.states["psi"])))
         figure.add_trace(
             line(t, course, "ordered course", INK, 1.3, line_dash="dash", line_shape="hv"), row=1, col=1
         )
-    figure.update_yaxes(axis("cross-track error, m" if path else "heading, deg"), row=1, col=1)
-    figure.update_yaxes(axis("rudder, deg", zeroline=True, zerolinecolor=GRID), row=2, col=1)
-    figure.update_xaxes(axis("time, s"), row=2, col=1)
+    label(figure, "", "cross-track error, m" if path else "heading, deg", row=1, col=1)
+    label(figure, "time, s", axis("rudder, deg", zero=True), row=2, col=1)
     figure.update_layout(_layout(480))
     return figure
 
 
-def _beside(angle: Floats, other: Floats) -> Floats:
-    """An angle by whole turns next to another, rad."""
-    beside: Floats = other + np.remainder(angle - other + np.pi, 2.0 * np.pi) - np.pi
-    return beside
+def _unwrapped(angle: Floats, other: Floats) -> Floats:
+    """An angle, by whole turns nearest to another, rad."""
+    near: Floats = other + np.remainder(angle - other + np.pi, 2.0 * np.pi) - np.pi
+    return near
 
 
 def _thinned(steps: int) -> NDArray[np.int64]:
-    """Numbers of the samples that are drawn, the first and the last among them."""
+    """Indices of the samples that are drawn, the first and the last among them."""
     return np.unique(np.linspace(0, steps, min(steps, SAMPLES) + 1).round().astype(np.int64))
 
 
-def _line(x: Any, y: Any, name: str, look: tuple[str, str], width: float) -> Any:
-    return line(x, y, name, look[0], width, line_dash=look[1])
+def _line(x: Any, y: Any, name: str, style: tuple[str, str], width: float) -> Any:
+    return line(x, y, name, style[0], width, line_dash=style[1])
 
 
 def _layout(height: int, **changes: Any) -> dict[str, Any]:
     """The shared layout without a legend: the page has one for all figures."""
-    return layout(height, **({"margin": MARGIN, "showlegend": False, "hovermode": "x"} | changes))
+    shared: dict[str, Any] = {"margin": MARGIN, "showlegend": False, "hovermode": "x"}
+    return layout(height, **(shared | changes))

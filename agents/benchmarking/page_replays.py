@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,8 +10,8 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE
 from agents.benchmarking.page_figures import styles
+from agents.benchmarking.replays import SAME_COST, EpisodeId, Rerun, cost_of
 from agents.benchmarking.results import BenchmarkResult
-from agents.rollouts.refly import SAME_COST, Flight, Reflown, cost_of
 from agents.rollouts.replay_page import player
 from agents.rollouts.replay_series import quantities, run
 
@@ -29,12 +28,12 @@ REWARD_DECIMALS = 4
 
 
 def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Names of those who flew a task and could do it at sea, as they are ranked."""
+    """Names of those who ran a task and are usable at sea, as they are ranked."""
     return [name for name in result.ranking if name in result.summary["tasks"][task] and name != ORACLE]
 
 
 def bests_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Who has the lowest mean cost in a task, the same to rounding; the oracle does not count."""
+    """Names of the lowest mean cost in a task, several where equal to rounding; the oracle does not count."""
     costs = {
         name: result.summary["tasks"][task][name]["cost"]["value"] for name in contestants_of(result, task)
     }
@@ -43,14 +42,14 @@ def bests_of(result: BenchmarkResult, task: str) -> list[str]:
     return [name for name, cost in known.items() if np.isclose(cost, least, rtol=SAME_COST)]
 
 
-def worst_of(result: BenchmarkResult, contestant: str, task: str, count: int) -> list[Flight]:
+def worst_of(result: BenchmarkResult, contestant: str, task: str, count: int) -> list[EpisodeId]:
     """The episodes that cost a contestant most, the worst first; over all of its training runs."""
     costs = result.figures(contestant, task)
     order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")[:count]
     runs, places = np.unravel_index(order, costs.shape)
     first = result.summary["seeds"]["first"]
     return [
-        Flight(contestant, task, int(run), first + int(place))
+        EpisodeId(contestant, task, int(run), first + int(place))
         for run, place in zip(runs, places, strict=True)
     ]
 
@@ -62,24 +61,24 @@ def hardest_of(result: BenchmarkResult, task: str) -> int:
     return int(result.summary["seeds"]["first"]) + place
 
 
-def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[Flight]]]:
-    """What may be replayed of a task: for whom, and the flights to lay over each other, the first chosen.
+def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[EpisodeId]]]:
+    """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
 
     At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
     each, beside the task's best contestant in the same.
     """
     who, seed = contestants_of(result, task), hardest_of(result, task)
     best = next(iter(bests_of(result, task)), None)
-    found = [("", [Flight(name, task, 0, seed) for name in who])]
+    found = [("", [EpisodeId(name, task, 0, seed) for name in who])]
     for name in who:
-        for flight in worst_of(result, name, task, count):
-            beside = [] if best is None or name == best else [Flight(best, task, 0, flight.seed)]
-            found.append((name, [flight, *beside]))
+        for episode in worst_of(result, name, task, count):
+            beside = [] if best is None or name == best else [EpisodeId(best, task, 0, episode.seed)]
+            found.append((name, [episode, *beside]))
     return found
 
 
-def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[Flight]]:
-    """How many of the worst episodes of each contestant a page has room for, and all flights it shows.
+def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeId]]:
+    """How many of the worst episodes of each contestant a page has room for, and all that it shows.
 
     Parameters
     ----------
@@ -89,13 +88,13 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[Flight]]
     """
     for count in range(wanted, 0, -1):
         entries = [entry for task in result.tasks for entry in entries_of(result, task, count)]
-        flights = list(dict.fromkeys(flight for _, flown in entries for flight in flown))
-        if len(flights) <= MOST_RUNS:
+        episodes = list(dict.fromkeys(one for _, some in entries for one in some))
+        if len(episodes) <= MOST_RUNS:
             break
-    return count, flights
+    return count, episodes
 
 
-def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[str, Any]:
+def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, Any]:
     """All that the page's script needs to replay episodes, ready for JSON.
 
     Returns
@@ -106,38 +105,44 @@ def replay_data(result: BenchmarkResult, reflown: Reflown, count: int) -> dict[s
         runs : short forms of them (`short`).
         entries : what may be chosen, by task: for whom, seed, cost, outcome and numbers of the runs.
     """
-    kept: dict[Flight, int] = {}
+    kept: dict[EpisodeId, int] = {}
     runs: list[dict[str, Any]] = []
     whole: list[dict[str, Any]] = []
     entries: dict[str, list[dict[str, Any]]] = {}
     look = styles(result.ranking)
     for task in result.tasks:
         entries[task] = []
-        for who, flights in entries_of(result, task, count):
-            there = [flight for flight in flights if flight in reflown.episodes]
+        for who, episodes in entries_of(result, task, count):
+            there = [episode for episode in episodes if episode in again.episodes]
             if not there or (who and there[0].contestant != who):
                 continue
-            for flight in there:
-                if flight not in kept:
-                    kept[flight] = len(runs)
-                    whole.append(run(_called(result, flight), reflown.episodes[flight]))
-                    runs.append({**short(whole[-1]), "colour": look[flight.contestant][0]})
+            for episode in there:
+                if episode not in kept:
+                    kept[episode] = len(runs)
+                    whole.append(run(_called(result, episode), again.episodes[episode]))
+                    runs.append({**short(whole[-1]), "colour": look[episode.contestant][0]})
             entries[task].append(
                 {
                     "who": who,
                     "seed": there[0].seed,
                     "cost": round(cost_of(result, there[0]), 2),
                     "outcome": runs[kept[there[0]]]["outcome"],
-                    "runs": [kept[flight] for flight in there],
+                    "runs": [kept[episode] for episode in there],
                 }
             )
     page = player("Replay", MARK)
-    return {"page": page, "mark": MARK, "quantities": quantities(whole), "runs": runs, "entries": entries}
+    return {
+        "page": page,
+        "mark": f'"{MARK}"',
+        "quantities": quantities(whole),
+        "runs": runs,
+        "entries": entries,
+    }
 
 
-def _called(result: BenchmarkResult, flight: Flight) -> str:
-    several = result.summary["tasks"][flight.task][flight.contestant]["runs"] > 1
-    return f"{flight.contestant}, run {flight.run + 1}" if several else flight.contestant
+def _called(result: BenchmarkResult, episode: EpisodeId) -> str:
+    several = result.summary["tasks"][episode.task][episode.contestant]["runs"] > 1
+    return f"{episode.contestant}, run {episode.run + 1}" if several else episode.contestant
 
 
 def short(whole: dict[str, Any]) -> dict[str, Any]:
@@ -156,8 +161,3 @@ def differences(values: Sequence[float], decimals: int) -> list[int]:
     """The decimals, and the differences of values in units of the last of them."""
     units = np.round(np.asarray(values) * 10.0**decimals).astype(np.int64)
     return [decimals, *np.diff(units, prepend=0).tolist()]
-
-
-def as_json(data: Any) -> str:
-    """JSON without needless spaces."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":"))

@@ -7,7 +7,7 @@ standard error and nothing written; 130 interrupted.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,32 +16,21 @@ from agents.cli.command import (
     FAILED,
     Address,
     EngineName,
-    HoldOut,
     Json,
-    Method,
-    Objective,
-    Preprocessing,
-    Prior,
-    PriorStrength,
-    Rank,
-    Reference,
-    Repair,
-    Samples,
-    Set,
     ShipFileArgument,
-    Structure,
-    Uncertainty,
-    Weight,
     Workers,
     answered,
     fail,
 )
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
+from agents.cli.identify_options import takes_identify_options
+from agents.cli.reproduction import reproduce_command
 from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
 
 if TYPE_CHECKING:
+    from agents.cli.standard_trials import StandardTrials
     from agents.verification.result import AutopilotResult
 
 app = typer.Typer(
@@ -78,6 +67,7 @@ app.command("export")(export_command)
 app.command("train")(train_command)
 app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)
+app.command("reproduce")(reproduce_command)
 
 
 @app.command("trials")
@@ -98,14 +88,14 @@ def trials_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Put a model through the standard manoeuvres and judge it by the IMO criteria.
+    """Simulate the standard manoeuvres of a model and assess them by the IMO criteria.
 
     Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
     indices of an identified model come with their 95 % intervals.
     """
-    from agents.cli.standard_trials import check_page, standard_trials, write_page
-    from agents.cli.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.standard_trials import standard_trials
+    from agents.cli.terminal import print_json, progress_bars
+    from agents.cli.trials_page import check_page, write_page
     from shipgym.ships import load_model
 
     ship = load_model(model)
@@ -120,49 +110,46 @@ def trials_command(
         write_page(ship, found, out)
     if as_json:
         print_json({"model": ship.name, "seed": seed, **found.to_dict()})
-        return
+    else:
+        _print_trials(found, out)
+
+
+def _print_trials(found: StandardTrials, page: Path | None) -> None:
+    """Print tables of the standard manoeuvres, and where the page was written."""
+    from agents.cli.terminal import criteria_table, manoeuvre_table, warn
+    from agents.cli.terminal import out as console
+
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
     if found.criteria:
         console.print(criteria_table(found.criteria))
     else:
-        console.print("The IMO criteria are made for deep water: leave --depth out to judge by them.")
+        console.print("The IMO criteria are made for deep water: leave --depth out to assess them.")
     for name, criterion in found.criteria.items():
         if criterion.note:
             console.print(f"{name}: {criterion.note}", soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
-    if out is not None:
-        console.print(f"\nwritten: {out}", soft_wrap=True)
+    if page is not None:
+        console.print(f"\nwritten: {page}", soft_wrap=True)
 
 
 @app.command("autopilot")
 @answered
+@takes_identify_options
 def autopilot_command(
     ship: ShipFileArgument,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
     draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes flown.")] = 0,
-    structure: Structure = None,
-    method: Method = None,
-    samples: Samples = None,
-    preprocessing: Preprocessing = None,
-    repair: Repair = None,
-    uncertainty: Uncertainty = None,
-    prior: Prior = None,
-    prior_strength: PriorStrength = None,
-    reference: Reference = None,
-    hold_out: HoldOut = None,
-    objective: Objective = None,
-    rank: Rank = None,
-    weight: Weight = None,
-    options: Set = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes.")] = 0,
+    *,
+    options: dict[str, Any],
     agents: Annotated[
         list[str] | None,
         typer.Option(
             "--agent",
             metavar="AGENT",
-            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+            help="Run this autopilot too: a file, or the name of a pretrained one. May be repeated.",
         ),
     ] = None,
     engine: EngineName = "local",
@@ -170,26 +157,18 @@ def autopilot_command(
     address: Address = None,
     as_json: Json = False,
 ) -> None:
-    """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
+    """The whole chain: identify, predict, design PID and LQ, run them on drawn models, write a report.
 
     Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
     model is unstable; the report then says so.
     """
     from agents.cli.terminal import progress_bars
-    from agents.identifying import given_options
     from agents.verification.chain import build_autopilot
     from agents.verification.monte_carlo import Engine
 
-    given = {
-        "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
-        "repair": repair, "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
-        "reference_model": reference, "hold_out": hold_out or None, "objective": objective, "rank": rank,
-        "C": weight,
-    }  # fmt: skip
-    chosen = given_options(given, options or ())
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
-            ship, out, draws=draws, seed=seed, options=chosen, agents=agents or (), progress=progress,
+            ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
             where=Engine(engine, workers, address),
         )  # fmt: skip
     _told(result, out / "report.html", draws, as_json)
@@ -199,7 +178,7 @@ def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> N
     """Print the result of the chain; fail for an unstable model."""
     from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.cli.terminal import out as console
-    from identification.validation.warnings import concerns
+    from identification.validation.warnings import model_warnings
 
     if as_json:
         print_json({**result.metrics, "report": str(report)})
@@ -213,8 +192,8 @@ def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> N
         console.print()
     if not result.stable:
         fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
-    for concern in concerns(result.identification):
-        warn(concern)
+    for warning in model_warnings(result.identification):
+        warn(warning)
     for name, reason in (result.verification.refused if result.verification else {}).items():
         warn(f"no {name.upper()} autopilot: {reason}")
     if not as_json:
@@ -235,47 +214,6 @@ def replay_command(
 
     write_replay(episodes, out)
     console.print(f"written: {out}", soft_wrap=True)
-
-
-@app.command("reproduce")
-@answered
-def reproduce_command(
-    paper: Annotated[
-        str,
-        typer.Argument(
-            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
-        ),
-    ],
-    markdown: Annotated[
-        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
-    ] = None,
-    as_json: Json = False,
-) -> None:
-    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
-
-    Exits with 1 if an aim is missed.
-    """
-    from agents.cli.reproduction import missed, page, papers_of, reproduce, terminal_table
-    from agents.cli.terminal import err, print_json
-    from agents.cli.terminal import out as console
-    from shipgym.whole_file import write_text
-
-    names = papers_of(paper)
-    with err.status("starting") as status:
-        results = reproduce(names, tell=status.update)
-    if markdown is not None:
-        write_text(page(results), markdown)
-    if as_json:
-        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
-    else:
-        for name, rows in results.items():
-            console.print(terminal_table(name, rows))
-            console.print()
-        if markdown is not None:
-            console.print(f"written: {markdown}", soft_wrap=True)
-    late = missed(results)
-    if late:
-        fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
 
 
 @app.command("doctor")
@@ -302,7 +240,3 @@ def doctor_command(as_json: Json = False) -> None:
 def main() -> None:
     """Run the command line."""
     app(prog_name="shipgym")
-
-
-if __name__ == "__main__":
-    main()

@@ -9,29 +9,14 @@ import typer
 
 from agents.cli.command import (
     FAILED,
-    HoldOut,
     Json,
-    Method,
-    Objective,
-    Preprocessing,
-    Prior,
-    PriorStrength,
-    Rank,
-    Reference,
-    Repair,
-    Samples,
-    Set,
     ShipFileArgument,
-    Structure,
-    Uncertainty,
-    Weight,
     answered,
     fail,
 )
+from agents.cli.identify_options import takes_identify_options
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from identification import IdentificationResult
     from shipgym.trials.ship_file import ShipFile
 
@@ -39,23 +24,12 @@ Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the result
 
 
 @answered
+@takes_identify_options
 def identify_command(
     ship: ShipFileArgument,
     out: Out,
-    structure: Structure = None,
-    method: Method = None,
-    samples: Samples = None,
-    preprocessing: Preprocessing = None,
-    repair: Repair = None,
-    uncertainty: Uncertainty = None,
-    prior: Prior = None,
-    prior_strength: PriorStrength = None,
-    reference: Reference = None,
-    hold_out: HoldOut = None,
-    objective: Objective = None,
-    rank: Rank = None,
-    weight: Weight = None,
-    options: Set = None,
+    *,
+    options: dict[str, Any],
     compare: Annotated[
         bool, typer.Option("--compare", help="Fit several methods and rank them on the trials held out.")
     ] = False,
@@ -71,26 +45,20 @@ def identify_command(
 
     Exits with 1 if the identified model is unstable.
     """
-    given = {
-        "structure": structure, "method": method, "samples": samples, "preprocessing": preprocessing,
-        "repair": repair, "uncertainty": uncertainty, "prior": prior, "prior_strength": prior_strength,
-        "reference_model": reference, "hold_out": hold_out or None, "objective": objective, "rank": rank,
-        "C": weight,
-    }  # fmt: skip
-    read, settings = _chosen(ship, given, options or ())
+    read, settings = _chosen(ship, options)
     if compare or methods is not None:
         _compare(read, settings, out, methods, as_json)
     else:
         _identify(read, settings, out, as_json)
 
 
-def _chosen(ship: Path, given: dict[str, Any], options: Sequence[str]) -> tuple[ShipFile, dict[str, Any]]:
+def _chosen(ship: Path, options: dict[str, Any]) -> tuple[ShipFile, dict[str, Any]]:
     """The ship file, and the options: of the command line first."""
-    from agents.identifying import given_options, identification_settings
+    from agents.identifying import identification_settings
     from shipgym.trials.ship_file import ShipFile
 
     read = ShipFile.load(ship)
-    return read, identification_settings(read, given_options(given, options))
+    return read, identification_settings(read, options)
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
@@ -120,13 +88,13 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
 def _judge(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
-    from identification.validation.warnings import concerns, why_unstable
+    from identification.validation.warnings import model_warnings, why_unstable
 
     instability = why_unstable(result)
     if instability is not None:
         fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
-    for concern in concerns(result):
-        warn(concern)
+    for warning in model_warnings(result):
+        warn(warning)
 
 
 def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str | None, as_json: bool) -> None:
@@ -156,6 +124,7 @@ def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str |
 
 
 @answered
+@takes_identify_options
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
@@ -165,10 +134,8 @@ def advise_command(
         str | None, typer.Option(help="Of the criterion c; default: the least certain one.")
     ] = None,
     number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
-    structure: Structure = None,
-    method: Method = None,
-    samples: Samples = None,
-    options: Set = None,
+    *,
+    options: dict[str, Any],
     as_json: Json = False,
 ) -> None:
     """Tell what the trials tell of each coefficient, and which manoeuvres to run next.
@@ -182,8 +149,7 @@ def advise_command(
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
-    given = {"structure": structure, "method": method, "samples": samples}
-    read, settings = _chosen(ship, given, options or ())
+    read, settings = _chosen(ship, options)
     with err.status("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
@@ -196,6 +162,7 @@ def advise_command(
 
 
 @answered
+@takes_identify_options
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
@@ -205,10 +172,8 @@ def reduce_command(
     tolerance: Annotated[
         float, typer.Option(min=0.0, help="By how much the R2 of stretches held out may fall.")
     ] = 1e-3,
-    structure: Structure = None,
-    method: Method = None,
-    samples: Samples = None,
-    options: Set = None,
+    *,
+    options: dict[str, Any],
     as_json: Json = False,
 ) -> None:
     """Drop the terms that the trials do not need, and identify with those that are left.
@@ -221,12 +186,11 @@ def reduce_command(
     from agents.identifying import reduce_ship
     from agents.output import check_folder, whole_folder
     from identification.result import FILES
-    from shipgym.json_file import write_json
+    from shipgym.files import write_json
 
     names = (*FILES, "reduction.json")
     check_folder(out, names)
-    given = {"structure": structure, "method": method, "samples": samples}
-    read, settings = _chosen(ship, given, options or ())
+    read, settings = _chosen(ship, options)
     with err.status("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()

@@ -1,144 +1,43 @@
-"""The papers' tables beside ours: for the terminal, for programs, and as a page of the documentation."""
+"""`shipgym reproduce`: the papers' tables are evidence, run from a checkout by `scripts/reproduce.py`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
-from typing import TYPE_CHECKING
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
 
-from identification.papers import CASES, get_paper
-from shipgym.checks import check_choice
+import typer
 
-if TYPE_CHECKING:
-    from rich.table import Table
+from agents.cli.command import WRONG_INPUT, Json, answered, fail
 
-    from identification.papers import Requirement, Row
-
-ALL = "all"
-HEADINGS = ("case", "quantity", "printed", "as the paper", "at best", "aim", "met")
-INTRODUCTION = """# The papers' tables, run again
-
-Written by `shipgym reproduce all --markdown docs/reproduction.md`. *Printed* is the paper's number, *as the
-paper* ours by its method on the same case, *at best* ours by the best method that there is here, on the same
-data. A cell is empty where the paper shows only a picture or does not publish what it used; the note, whose
-number stands in the last column, then says what stands in for it.
-"""
+SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
 
 
-def papers_of(name: str) -> tuple[str, ...]:
-    """Short names of the papers asked for: one, or all, with the requirements after them.
+@answered
+def reproduce_command(
+    paper: Annotated[
+        str,
+        typer.Argument(
+            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
+        ),
+    ],
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name.
+    Needs a checkout of the project. Exits with 1 if an aim is missed.
     """
-    return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
-
-
-def reproduce(names: Iterable[str], tell: Callable[[str], None] | None = None) -> dict[str, list[Row]]:
-    """Run the cases of papers again.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Short names of papers.
-    tell : callable, optional
-        Told of each row when it is done: paper, case and quantity.
-
-    Returns
-    -------
-    dict of str to list of Row
-    """
-    results: dict[str, list[Row]] = {}
-    for name in names:
-        results[name] = []
-        for row in get_paper(name).rows():
-            results[name].append(row)
-            if tell is not None:
-                tell(f"{name}: {row.case}, {row.quantity}")
-    return results
-
-
-def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
-    """The rows whose aim is not met, as paper, case and quantity."""
-    return [
-        f"{name}: {row.case}, {row.quantity}"
-        for name, rows in results.items()
-        for row in rows
-        if row.met is False
-    ]
-
-
-def terminal_table(name: str, rows: Sequence[Row]) -> Table:
-    """The rows of one paper for the terminal."""
-    from agents.cli.terminal import plain_table
-
-    table = plain_table(get_paper(name).citation)
-    for heading in HEADINGS:
-        table.add_column(heading, justify="right" if heading in HEADINGS[2:5] else "left")
-    for _, case in groupby(rows, lambda row: row.case):
-        for k, row in enumerate(case):
-            cells = _cells(row)
-            table.add_row(*(cells if k == 0 else ("", *cells[1:])))
-    return table
-
-
-def page(results: Mapping[str, Sequence[Row]]) -> str:
-    """The page of the documentation, Markdown."""
-    return "\n".join([INTRODUCTION, *(_section(name, rows) for name, rows in results.items())])
-
-
-def _section(name: str, rows: Sequence[Row]) -> str:
-    paper = get_paper(name)
-    kept = [row for row in rows if row.met is not None]
-    lines = [
-        f"## {name}",
-        "",
-        f"{paper.citation}. {paper.what}",
-        "",
-        *_requirements(paper.requirements),
-        f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}. `shipgym reproduce {name}`",
-        "",
-        *_table(rows),
-    ]
-    return "\n".join([*lines, ""])
-
-
-def _table(rows: Sequence[Row]) -> list[str]:
-    """The rows, and below them each note once."""
-    lines = [
-        "| " + " | ".join((*HEADINGS, "note")) + " |",
-        "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
-    ]
-    notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
-    for row in rows:
-        number = str(notes[row.note]) if row.note else ""
-        lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
-    return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
-
-
-def _requirements(requirements: Sequence[Requirement]) -> list[str]:
-    """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
-    if not requirements:
-        return []
-    lines = ["| | requirement | why it holds | tests | tables |", "| --- | --- | --- | --- | --- |"]
-    for one in requirements:
-        tests = "<br>".join(f"`{test}`" for test in one.tests)
-        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
-        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
-    return [*lines, ""]
-
-
-def _cells(row: Row) -> tuple[str, ...]:
-    met = {True: "yes", False: "no", None: ""}[row.met]
-    numbers = (_number(value) for value in (row.printed, row.as_paper, row.best))
-    return (row.case, row.quantity, *numbers, row.aim, met)
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.4g}"
-
-
-def _escaped(text: str) -> str:
-    return text.replace("|", "\\|")
+    if not SCRIPT.is_file():
+        fail(
+            "the papers' tables are not part of the installed package: in a checkout of the project run "
+            f"python scripts/reproduce.py {paper}",
+            WRONG_INPUT,
+        )
+    options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if as_json else [])]
+    done = subprocess.run([sys.executable, str(SCRIPT), paper, *options], check=False)
+    if done.returncode:
+        raise typer.Exit(done.returncode)

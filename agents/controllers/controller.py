@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self
 
@@ -24,13 +24,16 @@ from agents.controllers.linear_loop import (
     feedback_row,
     sample_ship,
 )
+from agents.controllers.memory import checked_observation, heading_error
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
+from shipgym.files import write_json
 from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
 Action = NDArray[np.float32]
 
+FORMAT = 1  # of the controller file
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
 
 
@@ -44,7 +47,34 @@ class Policy(Protocol):
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Any, Any]:
-        """Actions for observations of shape (n_observations,) or (n, n_observations), and the state."""
+        """Commands for one or many observations, with the signature of stable-baselines3.
+
+        Parameters
+        ----------
+        observation : array-like of shape (n_observations,) or (n, n_observations)
+            Of an environment. Controllers steer by the first of them, those that they were designed for:
+            heading autopilots by the eight of course keeping, whose heading error is against the
+            line-of-sight course where a path is followed.
+        state : Any, optional
+            What the last call returned; None where episodes begin.
+        episode_start : bool or array-like of bool of shape (n,), optional
+            Where an episode begins and the state is that of the one before.
+        deterministic : bool
+            Whether to command without chance. Controllers of this package always do.
+
+        Returns
+        -------
+        action : float32 array of shape (n_commands,) or (n, n_commands)
+            Parts of the limits in [-1, 1], the first of the rudder.
+        state : Any
+            For the next call: all that is remembered is in it.
+
+        Raises
+        ------
+        InputError
+            If the observation has fewer entries or another number of dimensions, or the state is not one of
+            as many ships.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +186,8 @@ class Controller:
     def reset(self) -> None:
         """The state with which an episode begins: None, whatever the number of ships.
 
-        What there is to remember is in the state that `predict` hands back, so one controller may steer
-        any number of episodes side by side.
+        What there is to remember is in the state that `predict` returns, so one controller may steer any
+        number of episodes side by side.
         """
 
     @property
@@ -172,32 +202,9 @@ class Controller:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """Commanded rudder for one or many observations, with the signature of stable-baselines3.
-
-        Parameters
-        ----------
-        observation : array-like of shape (n_observations,) or (n, n_observations)
-            Of any of the environments: it steers by the first eight, those of course keeping, whose
-            heading error is against the line-of-sight course where a path is followed.
-        state, episode_start, deterministic
-            Not used: the controller has no memory and no chance in it.
-
-        Returns
-        -------
-        action : float32 array of shape (1,) or (n, 1)
-            Part of the rudder limit, in [-1, 1].
-        state
-            As given.
-
-        Raises
-        ------
-        InputError
-            If the observation has fewer entries, or another number of dimensions.
-        """
-        seen, n = np.asarray(observation, dtype=np.float64), len(self.observation_names)
-        if seen.ndim not in (1, 2) or seen.shape[-1] < n:
-            raise InputError(f"observation: shape {seen.shape} found, expected ({n},) or (n, {n}), or more")
-        deviations = self._deviations(seen[..., :n])
+        """See `Policy.predict`; nothing is remembered, and the state is returned as given."""
+        seen = checked_observation(observation, self.observation_names)
+        deviations = self._deviations(seen[..., : len(self.observation_names)])
         order = np.full(seen.shape[:-1], self.neutral_rudder)
         for gain, (signal, sign) in self.feedback.items():
             order = order + sign * self.gains[gain] * deviations[signal]
@@ -208,7 +215,7 @@ class Controller:
         """Deviations from straight running by signal, SI units, each of shape (...)."""
         values = dict(zip(self.observation_names, (seen * self.observation_scales).T, strict=True))
         return {
-            "heading_error": np.arctan2(values["heading_error_sin"], values["heading_error_cos"]),
+            "heading_error": heading_error(values),
             "yaw_rate": values["yaw_rate"],
             "sway": values["sway"] - self.neutral_sway,
             "rudder": values["rudder"] - self.neutral_rudder,
@@ -232,10 +239,8 @@ class Controller:
         InputError
             Naming the first difference.
         """
-        n = len(self.observation_names)
-        check_names(names[:n], self.observation_names, where)
-        check_scales(
-            names[:n], scales[:n], self.observation_scales, where,
+        check_observed(
+            self, names, scales, where,
             f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
             f"rudder limit; design a controller on this model with {type(self).__name__}.from_model",
         )  # fmt: skip
@@ -245,10 +250,32 @@ class Controller:
         self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write the controller as a JSON file (format in `agents.controllers.controller_file`)."""
-        from agents.controllers.controller_file import save
+        """Write the controller as a JSON file (format in `agents.controllers.controller_file`).
 
-        save(self, Path(path))
+        Raises
+        ------
+        InputError
+            If the folder does not exist or cannot be written.
+        """
+        write_json(self.to_dict(), Path(path))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the controller's file holds."""
+        margins = asdict(self.margins)
+        arrays = {name: getattr(self, name).tolist() for name in self.arrays}
+        return {
+            "format": FORMAT,
+            "kind": self.kind,
+            "observation_names": list(self.observation_names),
+            "observation_scales": list(self.observation_scales),
+            "gains": self.gains,
+            "neutral_rudder": self.neutral_rudder,
+            "neutral_sway": self.neutral_sway,
+            "model": {"name": self.model_name, "sha256": self.model_sha256},
+            "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
+            "design": self.design,
+            **({"arrays": arrays} if arrays else {}),
+        }
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
@@ -264,14 +291,15 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
         )
 
 
-def check_scales(
-    names: Sequence[str], found: Sequence[float], expected: Sequence[float], where: str, meant: str
-) -> None:
-    """Refuse observations in other scales, naming the first difference; `meant` has {} for what is meant."""
-    for name, one, other in zip(names, found, expected, strict=True):
+def check_observed(agent: Any, names: Sequence[str], scales: Sequence[float], where: str, meant: str) -> None:
+    """Refuse observations that an agent was not made for; `meant` has {} for its own scale."""
+    n = len(agent.observation_names)
+    check_names(names[:n], agent.observation_names, where)
+    for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
         if abs(one - other) > SCALE_TOLERANCE * abs(other):
-            said = meant.replace("{}", f"{other:g}")
-            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
+            raise InputError(
+                f"{where}: the scale of '{name}' is {one:g}, but {meant.replace('{}', f'{other:g}')}"
+            )
 
 
 def model_hash(model: ShipModel) -> str:

@@ -1,9 +1,9 @@
-"""The controller file: JSON, versioned, written whole or not at all, validated field by field on reading.
+"""The controller file as it is read: JSON, versioned, validated field by field.
 
 Format 1:
 
     format               1
-    kind                 "pid", "lq", ... (`HOMES`)
+    kind                 "pid", "lq", ... (`agents.controllers.registry`)
     observation_names    what it observes, in order
     observation_scales   physical value of each observation of 1, SI units
     gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
@@ -19,15 +19,14 @@ Format 1:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, fields
-from importlib import import_module
-from pathlib import Path
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller import Controller, check_names
+from agents.controllers.controller import FORMAT, Controller, check_names
 from agents.controllers.linear_loop import Margins
+from agents.controllers.registry import controller_class, controller_kinds
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -37,9 +36,7 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
 
-FORMAT = 1
 REMEDY = "design the controller again or take another copy"
 FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
@@ -47,55 +44,10 @@ FIELDS = (
 )  # fmt: skip
 MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
 POLICIES = ("learned", "shielded")  # whose files are described in `agents.policies.policy_file`
-HOMES = {
-    "pid": ("agents.controllers.pid", "PID"),
-    "pid-filtered": ("agents.controllers.filtered_pid", "FilteredPID"),
-    "lq": ("agents.controllers.lq", "LQ"),
-    "lqg": ("agents.controllers.lqg", "LQG"),
-    "lq-scheduled": ("agents.controllers.scheduled_lq", "ScheduledLQ"),
-    "lq-adaptive": ("agents.controllers.adaptive_lq", "AdaptiveLQ"),
-    "mpc": ("agents.controllers.mpc", "MPC"),
-    "los": ("agents.controllers.los_autopilot", "LineOfSight"),
-    "ilos": ("agents.controllers.los_autopilot", "IntegralLineOfSight"),
-    "alos": ("agents.controllers.los_autopilot", "AdaptiveLineOfSight"),
-}
-
-
-def save(controller: Controller, path: Path) -> None:
-    """Write a controller file: to a temporary name, then renamed.
-
-    Raises
-    ------
-    InputError
-        If the folder does not exist or cannot be written.
-    """
-    write_json(controller_content(controller), path)
-
-
-def controller_content(controller: Controller) -> dict[str, Any]:
-    """What a controller's file holds."""
-    margins = asdict(controller.margins)
-    content: dict[str, Any] = {
-        "format": FORMAT,
-        "kind": controller.kind,
-        "observation_names": list(controller.observation_names),
-        "observation_scales": list(controller.observation_scales),
-        "gains": controller.gains,
-        "neutral_rudder": controller.neutral_rudder,
-        "neutral_sway": controller.neutral_sway,
-        "model": {"name": controller.model_name, "sha256": controller.model_sha256},
-        "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
-        "design": controller.design,
-    }
-    if controller.arrays:
-        content["arrays"] = {name: getattr(controller, name).tolist() for name in controller.arrays}
-    if controller.has_autopilot:
-        content["autopilot"] = controller_content(getattr(controller, "autopilot"))  # noqa: B009
-    return content
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
-    """A classical controller from what `controller_content` wrote.
+    """A classical controller from what `Controller.to_dict` returned.
 
     Raises
     ------
@@ -107,13 +59,13 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
             f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
     if "kind" in content:
-        kind = check_choice(content["kind"], (*HOMES, *POLICIES), f"{where}: kind")
+        kinds = controller_kinds()
+        kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
         if kind in POLICIES:
-            raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(HOMES)}")
+            raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(kinds)}")
     check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
-    home, name = HOMES[content["kind"]]
-    design: type[Controller] = getattr(import_module(home), name)
+    design = controller_class(content["kind"])
     has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
     expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
     check_keys(content, expected, where)
@@ -131,7 +83,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
         neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
         neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
         margins=_margins(content["margins"], f"{where}: margins"),
-        observation_scales=_scales(content["observation_scales"], design.observes, where),
+        observation_scales=read_scales(content["observation_scales"], design.observes, where),
         model_name=check_text(model.get("name"), f"{where}: model.name"),
         model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
         design=_design(content["design"], f"{where}: design"),
@@ -178,7 +130,8 @@ def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> No
     check_names([str(name) for name in names], expected, f"{where}: observation_names")
 
 
-def _scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+def read_scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+    """Observation scales, positive numbers, one for each name."""
     n = len(names)
     if not isinstance(value, list) or len(value) != n:
         found = len(value) if isinstance(value, list) else repr(value)

@@ -12,17 +12,16 @@ on Control Systems Technology 31 (adaptive).
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from agents.controllers.controller import Action, Controller, Policy
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
+from agents.controllers.memory import Floats, begun, checked_observation
 from shipgym.checks import check_number
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.envs.path_following_task import PathFollowingTask
@@ -30,8 +29,6 @@ from shipgym.envs.task import INTEGRAL_ZONE
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
-
-Floats = NDArray[np.float64]
 
 N_HEADING = len(OBSERVATION_NAMES)
 CRITICAL = 4.0  # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double root
@@ -41,7 +38,7 @@ CRITICAL = 4.0  # integral time over lookahead time with which s^2 + s / T + 1 /
 class Guided(Controller):
     """A heading autopilot that is led along a path.
 
-    The state that `predict` takes and hands back is a pair: what the guidance remembers of each ship, and the
+    The state that `predict` takes and returns is a pair: what the guidance remembers of each ship, and the
     autopilot's own state.
 
     Attributes
@@ -82,10 +79,6 @@ class Guided(Controller):
             Time over which a steady cross-track error is integrated to as much again, in times to travel
             one ship length. By default 4 times `lookahead_lengths`, with which the way back to the path is
             critically damped; less swings, more is slower.
-
-        Returns
-        -------
-        LineOfSight, IntegralLineOfSight or AdaptiveLineOfSight
 
         Raises
         ------
@@ -147,39 +140,10 @@ class Guided(Controller):
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, Any]:
-        """Commanded rudder for one or many observations, with the signature of stable-baselines3.
-
-        Parameters
-        ----------
-        observation : array-like of shape (n_observations,) or (n, n_observations)
-            Of the path-following environment.
-        state : tuple, optional
-            What the last call handed back; None where episodes begin.
-        episode_start : bool or array-like of bool of shape (n,), optional
-            Where an episode begins and the state is that of the one before.
-        deterministic : bool
-            Handed on to the autopilot.
-
-        Returns
-        -------
-        action : float32 array of shape (1,) or (n, 1)
-            Part of the rudder limit, in [-1, 1].
-        state : tuple
-            For the next call.
-
-        Raises
-        ------
-        InputError
-            If the observation has fewer entries or another number of dimensions, or the state is not one
-            of as many ships.
-        """
-        given, n = np.array(observation, dtype=np.float64), len(self.observes)
-        if given.ndim not in (1, 2) or given.shape[-1] < n:
-            raise InputError(
-                f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: of the "
-                f"path-following environment"
-            )
-        memory, inner, begins = _remembered(state, episode_start, given.shape[:-1])
+        """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
+        given = checked_observation(observation, self.observes).copy()
+        own, inner = (None, None) if state is None else state
+        memory, begins = begun(own, episode_start, given.shape[:-1], 2)
         cross = given[..., N_HEADING] * self.observation_scales[N_HEADING]
         wanted, drift = self.course(cross, memory[..., 0])
         shown = -np.arctan2(cross, self.gains["task_lookahead"])
@@ -202,10 +166,9 @@ class Guided(Controller):
         if isinstance(self.autopilot, Controller):
             self.autopilot.check_fits_model(model)
 
-    def save(self, path: str | Path) -> None:
-        """Write guidance and autopilot as one JSON file (format in `agents.controllers.controller_file`)."""
-        self._heading_autopilot("a file")
-        super().save(path)
+    def to_dict(self) -> dict[str, Any]:
+        """What the file holds, of guidance and autopilot."""
+        return {**super().to_dict(), "autopilot": self._heading_autopilot("a file").to_dict()}
 
     def _heading_autopilot(self, what: str) -> Controller:
         if not isinstance(self.autopilot, Controller):
@@ -256,25 +219,3 @@ class AdaptiveLineOfSight(Guided):
         lookahead = self.gains["lookahead"]
         rate = self.gains["integral"] * cross_track / np.hypot(lookahead, cross_track)
         return -drift - np.arctan2(cross_track, lookahead), drift + self.design["dt"] * rate
-
-
-#: Guidance laws by kind.
-LAWS: Mapping[str, type[Guided]] = {
-    law.kind: law for law in (LineOfSight, IntegralLineOfSight, AdaptiveLineOfSight)
-}
-
-
-def _remembered(state: Any, starts: Any, shape: tuple[int, ...]) -> tuple[Floats, Any, NDArray[np.bool_]]:
-    """Memory of each ship with zeros where an episode begins, the autopilot's state, and where it does."""
-    if state is None:
-        return np.zeros((*shape, 2)), None, np.ones(shape, dtype=np.bool_)
-    memory = np.array(state[0], dtype=np.float64)
-    if memory.shape != (*shape, 2):
-        raise InputError(
-            f"state: shape {memory.shape} found, expected {(*shape, 2)}: what the last predict of as many "
-            f"ships handed back, or None where episodes begin"
-        )
-    flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
-    begins = np.zeros(shape, dtype=np.bool_) | flags.reshape(shape if flags.size > 1 else ())
-    memory[begins] = 0.0
-    return memory, state[1], begins

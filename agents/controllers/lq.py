@@ -72,27 +72,17 @@ class LQ(Controller):
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
 
-        Returns
-        -------
-        LQ
-
         Raises
         ------
         InputError
             If the model has no straight course, or an argument is out of its range.
         """
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        ship = sample_ship(model, interval)
-        check_number(rudder_weight, "rudder_weight", above=0.0)
-        weight = rate_weight(model)
-        if rate_weight_s2 is not None:
-            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
-        reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
-        gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
+        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
+        ship = without_yaw_memory(model, interval)
+        gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
         return cls.designed(
             model,
-            ship,
+            sample_ship(model, interval),
             gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
             design={
                 "integral_lengths": float(integral_lengths),
@@ -100,6 +90,32 @@ class LQ(Controller):
                 "rate_weight_s2": weight,
             },
         )
+
+
+def lq_settings(
+    model: ShipModel,
+    dt: float | None,
+    integral_lengths: float,
+    rudder_weight: float,
+    rate_weight_s2: float | None,
+) -> tuple[float, float]:
+    """Control interval, s, and weight of the rudder rate, s^2, of a design; its arguments are checked.
+
+    Raises
+    ------
+    InputError
+        If an argument is out of its range.
+    """
+    check_number(integral_lengths, "integral_lengths", above=0.0)
+    check_number(rudder_weight, "rudder_weight", above=0.0)
+    interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+    weight = rate_weight(model) if rate_weight_s2 is None else rate_weight_s2
+    return interval, check_number(weight, "rate_weight_s2", above=0.0)
+
+
+def without_yaw_memory(model: ShipModel, dt: float, speed: float | None = None) -> SampledShip:
+    """The ship that gains are computed for: in first order if she has a memory of yaw, never measured."""
+    return sample_ship(model, dt, first_order="q" in model.state_names, speed=speed)
 
 
 def lq_gain(

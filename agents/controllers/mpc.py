@@ -19,17 +19,15 @@ from importlib import import_module
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import RUDDER, SIGNALS, length_time, sample_ship
-from agents.controllers.lq import LQ, lq_gain
-from agents.controllers.stateful import Flags, Stateful
+from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
+from agents.controllers.memory import Flags, Floats, deviations
+from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT, control_interval
+from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-
-Floats = NDArray[np.float64]
 
 ACCURACY = 1e-4  # of the solver, rad
 MOST_ITERATIONS = 20_000
@@ -102,28 +100,20 @@ class MPC(Stateful):
             Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
             (`linear_loop.rate_weight`), because LQ does not know that the gear is slow.
 
-        Returns
-        -------
-        MPC
-
         Raises
         ------
         InputError
             If OSQP is not installed, the model has no straight course, or an argument is out of its range.
         """
         _solver_library()
-        check_number(integral_lengths, "integral_lengths", above=0.0)
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        check_number(rudder_weight, "rudder_weight", above=0.0)
         weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
-        check_number(weight, "rate_weight_s2", above=0.0)
-        ship = sample_ship(model, interval)
-        reduced = sample_ship(model, interval, first_order=True) if "q" in model.state_names else ship
+        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, weight)
+        reduced = without_yaw_memory(model, interval)
         gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
         return cls.designed(
             model,
-            ship,
+            sample_ship(model, interval),
             gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
             design={
                 "integral_lengths": float(integral_lengths),
@@ -144,23 +134,17 @@ class MPC(Stateful):
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
         limit = self.observation_scales[self.observation_names.index("rudder")]
-        deviations = self._from_straight_running(seen)
-        rudder = np.clip(deviations[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
-        deviations[:, RUDDER] = rudder
+        state = deviations(seen, self.neutral_rudder, self.neutral_sway)
+        rudder = np.clip(state[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
+        state[:, RUDDER] = rudder
         row = np.array([self.gains[signal] for signal in SIGNALS])
-        orders: Floats = np.einsum("ij,j->i", deviations, row)
+        orders: Floats = np.einsum("ij,j->i", state, row)
         lowest, highest = self._bounds(limit)
-        planned = np.einsum("ij,kj->ik", deviations, self.plan.by_state)
+        planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
         for ship in np.flatnonzero(np.any((planned < lowest) | (planned > highest), axis=1)):
             orders[ship] += self._correction(lowest - planned[ship], highest - planned[ship])
             orders[ship] = self._within(orders[ship], rudder[ship], limit)
         return self.neutral_rudder + orders, memory
-
-    def _from_straight_running(self, seen: dict[str, Floats]) -> Floats:
-        """State of each ship, shape (n, 5)."""
-        error = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
-        sway, rudder = seen["sway"] - self.neutral_sway, seen["rudder"] - self.neutral_rudder
-        return np.stack([sway, seen["yaw_rate"], error, rudder, seen["heading_error_integral"]], axis=-1)
 
     @cached_property
     def plan(self) -> Plan:

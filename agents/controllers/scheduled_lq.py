@@ -11,17 +11,15 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, rate_weight, sample_ship
-from agents.controllers.lq import LQ, lq_gain
-from agents.controllers.stateful import Flags, Stateful, heading_error
+from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, sample_ship
+from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
+from agents.controllers.memory import Flags, Floats, deviations
+from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
+from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-
-Floats = NDArray[np.float64]
 
 SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed
 
@@ -74,9 +72,7 @@ class ScheduledLQ(Stateful):
         ----------
         model : ShipModel
             Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
-        integral_lengths, rudder_weight, rate_weight_s2
+        dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`, at each speed.
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the
@@ -92,22 +88,14 @@ class ScheduledLQ(Stateful):
         InputError
             If the model has no straight course at one of the speeds, or an argument is out of its range.
         """
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         service = model.particulars["speed"]
-        check_number(rudder_weight, "rudder_weight", above=0.0)
-        weight = rate_weight(model)
-        if rate_weight_s2 is not None:
-            weight = check_number(rate_weight_s2, "rate_weight_s2", above=0.0)
         listed = _rising([service * part for part in SPEEDS] if speeds is None else speeds)
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
             ship = sample_ship(model, interval, speed=speed)
-            reduced = ship
-            if "q" in model.state_names:
-                reduced = sample_ship(model, interval, first_order=True, speed=speed)
             time = integral_lengths * model.particulars["length"] / speed
-            gains.append(-lq_gain(reduced, weight, time, rudder_weight))
+            gains.append(-lq_gain(without_yaw_memory(model, interval, speed), weight, time, rudder_weight))
             neutral.append((ship.about.rudder, ship.about.sway))
             name = f"ScheduledLQ on model '{model.name}' at {speed:g} m/s"
             margins.append(compensator_margins(ship, Compensator.static(gains[-1][None]), name))
@@ -144,14 +132,7 @@ class ScheduledLQ(Stateful):
         """Feedback with the gains of each ship's speed."""
         gains, neutral = self.at(seen["surge"])
         rudder, sway = neutral.T
-        signals = (
-            seen["sway"] - sway,
-            seen["yaw_rate"],
-            heading_error(seen),
-            seen["rudder"] - rudder,
-            seen["heading_error_integral"],
-        )
-        order: Floats = rudder + np.einsum("ij,ij->i", gains, np.stack(signals, axis=-1))
+        order: Floats = rudder + np.einsum("ij,ij->i", gains, deviations(seen, rudder, sway))
         return order, memory
 
 

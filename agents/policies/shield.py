@@ -8,7 +8,7 @@ It looks at observations alone and takes over
 * where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
   towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
   count, however large;
-* where the policy's command is no number.
+* where the policy's command is not a number.
 
 It hands back after the ship has been within `Limits.back_deg` of her course and within
 `Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
@@ -18,23 +18,23 @@ The limits to hand back lie inside those to take over, so that it does not chatt
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import Action, Controller, Policy
+from agents.controllers.controller import FORMAT, Action, Controller, Policy
 from agents.controllers.lq import LQ
+from agents.controllers.memory import Flags, Floats, begun
+from agents.policies.policy import LearnedPolicy
+from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import Envelope, ShipModel
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 # what is remembered of each ship
 STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)
@@ -115,7 +115,7 @@ class Interventions:
 
 
 def interventions(state: ShieldState) -> Interventions:
-    """Read from the state that `Shielded.predict` handed back how often and how long the fallback steered."""
+    """Read from the state that `Shielded.predict` returned how often and how long the fallback steered."""
     watch = state.watch
     count, intervals = watch[..., COUNT].astype(np.int64), watch[..., INTERVALS].astype(np.int64)
     return Interventions(count, intervals, watch[..., STEERED] > 0.0)
@@ -218,54 +218,17 @@ class Shielded:
         episode_start: Any = None,
         deterministic: bool = True,
     ) -> tuple[Action, ShieldState]:
-        """Commands for one or many observations, with the signature of stable-baselines3.
-
-        Parameters
-        ----------
-        observation : array-like of shape (n_observations,) or (n, n_observations)
-            Of the environment.
-        state : ShieldState, optional
-            What the last call handed back; None where episodes begin.
-        episode_start : bool or array-like of bool of shape (n,), optional
-            Where an episode begins and the state is that of the one before.
-        deterministic : bool
-            Handed on to the policy.
-
-        Returns
-        -------
-        action : float32 array of shape (n_commands,) or (n, n_commands)
-            The policy's, or the fallback's rudder.
-        state : ShieldState
-
-        Raises
-        ------
-        InputError
-            If the observation has fewer entries or another number of dimensions, or the state is not one of
-            as many ships.
-        """
+        """See `Policy.predict`: the policy's commands, or those with the fallback's rudder."""
         given = np.asarray(observation)
         inner, outer, watch = (None, None, None) if state is None else state
         ours, outer = self.fallback.predict(given, outer, episode_start, deterministic)
         theirs, inner = self.policy.predict(given, inner, episode_start, deterministic)
         action = np.array(theirs, dtype=np.float32)
-        watch = self._begun(watch, episode_start, given.shape[:-1])
+        watch, _ = begun(watch, episode_start, given.shape[:-1], N_WATCHED)
         self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), watch)
         steered = watch[..., STEERED] > 0.0
         action[..., 0] = np.where(steered, ours[..., 0], action[..., 0])
         return np.where(np.isfinite(action), action, 0.0), ShieldState(inner, outer, watch)
-
-    def _begun(self, watch: Floats | None, starts: Any, shape: tuple[int, ...]) -> Floats:
-        """What is remembered, a copy with zeros where an episode begins."""
-        if watch is None:
-            return np.zeros((*shape, N_WATCHED))
-        if np.shape(watch) != (*shape, N_WATCHED):
-            raise InputError(
-                f"state: watch of shape {np.shape(watch)} found, expected {(*shape, N_WATCHED)}: what the "
-                f"last predict of as many ships handed back, or None where episodes begin"
-            )
-        flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
-        begins = np.broadcast_to(flags.reshape(shape if flags.size > 1 else ()), shape)
-        return np.where(begins[..., None], 0.0, watch)
 
     def _update(self, observation: NDArray[Any], broken: Flags, watch: Floats) -> None:
         """Decide for each ship who steers, and count."""
@@ -318,6 +281,29 @@ class Shielded:
 
     def save(self, path: str | Path) -> None:
         """Write policy and fallback as one file (format in `agents.policies.policy_file`)."""
-        from agents.policies.policy_file import save
+        write_policy(*self.file_fields(), Path(path))
 
-        save(self, Path(path))
+    def file_fields(self) -> tuple[dict[str, Any], Tensors]:
+        """What stands in its JSON, and the weights of its policy by name."""
+        policy, tensors = _file_fields(self.policy)
+        content = {
+            "format": FORMAT,
+            "kind": "shielded",
+            "policy": policy,
+            "fallback": self.fallback.to_dict(),
+            "dt": self.dt,
+            "envelope": None if self.envelope is None else self.envelope.to_dict(),
+            "limits": asdict(self.limits),
+        }
+        return content, {f"policy.{name}": tensor for name, tensor in tensors.items()}
+
+
+def _file_fields(policy: Policy) -> tuple[dict[str, Any], Tensors]:
+    if isinstance(policy, Controller):
+        return policy.to_dict(), {}
+    if isinstance(policy, LearnedPolicy | Shielded):
+        return policy.file_fields()
+    raise InputError(
+        f"policy: {type(policy).__name__} found, expected a learned policy or a controller of shipgym for a "
+        f"file"
+    )

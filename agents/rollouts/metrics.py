@@ -1,7 +1,7 @@
-"""What an episode is judged by: figures of recorded motions, one number an episode.
+"""What an episode comes to: figures of rollouts, one number an episode.
 
-A recording holds arrays of shape (n_steps, n_episodes); intervals in which an episode was over do not count.
-A figure that an episode does not have (nothing sailed, no course change, no path) is NaN.
+Intervals in which an episode was over do not count. A figure that an episode does not have (nothing sailed,
+no course change, no path) is NaN.
 
 Sources: Norrbin 1972, On the added resistance due to steering on a straight course (steering cost); van
 Amerongen 1982, Adaptive steering of ships (way lengthened and speed lost by steering); Carlton 2012, Marine
@@ -10,131 +10,117 @@ Propellers and Propulsion, chapter 6 (propeller law: power goes with the cube of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.path_following_task import PathFollowingTask
+from agents.controllers.controller import Policy
+from agents.rollouts.rollout import Rollout, rollout
+from agents.suites.suite import BenchmarkTask
 from shipgym.envs.task import HEADING_SCALE, Task
-from shipgym.kernels.path_following import WORST_PROGRESS
+from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+#: Physical states that `metrics` needs, beside all of `info`.
+STATES = ("psi", "u", "v", "n", "delta", "set_point")
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
-SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling are judged
+SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling count
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
+WORST_PROGRESS = 2.0  # cost of a step against the path
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
-    """Episodes of one task, flown side by side, step after step.
-
-    Attributes
-    ----------
-    task : Task
-        What was asked.
-    dt : float
-        Control interval, s.
-    service_speed, service_shaft : float
-        m/s; 1/s, 0 of a ship whose shaft has no motion of its own.
-    sailing : bool array of shape (n_steps, n)
-        Whether the interval counts.
-    parts : array of shape (n_steps, n, n_parts)
-        Cost of the interval, in the order of `task.reward_parts`.
-    series : dict of str to array of shape (n_steps, n)
-        At the end of each interval: `heading_error` (rad, before the set-point changes), `extrapolating`,
-        `shielded`; in course keeping `u`, `v` (m/s); `n` (1/s) of a ship with a shaft; on a path those of
-        `task.info_names` that path following adds.
-    rudder, set_point, heading : array of shape (n_steps + 1, n)
-        From the beginning on, rad.
-    lost : bool array of shape (n,)
-        Whether control was lost, the ship ran away or aground.
-    failed : bool array of shape (n,)
-        Whether the controller gave no command.
-    """
-
-    task: Task
-    dt: float
-    service_speed: float
-    service_shaft: float
-    sailing: Flags
-    parts: Floats
-    series: dict[str, Floats]
-    rudder: Floats
-    set_point: Floats
-    heading: Floats
-    lost: Flags
-    failed: Flags
-
-    @property
-    def steps(self) -> Floats:
-        """Intervals of each episode, shape (n,)."""
-        steps: Floats = self.sailing.sum(axis=0).astype(np.float64)
-        return steps
-
-    def mean(self, values: Floats) -> Floats:
-        """Mean over the intervals of each episode, shape (n,); NaN for one without any."""
-        return ratio(total(np.where(self.sailing, values, 0.0)), self.steps)
+def recorded_for_metrics(task: Task) -> tuple[str, ...]:
+    """What a rollout has to record for `metrics`."""
+    return (*STATES, *task.info_names)
 
 
 def worst_step_cost(task: Task) -> float:
-    """Cost of each step that is left of an episode in which control is lost, as the kernels have it."""
-    if isinstance(task, CourseKeepingTask):
-        return float((np.radians(task.max_heading_error_deg) / HEADING_SCALE) ** 2)
-    assert isinstance(task, PathFollowingTask)
-    return float((task.ground / task.corridor) ** 2 + WORST_PROGRESS)
+    """Cost of each step that is left of an episode in which control is lost, as the tasks have it."""
+    asked: Any = task
+    if _on_path(task):
+        return float((asked.ground / asked.corridor) ** 2 + WORST_PROGRESS)
+    return float((np.radians(asked.max_heading_error_deg) / HEADING_SCALE) ** 2)
 
 
-def metrics(recording: Recording) -> dict[str, Floats]:
+def _on_path(task: Task) -> bool:
+    return "cross_track" in task.info_names
+
+
+def metrics(run: Rollout) -> dict[str, Floats]:
     """Figures of each episode by name, each of shape (n,).
+
+    Parameters
+    ----------
+    run : Rollout
+        That recorded `recorded_for_metrics`.
 
     Returns
     -------
     dict of str to array
         cost, cost_heading and so on : minus the sum of the rewards, and its parts. An episode in which the
-            controller failed is costed as if it had lost control then.
+            policy failed is charged as if it had lost control then.
         heading_rmse_deg : against the set-point, on a path against its line-of-sight course.
-        cross_track_rmse_m : on a path.
         rudder_travel_deg_min, rudder_reversals_min : way of the rudder, and how often it turns round (by
             0.5 degrees at least), a minute.
         overshoot_percent, settling_s, unsettled : see `course_changes`.
+        cross_track_rmse_m : on a path.
         outside_corridor, left_corridor, grounded : share of the time; whether at all.
         success : on a path, whether its end was reached; else whether control was kept to the end.
         fuel : see `fuel_per_distance`.
         extrapolating : share of the time outside the model's envelope.
         shielded : share of the time in which a safety shield steered; interventions: how often it took over.
-        terminated, failed : control lost; no command.
+        terminated, failed : control lost, the ship ran away or aground; no command.
         duration_s : time sailed.
     """
-    task, steps = recording.task, recording.steps
-    sums = total(recording.parts)
-    found = {f"cost_{part.removeprefix('reward_')}": sums[:, k] for k, part in enumerate(task.reward_parts)}
-    left = task.episode_steps - steps
-    found["cost_end"] = found["cost_end"] + np.where(recording.failed, left * worst_step_cost(task), 0.0)
-    minutes = steps * recording.dt / 60.0
-    turned = np.abs(np.diff(recording.rudder, axis=0)) * recording.sailing
-    shielded = recording.series["shielded"] * recording.sailing
+    shielded = run.shielded & run.sailing
     return {
-        "cost": sum(found.values(), start=np.zeros_like(steps)),
-        **found,
-        "heading_rmse_deg": np.degrees(np.sqrt(recording.mean(recording.series["heading_error"] ** 2))),
-        "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
-        "rudder_reversals_min": ratio(reversals(recording.rudder, recording.sailing), minutes),
-        **course_changes(recording),
-        **_on_a_path(recording),
-        "fuel": fuel_per_distance(recording),
-        "extrapolating": recording.mean(recording.series["extrapolating"]),
-        "shielded": recording.mean(shielded),
-        "interventions": (np.diff(shielded, axis=0, prepend=0.0) > 0.0).sum(axis=0).astype(np.float64),
-        "terminated": recording.lost.astype(np.float64),
-        "failed": recording.failed.astype(np.float64),
-        "duration_s": steps * recording.dt,
+        **costs(run),
+        **steering(run),
+        **course_changes(run),
+        **path_following(run),
+        "fuel": fuel_per_distance(run),
+        "extrapolating": mean(run, run.infos["extrapolating"]),
+        "shielded": ratio(total(shielded), run.steps),
+        "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
+        "terminated": lost(run).astype(np.float64),
+        "failed": run.failed.astype(np.float64),
+        "duration_s": run.steps * run.dt,
     }
+
+
+def costs(run: Rollout) -> dict[str, Floats]:
+    """Cost of each episode and its parts, see `metrics`."""
+    parts = {
+        f"cost_{name.removeprefix('reward_')}": total(-run.infos[name][1:] * run.sailing)
+        for name in run.task.reward_parts
+    }
+    left = run.task.episode_steps - run.steps
+    parts["cost_end"] = parts["cost_end"] + np.where(run.failed, left * worst_step_cost(run.task), 0.0)
+    return {"cost": sum(parts.values(), start=np.zeros(len(run.seeds))), **parts}
+
+
+def steering(run: Rollout) -> dict[str, Floats]:
+    """Heading error and rudder activity of each episode, see `metrics`."""
+    minutes, rudder = run.steps * run.dt / 60.0, run.states["delta"]
+    turned = np.abs(np.diff(rudder, axis=0)) * run.sailing
+    return {
+        "heading_rmse_deg": np.degrees(np.sqrt(mean(run, run.infos["heading_error"] ** 2))),
+        "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
+        "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
+    }
+
+
+def lost(run: Rollout) -> Flags:
+    """Whether control was lost, the ship ran away or aground, shape (n,)."""
+    found: Flags = (
+        run.terminated & ~(path_following(run)["success"] > 0.0) if _on_path(run.task) else run.terminated
+    )
+    return found
 
 
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
@@ -167,7 +153,7 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
     return number
 
 
-def course_changes(recording: Recording) -> dict[str, Floats]:
+def course_changes(run: Rollout) -> dict[str, Floats]:
     """Overshoot and settling after the course changes of an episode, means over its changes.
 
     A change begins with a new set-point at least 5 degrees from the heading, and lasts until the next or
@@ -180,22 +166,22 @@ def course_changes(recording: Recording) -> dict[str, Floats]:
     dict of str to array of shape (n,)
         overshoot_percent, settling_s, unsettled (share of the changes); NaN on paths.
     """
-    n = recording.sailing.shape[1]
+    n = len(run.seeds)
     names = ("overshoot_percent", "settling_s", "unsettled")
-    if not isinstance(recording.task, CourseKeepingTask):
+    if _on_path(run.task):
         return {name: np.full(n, np.nan) for name in names}
     means = np.full((3, n), np.nan)
     for episode in range(n):
-        last = int(recording.steps[episode])
-        course = recording.set_point[: last + 1, episode]
-        error = wrapped(recording.set_point[: last + 1, episode] - recording.heading[: last + 1, episode])
+        last = int(run.steps[episode])
+        course = run.states["set_point"][: last + 1, episode]
+        error = wrapped(course - run.states["psi"][: last + 1, episode])
         begins = [0, *(np.flatnonzero(np.diff(course[:-1]) != 0.0) + 1).tolist(), last]
         found = []
         for begin, end in pairwise(begins):
             if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
                 changed = course[end] != course[begin]  # the error at `end` is that against the next course
                 stretch = error[begin : end + (not changed)]
-                found.append(step_figures(stretch, recording.dt))
+                found.append(step_figures(stretch, run.dt))
         if found:
             means[:, episode] = np.mean(found, axis=0)
     return dict(zip(names, means, strict=True))
@@ -220,7 +206,7 @@ def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
     return 100.0 * beyond / abs(first), time, float(unsettled)
 
 
-def fuel_per_distance(recording: Recording) -> Floats:
+def fuel_per_distance(run: Rollout) -> Floats:
     """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
 
     The power is taken to go with the cube of the shaft speed (propeller law); the way made good is along the
@@ -233,39 +219,48 @@ def fuel_per_distance(recording: Recording) -> Floats:
     array of shape (n,)
         NaN where no way was made good.
     """
-    shaft = recording.series["n"] / recording.service_shaft if recording.service_shaft > 0.0 else 1.0
-    spent = total(np.where(recording.sailing, shaft, 0.0) ** 3) * recording.dt
-    if isinstance(recording.task, PathFollowingTask):
-        way = np.where(recording.sailing, recording.series["distance_made_good"], 0.0).max(
-            axis=0, initial=0.0
-        )
+    service = run.model.service_shaft_speed if "n" in run.model.state_names else 0.0
+    shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
+    spent = total(np.where(run.sailing, shaft, 0.0) ** 3) * run.dt
+    if _on_path(run.task):
+        made = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0)
+        way = made.max(axis=0, initial=0.0)
     else:
-        error = recording.series["heading_error"]
-        along = recording.series["u"] * np.cos(error) + recording.series["v"] * np.sin(error)
-        way = total(np.where(recording.sailing, along, 0.0)) * recording.dt
-    return ratio(spent * recording.service_speed, np.maximum(way, 0.0))
+        error = run.infos["heading_error"]
+        along = run.states["u"] * np.cos(error) + run.states["v"] * np.sin(error)
+        way = total(np.where(run.sailing, along[1:], 0.0)) * run.dt
+    return ratio(spent * run.model.particulars["speed"], np.maximum(way, 0.0))
 
 
-def _on_a_path(recording: Recording) -> dict[str, Floats]:
-    if not isinstance(recording.task, PathFollowingTask):
-        none = np.full(recording.sailing.shape[1], np.nan)
+def path_following(run: Rollout) -> dict[str, Floats]:
+    """How each episode followed its path, see `metrics`; in course keeping NaN but for success."""
+    if not _on_path(run.task):
         names = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
-        kept = ~(recording.lost | recording.failed)
+        none = np.full(len(run.seeds), np.nan)
+        kept = ~(run.terminated | run.failed)
         return {**dict.fromkeys(names, none), "success": kept.astype(np.float64)}
-    series, sailing = recording.series, recording.sailing
-    outside = (series["in_corridor"] == 0.0) & sailing
+    outside = (run.infos["in_corridor"][1:] == 0.0) & run.sailing
+
+    def ever(name: str) -> Floats:
+        return np.minimum(total((run.infos[name][1:] > 0.0) & run.sailing), 1.0)
+
     return {
-        "cross_track_rmse_m": np.sqrt(recording.mean(series["cross_track"] ** 2)),
-        "outside_corridor": recording.mean(outside.astype(np.float64)),
+        "cross_track_rmse_m": np.sqrt(mean(run, run.infos["cross_track"] ** 2)),
+        "outside_corridor": ratio(total(outside), run.steps),
         "left_corridor": outside.any(axis=0).astype(np.float64),
-        "grounded": ((series["grounded"] > 0.0) & sailing).any(axis=0).astype(np.float64),
-        "success": ((series["success"] > 0.0) & sailing).any(axis=0).astype(np.float64),
+        "grounded": ever("grounded"),
+        "success": ever("success"),
     }
 
 
-def total(values: Floats) -> Floats:
+def mean(run: Rollout, values: Floats) -> Floats:
+    """Mean over the intervals of each episode of what was recorded, shape (n,); NaN for one without any."""
+    return ratio(total(np.where(run.sailing, values[1:], 0.0)), run.steps)
+
+
+def total(values: Floats | Flags) -> Floats:
     """Sum over the first axis, always in its order: it does not depend on how many episodes there are."""
-    sums: Floats = np.cumsum(values, axis=0)
+    sums: Floats = np.cumsum(values, axis=0, dtype=np.float64)
     return sums[-1] if len(sums) else np.zeros(values.shape[1:])
 
 
@@ -273,3 +268,32 @@ def ratio(above: Floats, below: Floats) -> Floats:
     """A quotient, NaN where the divisor is 0."""
     found: Floats = np.divide(above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0)
     return found
+
+
+class Evaluation(NamedTuple):
+    """Figures of each episode by name, each of shape (n,), and the rollout that they are of."""
+
+    figures: dict[str, Floats]
+    run: Rollout
+
+
+def evaluate(
+    policy: Policy, task: BenchmarkTask, seeds: ArrayLike | None = None, model: ShipModel | None = None
+) -> Evaluation:
+    """Sail the episodes of a task, all at once, whatever the policy does (`rollout`, tolerant).
+
+    Parameters
+    ----------
+    policy : Policy
+        Anything with `predict`; it is given the observations of all ships together.
+    task : BenchmarkTask
+        Of a suite.
+    seeds : array-like of int, shape (n,), optional
+        By default those that are scored.
+    model : ShipModel, optional
+        Another ship than the task's own.
+    """
+    numbers = np.asarray(task.seeds if seeds is None else seeds, dtype=np.int64)
+    engine = task.engine(len(numbers), model)
+    run = rollout(policy, engine, numbers, record=recorded_for_metrics(task.task), tolerant=True)
+    return Evaluation(metrics(run), run)

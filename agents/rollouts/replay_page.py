@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
+from typing import Any
 
-import shipgym
 from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-from shipgym.whole_file import write_text
+from shipgym.files import write_text
+from shipgym.pages import render
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
@@ -23,7 +20,7 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     Parameters
     ----------
     paths : sequence of str or Path
-        Episode files, of one ship or of several; the page lays them over each other.
+        Episode files, of one ship or of several; the page shows them together.
     out : str or Path
         The HTML file; one that exists is replaced.
 
@@ -63,39 +60,31 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
     ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
-    data = json.dumps({"runs": runs, "quantities": quantities(runs)}, allow_nan=False)
-    return player(f"Replay: {ships}", _script_safe(data))
+    return player(f"Replay: {ships}", {"runs": runs, "quantities": quantities(runs)})
 
 
-def player(title: str, data: str) -> str:
-    """The page about data of runs.
+def player(title: str, data: Any) -> str:
+    """The page that replays runs.
 
     Parameters
     ----------
     title : str
         Of the window.
-    data : str
-        JSON of `runs` and `quantities` (`agents.rollouts.replay_series`) as a script element may hold it; or
-        what will be put in its place.
+    data : dict or str
+        `runs` and `quantities` (`agents.rollouts.replay_series`); or a placeholder for them.
 
     Returns
     -------
     str
         HTML that loads nothing.
     """
-    return Template(_part("template")).substitute(
-        title=escape(title),
-        version=escape(shipgym.__version__),
-        chart=_part("chart"),
-        player=_part("player"),
-        data=data,
-    )
+    return render("agents.rollouts/replay.html", title=title, data=data)
 
 
 def names(paths: Sequence[Path]) -> list[str]:
-    """What to call files: their names without ending, with as many folders as tell them apart.
+    """Titles of episode files: names without ending, with as many folders as needed to be different.
 
-    One that is given twice is numbered.
+    A file that is given twice is numbered.
     """
     stems = [path.absolute().with_suffix("").parts for path in paths]
     deepest = max(len(stem) for stem in stems)
@@ -107,15 +96,5 @@ def names(paths: Sequence[Path]) -> list[str]:
 
 
 def _earlier(called: Sequence[str]) -> list[int]:
-    """How often each name stood before."""
+    """How often each name occurred before."""
     return [called[:i].count(name) for i, name in enumerate(called)]
-
-
-def _part(name: str) -> str:
-    """One of the files of which the page is made."""
-    return files("agents.rollouts").joinpath(f"{name}.html").read_text(encoding="utf-8")
-
-
-def _script_safe(text: str) -> str:
-    """JSON that cannot end the script element it stands in."""
-    return text.replace("<", "\\u003c")

@@ -20,7 +20,7 @@ CROSS_TRACK = ("cross_track_error", "cross_track")
 
 
 class Quantity(NamedTuple):
-    """One history: its name and unit, its line, the order for it, dashed, and a name for little room."""
+    """One history: its name and unit, its series, that of its order (dashed), and a short name."""
 
     label: str
     unit: str
@@ -57,16 +57,16 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     -------
     dict
         What it is, the ship to draw, the path, series of n + 1 values each, and under `other` what was
-        recorded and is shown by no other name, SI units.
+        recorded besides, SI units.
     """
-    told, path = {**episode.info, **episode.states}, episode.waypoints
-    shown = {*SHOWN, _first(COURSE_ORDERS, told), _first(CROSS_TRACK, told)}
-    other = {key: values for key, values in told.items() if key not in shown}
+    recorded, path = {**episode.info, **episode.states}, episode.waypoints
+    shown = {*SHOWN, _first(COURSE_ORDERS, recorded), _first(CROSS_TRACK, recorded)}
+    other = {key: values for key, values in recorded.items() if key not in shown}
     return {
         "name": name,
         "environment": episode.environment,
         "model": episode.model,
-        "seed": None if episode.seed is None else str(episode.seed),  # longer than numbers are in a browser
+        "seed": None if episode.seed is None else str(episode.seed),  # too long for a number in a browser
         "number": episode.number,
         "dt": episode.dt,
         "steps": episode.n_steps,
@@ -114,11 +114,11 @@ def series(episode: Episode) -> dict[str, Floats]:
     if order is not None:
         error = np.remainder(states[order] - heading + np.pi, 2.0 * np.pi) - np.pi
         found["heading_error"] = np.degrees(error)
-        found["course_order"] = np.degrees(heading + error)  # so that it stands beside the heading
-    told = {**episode.info, **states}
-    cross_track = _first(CROSS_TRACK, told)
+        found["course_order"] = np.degrees(heading + error)  # without a jump from the heading
+    recorded = {**episode.info, **states}
+    cross_track = _first(CROSS_TRACK, recorded)
     if cross_track is not None:
-        found["cross_track_error"] = told[cross_track]
+        found["cross_track_error"] = recorded[cross_track]
     return {**found, **_weather(states)}
 
 
@@ -145,7 +145,7 @@ def _first(names: Sequence[str], states: Mapping[str, Floats]) -> str | None:
 
 
 def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Wind and current where they are recorded and blow or flow at all."""
+    """Wind and current where they are recorded and not zero throughout."""
     found: dict[str, Floats] = {}
     if "wind_speed" in states and "wind_from" in states and np.any(states["wind_speed"]):
         found["wind_speed"] = states["wind_speed"]
@@ -160,12 +160,12 @@ def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
 
 
 def _before_steps(values: Floats) -> Floats:
-    """Orders at the samples from which on they hold; the last one up to the end."""
+    """Orders at the samples from which on they apply; the last one up to the end."""
     return np.append(values, values[-1:])
 
 
 def _after_steps(parts: Mapping[str, Floats]) -> dict[str, Floats]:
-    """What steps earned at the samples where they end; nothing at the beginning."""
+    """Rewards of steps at the samples where these end; nothing at the beginning."""
     return {name: np.append(0.0, values) for name, values in parts.items()}
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from agents.agent_file import load_agent
-from agents.benchmarking.designs import design
-from agents.benchmarking.direct_search import tuned
-from agents.benchmarking.suite import DEFAULT_SUITE, BenchmarkTask
 from agents.controllers.controller import Controller
+from agents.controllers.designs import design, tuned
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask
 from shipgym.errors import InputError
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import BenchmarkTask
 from agents.controllers.controller import Policy
-from agents.rollouts.flying import episode_costs
+from agents.controllers.designs import design
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import BenchmarkTask
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 
@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Episodes of a task that nobody learns from, and what LQ costs on them.
+    """Episodes of a task that are not learned from, and what LQ costs on them.
 
     Attributes
     ----------

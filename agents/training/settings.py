@@ -1,6 +1,6 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
-The files in `hyperparameters/` hold the tuned ones, later tables before earlier ones:
+The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 
     [defaults]                          # every setting of the algorithm, to learn from nothing
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
@@ -14,167 +14,106 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import Field, asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, ClassVar, get_type_hints
+from typing import Any
 
-from agents.benchmarking.suite import ENVIRONMENTS, load_suite
+from agents.controllers.registry import controller_kinds
+from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
 
-SCHEDULES = ("constant", "linear")
+RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED, AUTO = "running", "learned", "auto"
-ACTIVATIONS = ("relu", "tanh")
-#: Classical controllers that a policy may add to, by name; "tuned" is the best of those tuned for the suite's
-#: task (but `direct_search.NO_BASES`), and a path that ends in .json is a controller's file.
-BASES = (
-    "none", "tuned", "pid", "pid-filtered", "lq", "lqg", "lq-scheduled", "lq-adaptive", "mpc", "los", "ilos",
-    "alos",
-)  # fmt: skip
+NUMBER_OR_WORD, WIDTHS = "float | str", "tuple[int, ...]"  # types of settings
+
+
+def setting(**allowed: Any) -> Any:
+    """A setting and what is allowed: bounds of `check_number`, a `word` for a number, or `options`."""
+    return field(metadata=allowed)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all algorithms have.
+    """What all algorithms have; a decision lasts `action_repeat` control intervals."""
 
-    Attributes
-    ----------
-    total_steps : int
-        Decisions to learn from, of all ships together; each lasts `hold` control intervals.
-    evaluate_every : int
-        Decisions between evaluations.
-    ships : int
-        That sail at once.
-    batch_size : int
-        Samples of one gradient step.
-    learning_rate : float
-        Of Adam, at the beginning.
-    schedule : {"constant", "linear"}
-        How the learning rate goes on; linear falls to 0 at the end of the training.
-    gamma : float
-        Discount of a decision.
-    net_arch : tuple of int
-        Widths of the hidden layers of the policy, and of PPO's value.
-    activation : {"relu", "tanh"}
-        Between the layers.
-    history : int
-        Observations that the policy is shown, the newest last.
-    hold : int
-        Control intervals of a decision; a base goes on with its feedback in each of them.
-    base : str
-        Controller that the policy adds to, one of `BASES` or a controller's file.
-    authority : float
-        Share of the action's range by which it may differ from the base; 1 without a base.
-    reward_scale : float or "running"
-        What rewards are divided by before they are limited to [-10, 10]; "running" is the deviation of their
-        discounted sum so far.
-    """
-
-    total_steps: int
-    evaluate_every: int
-    ships: int
-    batch_size: int
-    learning_rate: float
-    schedule: str
-    gamma: float
-    net_arch: tuple[int, ...]
-    activation: str
-    history: int
-    hold: int
-    base: str
-    authority: float
-    reward_scale: float | str
-
-    #: Least value of whole numbers, and bounds of others.
-    WHOLE: ClassVar[dict[str, int]] = {
-        "total_steps": 1, "evaluate_every": 1, "ships": 1, "batch_size": 1, "history": 1,
-        "hold": 1,
-    }  # fmt: skip
-    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = {
-        "learning_rate": {"above": 0.0, "at_most": 1.0},
-        "gamma": {"at_least": 0.0, "at_most": 1.0},
-        "authority": {"above": 0.0, "at_most": 2.0},
-    }
-    CHOICES: ClassVar[Mapping[str, Sequence[str]]] = {"schedule": SCHEDULES, "activation": ACTIVATIONS}
-    WIDTHS: ClassVar[tuple[str, ...]] = ("net_arch",)
+    #: Decisions to learn from, of all ships together.
+    total_steps: int = setting(at_least=1)
+    #: Decisions between evaluations.
+    evaluate_every: int = setting(at_least=1)
+    #: Ships that sail at once.
+    ships: int = setting(at_least=1)
+    #: Samples of one gradient step.
+    batch_size: int = setting(at_least=1)
+    #: Learning rate of Adam at the beginning.
+    learning_rate: float = setting(above=0.0, at_most=1.0)
+    #: How the learning rate goes on; linear falls to 0 at the end of the training.
+    schedule: str = setting(options=("constant", "linear"))
+    #: Discount of a decision.
+    gamma: float = setting(at_least=0.0, at_most=1.0)
+    #: Widths of the hidden layers of the policy, and of PPO's value.
+    net_arch: tuple[int, ...] = setting(at_least=1)
+    #: Function between the layers.
+    activation: str = setting(options=("relu", "tanh"))
+    #: Observations that the policy sees, the newest last.
+    frame_stack: int = setting(at_least=1)
+    #: Control intervals of a decision; a base goes on with its feedback in each of them.
+    action_repeat: int = setting(at_least=1)
+    #: Classical controller that the policy adds to: a kind, a controller's file that ends in .json, "none",
+    #: or "tuned", the best of those tuned for the suite's task (but `designs.NO_BASES`).
+    base: str = setting()
+    #: Share of the action's range by which it may differ from the base; 1 without a base.
+    authority: float = setting(above=0.0, at_most=2.0)
+    #: What rewards are divided by before they are limited to [-10, 10]; "running" is the standard deviation
+    #: of their discounted sum so far.
+    reward_scale: float | str = setting(above=0.0, word=RUNNING)
 
     def __post_init__(self) -> None:
-        for name, least in self.WHOLE.items():
-            check_whole(getattr(self, name), name, at_least=least)
-        for name, bounds in self.NUMBERS.items():
-            object.__setattr__(self, name, check_number(getattr(self, name), name, **bounds))
-        for name, words in self.CHOICES.items():
-            check_choice(getattr(self, name), words, name)
-        for name in self.WIDTHS:
-            object.__setattr__(self, name, check_widths(getattr(self, name), name))
-        if self.reward_scale != RUNNING:
-            check_number(self.reward_scale, "reward_scale", above=0.0, hint=f"or '{RUNNING}'")
+        for one in fields(self):
+            object.__setattr__(self, one.name, _checked(getattr(self, one.name), one))
         if not check_text(self.base, "base").endswith(".json"):
-            check_choice(self.base, BASES, "base")
+            check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:
             raise InputError(f"authority: {self.authority:g} found without a base, expected 1, or a base")
-        self._check_rollout()
+        self._check_together()
 
-    def _check_rollout(self) -> None:
-        """Refuse settings that do not go together."""
+    def _check_together(self) -> None:
+        """Refuse settings that do not fit each other."""
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
-        return {name: list(value) if name in self.WIDTHS else value for name, value in asdict(self).items()}
+        return {
+            name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()
+        }
 
 
 @dataclass(frozen=True)
 class PPOSettings(Settings):
-    """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347).
+    """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
-    Attributes
-    ----------
-    n_steps : int
-        Decisions of each ship in a rollout.
-    n_epochs : int
-        How often each sample of a rollout is used.
-    gae_lambda : float
-        Of the generalised advantage estimate.
-    clip_range : float
-        Of the ratio of probabilities.
-    ent_coef : float
-        Weight of the entropy.
-    vf_coef : float
-        Weight of the value's error.
-    max_grad_norm : float
-        Longest gradient.
-    log_std_init : float
-        Logarithm of the action's deviation at the beginning.
-    log_std_end : float or "learned"
-        To which it falls evenly over the training. A rudder that trembles costs more than steering does, and
-        what steers best while it trembles is not what steers best without.
-    """
+    #: Decisions of each ship in a rollout.
+    n_steps: int = setting(at_least=1)
+    #: How often each sample of a rollout is used.
+    n_epochs: int = setting(at_least=1)
+    #: Decay of the generalised advantage estimate.
+    gae_lambda: float = setting(at_least=0.0, at_most=1.0)
+    #: Largest change of the ratio of probabilities.
+    clip_range: float = setting(above=0.0)
+    #: Weight of the entropy.
+    ent_coef: float = setting(at_least=0.0)
+    #: Weight of the value's error.
+    vf_coef: float = setting(above=0.0)
+    #: Longest gradient.
+    max_grad_norm: float = setting(above=0.0)
+    #: Logarithm of the action's standard deviation at the beginning.
+    log_std_init: float = setting(at_least=-10.0, at_most=3.0)
+    #: To what it falls evenly over the training. A rudder that chatters costs more than steering does, and
+    #: the policy that is best while it explores is not the one that is best without.
+    log_std_end: float | str = setting(at_least=-10.0, at_most=3.0, word=LEARNED)
 
-    n_steps: int
-    n_epochs: int
-    gae_lambda: float
-    clip_range: float
-    ent_coef: float
-    vf_coef: float
-    max_grad_norm: float
-    log_std_init: float
-    log_std_end: float | str
-
-    WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {"n_steps": 1, "n_epochs": 1}
-    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {
-        "gae_lambda": {"at_least": 0.0, "at_most": 1.0},
-        "clip_range": {"above": 0.0},
-        "ent_coef": {"at_least": 0.0},
-        "vf_coef": {"at_least": 0.0},
-        "max_grad_norm": {"above": 0.0},
-        "log_std_init": {"at_least": -10.0, "at_most": 3.0},
-    }
-
-    def _check_rollout(self) -> None:
-        if self.log_std_end != LEARNED:
-            check_number(self.log_std_end, "log_std_end", at_least=-10.0, at_most=3.0, hint=f"or '{LEARNED}'")
+    def _check_together(self) -> None:
         samples = self.ships * self.n_steps
         if samples % self.batch_size or self.batch_size < 2:
             raise InputError(
@@ -185,38 +124,22 @@ class PPOSettings(Settings):
 
 @dataclass(frozen=True)
 class OffPolicySettings(Settings):
-    """What the algorithms have that learn from a store of past steps.
+    """What the algorithms have that learn from a replay buffer."""
 
-    Attributes
-    ----------
-    buffer_size : int
-        Decisions that are remembered.
-    learning_starts : int
-        Decisions of all ships under random actions before learning begins.
-    train_freq : int
-        Decisions of all ships between updates.
-    gradient_steps : int
-        Of an update.
-    tau : float
-        Share by which the target network follows.
-    critic_arch : tuple of int
-        Widths of the hidden layers of the critics.
-    """
+    #: Decisions that are remembered.
+    buffer_size: int = setting(at_least=1)
+    #: Decisions of all ships under random actions before learning begins.
+    learning_starts: int = setting(at_least=0)
+    #: Decisions of all ships between updates.
+    train_freq: int = setting(at_least=1)
+    #: Gradient steps of an update.
+    gradient_steps: int = setting(at_least=1)
+    #: Share by which the target network approaches the critic in an update.
+    tau: float = setting(above=0.0, at_most=1.0)
+    #: Widths of the hidden layers of the critics.
+    critic_arch: tuple[int, ...] = setting(at_least=1)
 
-    buffer_size: int
-    learning_starts: int
-    train_freq: int
-    gradient_steps: int
-    tau: float
-    critic_arch: tuple[int, ...]
-
-    WHOLE: ClassVar[dict[str, int]] = Settings.WHOLE | {
-        "buffer_size": 1, "learning_starts": 0, "train_freq": 1, "gradient_steps": 1,
-    }  # fmt: skip
-    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = Settings.NUMBERS | {"tau": {"above": 0.0, "at_most": 1.0}}
-    WIDTHS: ClassVar[tuple[str, ...]] = (*Settings.WIDTHS, "critic_arch")
-
-    def _check_rollout(self) -> None:
+    def _check_together(self) -> None:
         if self.buffer_size < self.ships:
             raise InputError(
                 f"buffer_size: {self.buffer_size} found, expected one for each of {self.ships} ships at least"
@@ -225,75 +148,42 @@ class OffPolicySettings(Settings):
 
 @dataclass(frozen=True)
 class SACSettings(OffPolicySettings):
-    """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905).
+    """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
 
-    Attributes
-    ----------
-    ent_coef : float or str
-        Weight of the entropy; "auto" or "auto_0.1" adapts it, from that value.
-    target_entropy : float or "auto"
-        To what; "auto" is -1 for each command. One command deviates by 0.09 with -1, by 0.24 with 0.
-    """
-
-    ent_coef: float | str
-    target_entropy: float | str
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_entropy(self.ent_coef)
-        if self.target_entropy != AUTO:
-            check_number(self.target_entropy, "target_entropy", at_most=1.0, hint=f"or '{AUTO}'")
+    #: Weight of the entropy; "auto" or "auto_0.1" adapts it, from that value.
+    ent_coef: float | str = setting(at_least=0.0, word="auto_")
+    #: Entropy that it is adapted to; "auto" is -1 for each command. One command has the standard deviation
+    #: 0.09 with -1, 0.24 with 0.
+    target_entropy: float | str = setting(at_most=1.0, word=AUTO)
 
 
 @dataclass(frozen=True)
 class TD3Settings(OffPolicySettings):
-    """Twin delayed deep deterministic policy gradient (Fujimoto et al. 2018, arXiv:1802.09477).
+    """Twin delayed deep deterministic policy gradient (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
-    Attributes
-    ----------
-    action_noise : float
-        Deviation of what is added to actions to explore.
-    policy_delay : int
-        Updates of the critics for one of the policy.
-    target_policy_noise, target_noise_clip : float
-        Deviation and largest value of what is added to the target's actions.
-    """
-
-    action_noise: float
-    policy_delay: int
-    target_policy_noise: float
-    target_noise_clip: float
-
-    WHOLE: ClassVar[dict[str, int]] = OffPolicySettings.WHOLE | {"policy_delay": 1}
-    NUMBERS: ClassVar[dict[str, dict[str, Any]]] = OffPolicySettings.NUMBERS | {
-        "action_noise": {"above": 0.0},
-        "target_policy_noise": {"at_least": 0.0},
-        "target_noise_clip": {"at_least": 0.0},
-    }
+    #: Standard deviation of what is added to actions to explore.
+    action_noise: float = setting(above=0.0)
+    #: Updates of the critics for one of the policy.
+    policy_delay: int = setting(at_least=1)
+    #: Standard deviation of what is added to the target's actions.
+    target_policy_noise: float = setting(at_least=0.0)
+    #: Largest value of it.
+    target_noise_clip: float = setting(at_least=0.0)
 
 
 @dataclass(frozen=True)
 class TQCSettings(SACSettings):
-    """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269).
+    """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
 
-    Attributes
-    ----------
-    n_critics, n_quantiles : int
-        Critics, and quantiles of each.
-    top_quantiles_to_drop : int
-        Of each critic.
-    """
+    #: Critics.
+    n_critics: int = setting(at_least=1)
+    #: Quantiles of each.
+    n_quantiles: int = setting(at_least=1)
+    #: Quantiles of each critic that are dropped, the largest.
+    top_quantiles_to_drop: int = setting(at_least=0)
 
-    n_critics: int
-    n_quantiles: int
-    top_quantiles_to_drop: int
-
-    WHOLE: ClassVar[dict[str, int]] = SACSettings.WHOLE | {
-        "n_critics": 1, "n_quantiles": 1, "top_quantiles_to_drop": 0,
-    }  # fmt: skip
-
-    def _check_rollout(self) -> None:
-        super()._check_rollout()
+    def _check_together(self) -> None:
+        super()._check_together()
         if self.top_quantiles_to_drop >= self.n_quantiles:
             raise InputError(
                 f"top_quantiles_to_drop: {self.top_quantiles_to_drop} found, expected fewer than "
@@ -307,27 +197,37 @@ ALGORITHMS: Mapping[str, type[Settings]] = {
 }  # fmt: skip
 
 
-def check_widths(value: Any, name: str) -> tuple[int, ...]:
-    """Widths of a network's hidden layers, if they are some."""
-    if isinstance(value, str) or not isinstance(value, Sequence):
-        raise InputError(f"{name}: {value!r} found, expected widths of layers, such as [64, 64]")
-    for width in value:
-        check_whole(width, name, at_least=1)
-    return tuple(value)
+def _checked(value: Any, one: Field[Any]) -> Any:
+    """The value of a setting, if its type and bounds allow it."""
+    allowed, name = dict(one.metadata), one.name
+    if one.type == "int":
+        return check_whole(value, name, **allowed)
+    if one.type == "float":
+        return check_number(value, name, **allowed)
+    if one.type == WIDTHS:
+        if isinstance(value, str) or not isinstance(value, Sequence):
+            raise InputError(f"{name}: {value!r} found, expected widths of layers, such as [64, 64]")
+        return tuple(check_whole(width, name, **allowed) for width in value)
+    if one.type == NUMBER_OR_WORD:
+        return _number_or_word(value, name, allowed)
+    return check_choice(value, allowed["options"], name) if allowed else value
 
 
-def check_entropy(value: Any) -> None:
-    """Refuse a weight of the entropy that is neither a number nor "auto"."""
-    if isinstance(value, str):
-        word, _, start = value.partition("_")
+def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
+    """A number, or a word; one that ends in an underscore has a positive number after it, or neither."""
+    word = allowed.pop("word")
+    start, sign, number = value.partition("_") if isinstance(value, str) else ("", "", "")
+    if value == word.rstrip("_"):
+        return value
+    if sign and word == f"{start}_":
         try:
-            fine = word == "auto" and (not start or float(start) > 0.0)
-        except ValueError:
-            fine = False
-        if not fine:
-            raise InputError(f"ent_coef: {value!r} found, expected a number, 'auto' or such as 'auto_0.1'")
-        return
-    check_number(value, "ent_coef", at_least=0.0)
+            check_number(float(number), name, above=0.0)
+        except (ValueError, InputError):
+            raise InputError(
+                f"{name}: {value!r} found, expected a number, '{start}' or such as '{start}_0.1'"
+            ) from None
+        return value
+    return check_number(value, name, **allowed, hint=f"or '{word.rstrip('_')}'")
 
 
 def load_settings(
@@ -390,9 +290,9 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     table = _settings(values, kind, f"settings of {algorithm}")
-    for name in _names(kind):
-        if name not in table:
-            raise InputError(f"settings of {algorithm}: '{name}' is missing")
+    for one in fields(kind):
+        if one.name not in table:
+            raise InputError(f"settings of {algorithm}: '{one.name}' is missing")
     return kind(**table)
 
 
@@ -426,12 +326,12 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 
 
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:
-    """Settings of the command line, `name=value` with a value as in TOML; what is none is a text.
+    """Settings of the command line, `name=value` with a value as in TOML; anything else is text.
 
     Raises
     ------
     InputError
-        For one that is not written so.
+        For one that is written otherwise.
     """
     found: dict[str, Any] = {}
     for text in texts:
@@ -445,6 +345,11 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
     return found
 
 
+def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their present names, where some have older ones."""
+    return {RENAMED.get(name, name): value for name, value in settings.items()}
+
+
 def _parsed(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
@@ -452,17 +357,12 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
         raise InputError(f"{where}: not TOML: {error}") from None
 
 
-def _names(kind: type[Settings]) -> tuple[str, ...]:
-    return tuple(item.name for item in fields(kind))
-
-
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
     """A table that names settings only; whole numbers stand for decimal ones."""
-    table = check_table(value, where)
-    check_keys(table, _names(kind), where)
-    hints = get_type_hints(kind)
-    decimal = {name for name in table if hints[name] in (float, float | str)}
+    table = present_names(check_table(value, where))
+    types = {one.name: one.type for one in fields(kind)}
+    check_keys(table, tuple(types), where)
     return {
-        name: float(given) if name in decimal and type(given) is int else given
+        name: float(given) if types[name] in ("float", NUMBER_OR_WORD) and type(given) is int else given
         for name, given in table.items()
-    }  # fmt: skip
+    }

@@ -1,1 +1,1 @@
-"""The chain of `shipgym autopilot`: design, flights over the uncertainty, report."""
+"""The chain of `shipgym autopilot`: design, episodes over the uncertainty, report."""

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.verification.index_uncertainty import ManoeuvreSpread
-from identification.report.predictions import RUDDER, legend_above
+from identification.report.predictions import RUDDER
 from shipgym.manoeuvres import Criterion
 from shipgym.plots import (
-    GRID,
     LIMIT,
     MEASURED,
     MODEL,
@@ -20,6 +19,7 @@ from shipgym.plots import (
     axis,
     compact,
     graph_objects,
+    label,
     layout,
     line,
     subplots,
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
-MARGIN = {"l": 62, "r": 18, "t": 60, "b": 44}
 BAND = (0.05, 0.95)
 
 CRITERIA = {
@@ -47,7 +46,7 @@ CRITERIA = {
 
 
 def band(t: Floats, values: Floats, name: str, colour: str, showlegend: bool = False) -> list[Any]:
-    """The range of 5 to 95 per cent of `values`, shape (n_draws, n_samples), as a filled band."""
+    """The range from 5 to 95 per cent of `values`, shape (n_draws, n_samples), as a filled band."""
     low, high = np.quantile(values, BAND, axis=0)
     go = graph_objects()
     return [
@@ -64,9 +63,9 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     go = graph_objects()
     figure = go.Figure()
     jitter = np.random.default_rng(0)
-    for row, spread in enumerate(criteria.values()):
-        values = np.empty(0) if spread.drawn is None else spread.drawn.values
-        share = 100.0 * values[np.isfinite(values)] / spread.limit
+    for row, criterion in enumerate(criteria.values()):
+        values = np.empty(0) if criterion.drawn is None else criterion.drawn.values
+        share = 100.0 * values[np.isfinite(values)] / criterion.limit
         heights = row + jitter.uniform(-0.22, 0.22, len(share))
         figure.add_trace(
             go.Scatter(
@@ -75,8 +74,8 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
                 marker={"color": translucent(MODEL, 0.3), "size": 5},
             )
         )  # fmt: skip
-        if spread.value is not None:
-            nominal = [100.0 * spread.value / spread.limit] * 2
+        if criterion.value is not None:
+            nominal = [100.0 * criterion.value / criterion.limit] * 2
             figure.add_trace(
                 line(
                     nominal, [row - 0.32, row + 0.32], "identified model", MEASURED, 2.2, showlegend=row == 0
@@ -84,47 +83,38 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
             )
     ends = [-0.5, len(criteria) - 0.5]
     figure.add_trace(line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash"))
-    figure.update_layout(
-        layout(46 * len(criteria) + 100, hovermode="closest", margin={"l": 190, "r": 18, "t": 34, "b": 48})
-    )
-    figure.update_xaxes(axis("per cent of the limit", rangemode="tozero", ticksuffix=" %"))
-    labels = [CRITERIA[name] for name in criteria]
-    figure.update_yaxes(
-        axis("", tickvals=list(range(len(labels))), ticktext=labels, range=ends[::-1], showgrid=False)
-    )
+    figure.update_layout(layout(46 * len(criteria) + 100, left=190, hovermode="closest"))
+    names = [CRITERIA[name] for name in criteria]
+    names_axis = axis(tickvals=list(range(len(names))), ticktext=names, range=ends[::-1], showgrid=False)
+    label(figure, axis("per cent of the limit", rangemode="tozero", ticksuffix=" %"), names_axis)
     return figure
 
 
-def manoeuvres_figure(spread: ManoeuvreSpread, length: float) -> Figure:
+def manoeuvres_figure(found: ManoeuvreSpread, length: float) -> Figure:
     """20/20 zigzag and turning circle of the identified model, over those of the draws."""
     figure = subplots(1, 2, titles=["20/20 zigzag", "Turning circle to starboard"], horizontal_spacing=0.1)
-    run = spread.zigzag
-    if len(spread.zigzag_headings):
+    run = found.zigzag
+    if len(found.zigzag_headings):
         figure.add_traces(
-            band(run.t, np.degrees(spread.zigzag_headings), "5 to 95 % of draws", MODEL, True), rows=1, cols=1
+            band(run.t, np.degrees(found.zigzag_headings), "5 to 95 % of draws", MODEL, True), rows=1, cols=1
         )
     figure.add_trace(line(run.t, np.degrees(run["delta"]), "rudder", RUDDER, 1.2), row=1, col=1)
     figure.add_trace(line(run.t, np.degrees(run["psi"]), "identified model", MODEL, 2.0), row=1, col=1)
-    if spread.circle_paths:
+    if found.circle_paths:
         gap = np.full((1, 2), np.nan)
-        paths = np.concatenate([part for path in spread.circle_paths for part in (path / length, gap)])
+        paths = np.concatenate([part for path in found.circle_paths for part in (path / length, gap)])
         figure.add_trace(
             line(paths[:, 1], paths[:, 0], "single draws", translucent(MODEL, 0.22), 1.0), row=1, col=2
         )
-    circle = spread.circle
+    circle = found.circle
     figure.add_trace(
         line(circle["y"] / length, circle["x"] / length, "identified model", MODEL, 2.0, showlegend=False),
         row=1, col=2,
     )  # fmt: skip
-    figure.update_xaxes(axis("time, s"), row=1, col=1)
-    figure.update_yaxes(axis("heading change and rudder, deg"), row=1, col=1)
-    figure.update_xaxes(axis("east, ship lengths"), row=1, col=2)
-    figure.update_yaxes(axis("north, ship lengths", scaleanchor="x2", scaleratio=1), row=1, col=2)
-    figure.update_layout(
-        layout(
-            430, margin={"l": 62, "r": 18, "t": 76, "b": 48}, legend=legend_above(430), hovermode="closest"
-        )
-    )
+    label(figure, "time, s", "heading change and rudder, deg", row=1, col=1)
+    north_axis = axis("north, ship lengths", scaleanchor="x2", scaleratio=1)
+    label(figure, "east, ship lengths", north_axis, row=1, col=2)
+    figure.update_layout(layout(430, titled=True, hovermode="closest"))
     return figure
 
 
@@ -150,9 +140,8 @@ def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step
     figure.add_trace(
         line([t[0], t[-1]], [step_deg] * 2, "set course", MUTED, 1.2, line_dash="dot"), row=1, col=1
     )
-    figure.update_yaxes(axis("heading change, deg"), row=1, col=1)
-    figure.update_yaxes(axis("rudder, deg", zeroline=True, zerolinecolor=GRID), row=2, col=1)
-    figure.update_xaxes(axis("time, s"), row=2, col=1)
+    label(figure, "", "heading change, deg", row=1, col=1)
+    label(figure, "time, s", axis("rudder, deg", zero=True), row=2, col=1)
     figure.update_layout(layout(500))
     return figure
 
@@ -176,9 +165,6 @@ def costs_figure(costs: Mapping[str, Floats]) -> Figure:
                 fillcolor=translucent(colour, 0.12), showlegend=False,
             )
         )  # fmt: skip
-    figure.update_layout(
-        layout(90 * len(costs) + 90, hovermode="closest", margin={"l": 62, "r": 18, "t": 12, "b": 48})
-    )
-    figure.update_xaxes(axis("steering cost of an episode"))
-    figure.update_yaxes(axis("", autorange="reversed"))
+    figure.update_layout(layout(90 * len(costs) + 90, hovermode="closest"))
+    label(figure, "steering cost of an episode", axis(autorange="reversed"))
     return figure

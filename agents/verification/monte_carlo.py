@@ -1,4 +1,4 @@
-"""Monte Carlo over the posterior: manoeuvres and flights of models drawn from the covariance of one ship.
+"""Monte Carlo: manoeuvres and episodes of models drawn from the estimated covariance of one ship.
 
 Draws are shared out in jobs of 25, always the same ones: the results do not depend on where they are done.
 """
@@ -28,7 +28,7 @@ from shipgym.ships.linear import is_course_stable
 
 if TYPE_CHECKING:
     from agents.controllers.controller import Controller
-    from agents.rollouts.flight import Flights
+    from agents.rollouts.course_keeping import Episodes
 
 Floats = NDArray[np.float64]
 
@@ -85,14 +85,14 @@ class MonteCarlo:
         Standard manoeuvres and IMO criteria over the draws.
     course_unstable : bool array of shape (n_draws,)
         Draws that do not hold a straight course with the rudder held.
-    flights : tuple of Flights
+    episodes : tuple of Episodes
         Of each controller, one episode on each draw.
     """
 
     draws: tuple[ShipModel, ...]
     manoeuvres: ManoeuvreSpread
     course_unstable: NDArray[np.bool_]
-    flights: tuple[Flights, ...]
+    episodes: tuple[Episodes, ...]
 
 
 def monte_carlo(
@@ -104,12 +104,12 @@ def monte_carlo(
     where: Engine = HERE,
     progress: Callable[[int], None] | None = None,
 ) -> MonteCarlo:
-    """Sail the standard manoeuvres and an episode of course keeping with models drawn from the posterior.
+    """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
     Parameters
     ----------
     controllers : sequence of Controller
-        Each is flown on every draw; draw i with seed + i, the same episodes for all.
+        Each steers every draw; draw i with seed + i, the same episodes for all.
     model : ShipModel
         With a covariance.
     draws : int
@@ -144,7 +144,9 @@ def monte_carlo(
         draws=tuple(drawn),
         manoeuvres=spread_of(model, nominal, sailed),
         course_unstable=np.concatenate([result["course_unstable"] for result in results]),
-        flights=tuple(_joined([result["flights"][k] for result in results]) for k in range(len(controllers))),
+        episodes=tuple(
+            _joined([result["episodes"][k] for result in results]) for k in range(len(controllers))
+        ),
     )
 
 
@@ -152,11 +154,9 @@ def draw_jobs(
     controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
-    from agents.controllers.controller_file import controller_content
-
     common = {
         "model": replace(model, covariance=None).to_dict(),
-        "controllers": [controller_content(controller) for controller in controllers],
+        "controllers": [controller.to_dict() for controller in controllers],
     }
     return [
         {
@@ -170,9 +170,9 @@ def draw_jobs(
 
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
-    """Manoeuvres, course stability and flights of some draws."""
+    """Manoeuvres, course stability and episodes of some draws."""
     from agents.controllers.controller_file import read_controller
-    from agents.rollouts.flight import fly
+    from agents.rollouts.course_keeping import sail
 
     model = ShipModel.from_dict(job["model"])
     draws = [
@@ -181,13 +181,13 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     ]
     seeds = job["first_seed"] + np.arange(len(draws))
     flown = [
-        fly(read_controller(content, "controller"), draws, seeds=seeds) for content in job["controllers"]
+        sail(read_controller(content, "controller"), draws, seeds=seeds) for content in job["controllers"]
     ]
     sailed = sail_draws(model, draws)
     return {
         "sailed": {item.name: getattr(sailed, item.name) for item in fields(sailed)},
         "course_unstable": np.array([not holds_course(draw) for draw in draws]),
-        "flights": [{item.name: getattr(one, item.name) for item in fields(one)} for one in flown],
+        "episodes": [{item.name: getattr(one, item.name) for item in fields(one)} for one in flown],
     }
 
 
@@ -199,10 +199,10 @@ def holds_course(model: ShipModel) -> bool:
         return False
 
 
-def _joined(parts: Sequence[dict[str, Any]]) -> Flights:
-    from agents.rollouts.flight import Flights
+def _joined(parts: Sequence[dict[str, Any]]) -> Episodes:
+    from agents.rollouts.course_keeping import Episodes
 
-    return Flights(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    return Episodes(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 def _told(progress: Callable[[int], None] | None, draws: int) -> JobProgress:

@@ -2,56 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
 import shipgym
-from agents.verification.figures import CRITERIA
-from agents.verification.sections import (
-    autopilots_section,
-    manoeuvres_section,
-    ranking_section,
+from agents.controllers.controller import Controller
+from agents.verification.figures import (
+    BAND,
+    CRITERIA,
+    costs_figure,
+    criteria_figure,
+    manoeuvres_figure,
+    steps_figure,
 )
-from identification.report.coefficients import coefficients_section
-from identification.report.facts import concerns_list, data_card, quality_card, remedy_section, ship_card
-from identification.report.sections import data_section, prediction_section, ship_tables, trials_table
-from shipgym.pages import (
-    NONE,
-    Html,
-    card,
-    cards,
-    header,
-    note,
-    number,
-    page,
-    percent,
-    section,
-    table,
-)
-from shipgym.pages import verdict as box
-
-if TYPE_CHECKING:
-    from agents.verification.result import AutopilotResult, Pilot, Verification
+from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from identification.report.view import fit_view, trial_figures
+from shipgym.files import write_text
+from shipgym.pages import NONE, render
 
 SURE = 0.95  # probability of passing from which on a criterion counts as met
-
-TITLES = {
-    "verdict": "Verdict",
-    "data": "Data and fit",
-    "coefficients": "Coefficients",
-    "prediction": "Prediction of trials",
-    "manoeuvres": "Manoeuvres and IMO",
-    "autopilots": "Autopilots",
-    "ranking": "Ranking",
-    "origin": "How this was made",
-    "remedy": "What to do",
+SIGNALS = {
+    "heading_error": ("heading error", "rad/rad"),
+    "yaw_rate": ("yaw rate", "s"),
+    "heading_error_integral": ("integral of heading error", "1/s"),
+    "sway": ("sway speed", "rad s/m"),
+    "rudder": ("rudder", "rad/rad"),
 }
 
 
 def write_report(result: AutopilotResult, path: str | Path) -> None:
     """Write the report.
+
+    Of an unstable model it says that it is, and what to do; it shows no numbers of the model's own.
 
     Parameters
     ----------
@@ -65,66 +50,62 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     InputError
         If plotly is not installed.
     """
-    found = result.verification
-    body = unstable_body(result) if found is None else stable_body(result, found)
-    Path(path).write_text(page(f"{ship_name(result)}: autopilot report", body, TITLES), encoding="utf-8")
-
-
-def stable_body(result: AutopilotResult, found: Verification) -> dict[str, Html]:
-    """All sections."""
-    return {
-        "header": top(result),
-        "verdict": verdict(result, found),
-        "data": data_section(result.identification),
-        "coefficients": coefficients_section(result.identification),
-        "prediction": prediction_section(result.identification),
-        "manoeuvres": manoeuvres_section(result, found),
-        "autopilots": autopilots_section(result, found),
-        "ranking": ranking_section(found),
-        "origin": origin_section(result),
-    }
-
-
-def unstable_body(result: AutopilotResult) -> dict[str, Html]:
-    """What can be said of an unstable model: that it is, and what to do; no numbers of its own."""
-    identification = result.identification
-    headline = (
-        f"The identified model is unstable: {result.instability}. It must not be used, and no coefficients, "
-        "predictions, manoeuvres or autopilots are given."
+    found, provenance = result.verification, result.model.provenance or {}
+    figures = {} if found is None else trial_figures(result.identification) | _figures(result, found)
+    page = render(
+        "agents.verification/report.html",
+        ship=result.ship.particulars.name,
+        fit=fit_view(result.identification),
+        found=None if found is None else verification_view(found) | {"length": _length(result)},
+        figures=figures,
+        instability=result.instability,
+        software=provenance.get("software", f"shipgym {shipgym.__version__}"),
+        ship_file=result.ship.path.name,
+        settings=[str(provenance.get(key, NONE)) for key in ("structure", "method", "samples")],
+        trials=result.trials,
+        step_deg=STEP_DEG,
+        infinity=np.inf,
     )
-    data = section("data", "Data", trials_table(result.identification), ship_tables(result.identification))
+    write_text(page, Path(path))
+
+
+def verification_view(found: Verification) -> dict[str, Any]:
+    """What the template shows of a verification but for its figures."""
+    pilots = [_pilot(pilot) for pilot in found.pilots]
+    designed = {pilot.name: pilot.design for pilot in _by_name(found) if pilot.design is not None}
+    criteria = _criteria(found)
+    first, *others = found.pilots
+    doubtful = any(one["share"] < SURE for one in criteria) or bool(found.manoeuvres.unstable.any())
     return {
-        "header": top(result),
-        "verdict": box(headline, "bad", cards(ship_card(identification), data_card(identification))),
-        "remedy": remedy_section(),
-        "data": data,
-        "origin": origin_section(result),
+        "headline": headline(found),
+        "certain": not doubtful and not pilots[0]["lost"],
+        "draws": found.draws,
+        "seed": found.seed,
+        "unstable": int(found.manoeuvres.unstable.sum()),
+        "course_unstable": int(found.course_unstable.sum()),
+        "criteria": criteria,
+        "sure": sum(one["share"] >= SURE for one in criteria),
+        "least": min(criteria, key=lambda one: one["share"]),
+        "nomoto": found.nomoto,
+        "pilots": pilots,
+        "designs": designed,
+        "gains": _gains(list(designed.values())),
+        "learned": [pilot.name for pilot in _by_name(found) if pilot.design is None],
+        "refused": found.refused,
+        "cheaper": [
+            (other.name, float(np.mean(first.episodes.cost < other.episodes.cost))) for other in others
+        ],
     }
-
-
-def ship_name(result: AutopilotResult) -> str:
-    """The name of the ship."""
-    return str(result.ship.particulars.name)
-
-
-def top(result: AutopilotResult) -> Html:
-    """Title of the page."""
-    return header(
-        "Identified manoeuvring model and autopilots",
-        ship_name(result),
-        "Identified from recorded manoeuvres, with the uncertainty of every coefficient carried through to "
-        "the manoeuvring criteria and to the autopilots.",
-    )
 
 
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
     criteria = found.manoeuvres.criteria
-    missed = [CRITERIA[name].lower() for name, spread in criteria.items() if not spread.passed]
+    missed = [CRITERIA[name].lower() for name, one in criteria.items() if not one.passed]
     unsure = [
         CRITERIA[name].lower()
-        for name, spread in criteria.items()
-        if spread.passed and (spread.share_passed or 0.0) < SURE
+        for name, one in criteria.items()
+        if one.passed and (one.share_passed or 0.0) < SURE
     ]
     imo = f"The model is stable but misses the IMO criterion of {', '.join(missed)}."
     if not missed:
@@ -135,81 +116,68 @@ def headline(found: Verification) -> str:
     if unstable:
         imo += f" {unstable} of {found.draws} models drawn run away in a manoeuvre."
     best = found.pilots[0]
-    lost = int(np.sum(best.flights.terminated))
+    lost = int(np.sum(best.episodes.terminated))
     control = f"keeps control of all {found.draws} models drawn"
     if lost:
         control = f"loses control of {lost} of {found.draws} models drawn"
     return f"{imo} {best.name} steers best and {control}."
 
 
-def verdict(result: AutopilotResult, found: Verification) -> Html:
-    """The box on top: ship, data, quality of the fit, IMO criteria, best autopilot."""
-    best = found.pilots[0]
-    spreads = found.manoeuvres.criteria.values()
-    doubts = any((spread.share_passed or 0.0) < SURE for spread in spreads) or bool(
-        found.manoeuvres.unstable.any()
-    )
-    lost = bool(np.any(best.flights.terminated))
-    facts = [
-        ship_card(result.identification),
-        data_card(result.identification),
-        quality_card(result.identification),
-        imo_card(found),
-        card(
-            "Best autopilot",
-            best.name,
-            Html(
-                f"mean cost {number(float(np.mean(best.flights.cost)), 3)}; {_margin(best)}heading rmse "
-                f"{number(float(np.mean(best.flights.heading_rmse_deg)), 2)}°"
-            ),
-        ),
+def _criteria(found: Verification) -> list[dict[str, Any]]:
+    """A row for each criterion."""
+    rows = []
+    for name, one in found.manoeuvres.criteria.items():
+        low, high = (None, None) if one.drawn is None else one.drawn.quantiles(*BAND)
+        rows.append({
+            "name": CRITERIA[name], "source": one.source, "passed": one.passed, "value": one.value,
+            "low": low, "high": high, "limit": one.limit, "unit": one.unit, "share": one.share_passed or 0.0,
+        })  # fmt: skip
+    return rows
+
+
+def _pilot(pilot: Pilot) -> dict[str, Any]:
+    """A row of the ranking: means and 95 % quantiles over the models drawn."""
+    episodes = pilot.episodes
+    return {
+        "name": pilot.name,
+        "lost": int(np.sum(episodes.terminated)),
+        "cost": float(np.mean(episodes.cost)),
+        "cost_95": float(np.quantile(episodes.cost, BAND[1])),
+        "heading": float(np.mean(episodes.heading_rmse_deg)),
+        "heading_95": float(np.quantile(episodes.heading_rmse_deg, BAND[1])),
+        "rudder_travel": float(np.mean(episodes.rudder_travel_deg_min)),
+        "extrapolating": float(np.mean(episodes.extrapolating)),
+    }
+
+
+def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[float | None]]]:
+    """Name, unit and gains of the designed autopilots for each signal that one of them acts on."""
+    gains = [
+        {signal: sign * design.gains[gain] for gain, (signal, sign) in design.feedback.items()}
+        for design in designs
     ]
-    return box(
-        headline(found),
-        "warn" if doubts or lost else "good",
-        cards(*facts),
-        concerns_list(result.identification),
-    )
-
-
-def _margin(pilot: Pilot) -> str:
-    """Phase margin of an autopilot that was designed."""
-    if pilot.design is None:
-        return ""
-    return f"phase margin {number(pilot.design.margins.phase_margin_deg, 2)}°, "
-
-
-def imo_card(found: Verification) -> Html:
-    """The criteria that pass, and the least certain one."""
-    spreads = found.manoeuvres.criteria
-    sure = sum((spread.share_passed or 0.0) >= SURE for spread in spreads.values())
-    least = min(spreads, key=lambda name: spreads[name].share_passed or 0.0)
-    detail = Html(
-        f"pass with at least 95 %; lowest: {CRITERIA[least].lower()}, "
-        f"{percent(spreads[least].share_passed or 0.0)}"
-    )
-    return card("IMO criteria", f"{sure} of {len(spreads)}", detail)
-
-
-def origin_section(result: AutopilotResult) -> Html:
-    """Software, settings and hashes, so that it can be done again."""
-    provenance = result.model.provenance or {}
-    settings = ("structure", "method", "samples")
-    facts = [
-        ["software", provenance.get("software", f"shipgym {shipgym.__version__}")],
-        ["ship file", result.ship.path.name],
-        [
-            "structure, method, samples",
-            ", ".join(str(provenance.get(key, NONE)) for key in settings),
-        ],
+    return [
+        (name, unit, [gain.get(signal) for gain in gains])
+        for signal, (name, unit) in SIGNALS.items()
+        if any(signal in gain for gain in gains)
     ]
-    if result.verification is not None:
-        facts.append(["models drawn, seed", f"{result.verification.draws}, {result.verification.seed}"])
-    hashes = [[trial.name, Html(f"<code>{trial.sha256[:16]}</code>")] for trial in result.trials]
-    return section(
-        "origin",
-        "How this was made",
-        table(["", ""], facts, text_columns=2),
-        table(["trial", "SHA-256 of its contents (first 16 digits)"], hashes, text_columns=2),
-        note("The numbers of this page are in metrics.json beside it."),
-    )
+
+
+def _figures(result: AutopilotResult, found: Verification) -> dict[str, Any]:
+    pilots = _by_name(found)
+    responses = {pilot.name: pilot.step[1:] for pilot in pilots}
+    return {
+        "criteria": criteria_figure(found.manoeuvres.criteria),
+        "manoeuvres": manoeuvres_figure(found.manoeuvres, _length(result)),
+        "steps": steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
+        "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in pilots}),
+    }
+
+
+def _length(result: AutopilotResult) -> float:
+    return float(result.model.particulars["length"])
+
+
+def _by_name(found: Verification) -> list[Pilot]:
+    """Autopilots in an order that does not change with the ranking, for their colours."""
+    return sorted(found.pilots, key=lambda pilot: pilot.name, reverse=True)

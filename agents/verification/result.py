@@ -1,4 +1,4 @@
-"""What the whole chain found out: the model, its certainty, the autopilots and how they flew."""
+"""What the whole chain found out: the model, its certainty, the autopilots and what they cost."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
+from agents.rollouts.course_keeping import Episodes, StepResponses
 from agents.verification.index_uncertainty import ManoeuvreSpread
 from identification import IdentificationResult
 from shipgym.ships import ShipModel
@@ -18,7 +19,6 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
-    from agents.rollouts.flight import Flights, StepResponses
 
 Floats = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ STEP_DEG = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """One autopilot and how it flew.
+    """One autopilot and what it costs over the models drawn.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Pilot:
         Its name in metrics, no other's: that of the controller, with a number where there are several.
     controller : Controller, LearnedPolicy or Shielded
         With gains and margins if it is a Controller.
-    flights : Flights
+    episodes : Episodes
         One episode on each model drawn.
     step : StepResponses
         Of the identified model, first, and of the stable models drawn.
@@ -43,7 +43,7 @@ class Pilot:
 
     key: str
     controller: Agent
-    flights: Flights
+    episodes: Episodes
     step: StepResponses
 
     @property
@@ -155,20 +155,20 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
-    """Gains and margins of one autopilot, null if it is learned, and its flights over the models drawn."""
-    flights, design = pilot.flights, pilot.design
+    """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
+    episodes, design = pilot.episodes, pilot.design
     gains = None if design is None else {name: float(value) for name, value in design.gains.items()}
     margins = None if design is None else {k: _finite(value) for k, value in asdict(design.margins).items()}
     return {
         "gains": gains,
         "margins": margins,
-        "cost_mean": float(np.mean(flights.cost)),
-        "cost_quantile_95": float(np.quantile(flights.cost, 0.95)),
-        "heading_rmse_deg_mean": float(np.mean(flights.heading_rmse_deg)),
-        "heading_rmse_deg_quantile_95": float(np.quantile(flights.heading_rmse_deg, 0.95)),
-        "rudder_travel_deg_min_mean": float(np.mean(flights.rudder_travel_deg_min)),
-        "extrapolating_mean": float(np.mean(flights.extrapolating)),
-        "lost_control": int(np.sum(flights.terminated)),
+        "cost_mean": float(np.mean(episodes.cost)),
+        "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
+        "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),
+        "heading_rmse_deg_quantile_95": float(np.quantile(episodes.heading_rmse_deg, 0.95)),
+        "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
+        "extrapolating_mean": float(np.mean(episodes.extrapolating)),
+        "lost_control": int(np.sum(episodes.terminated)),
     }
 
 

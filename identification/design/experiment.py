@@ -1,7 +1,7 @@
 """What trials tell about each coefficient, and which manoeuvre to run next.
 
 The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up over trials. Its
-inverse is the least covariance of the coefficients; candidates are simulated on the current model and judged
+inverse is the least covariance of the coefficients; candidates are simulated on the current model and ranked
 by what adding their information makes of it (Fedorov 1972, Theory of optimal experiments): c-optimal for one
 coefficient, D-optimal for the volume of the ellipsoid of all of them, E-optimal for its longest axis.
 Coefficients count relative to their size.
@@ -233,11 +233,6 @@ def advise(
     number : int
         How many to choose; the same one may be chosen again.
 
-    Returns
-    -------
-    Advice
-        Printable.
-
     Raises
     ------
     InputError
@@ -252,23 +247,30 @@ def advise(
         raise InputError("trials: none found, expected those that the model was identified from")
     regressions = [_regression(model, trial) for trial in trials]
     noise = _noise(model, regressions)
-    told = tuple(_told(model, t.name, s, noise) for t, s in zip(trials, regressions, strict=True))
+    known = tuple(_information_of(model, t.name, s, noise) for t, s in zip(trials, regressions, strict=True))
     offers = _offers(model, standard_candidates(model) if candidates is None else candidates, noise)
     names = tuple(model.coefficients)
-    total = np.sum([trial.information for trial in told], axis=0)
+    total = np.sum([trial.information for trial in known], axis=0)
     size = _size(model, total)
     before = dict(zip(names, _errors(total, size).tolist(), strict=True))
     worst = max(before, key=lambda name: before[name]) if coefficient is None else coefficient
-    at, steps, chosen = names.index(worst), [], []
+    steps: list[dict[str, float]] = []
+    chosen: list[str] = []
     for _ in range(number):
-        now = _spread(total, size, criterion, at)
-        gains = {name: now / _spread(total + extra, size, criterion, at) for name, extra in offers.items()}
-        best = max(gains, key=lambda name: gains[name])
-        total = total + offers[best]
+        gains = _gains(total, offers, size, criterion, names.index(worst))
+        chosen.append(max(gains, key=lambda name: gains[name]))
         steps.append(gains)
-        chosen.append(best)
+        total = total + offers[chosen[-1]]
     after = dict(zip(names, _errors(total, size).tolist(), strict=True))
-    return Advice(criterion, worst, told, before, tuple(steps), tuple(chosen), after)
+    return Advice(criterion, worst, known, before, tuple(steps), tuple(chosen), after)
+
+
+def _gains(
+    total: Floats, offers: Mapping[str, Floats], size: Floats, criterion: str, at: int
+) -> dict[str, float]:
+    """By what factor each candidate would shrink what the criterion looks at."""
+    now = _uncertainty(total, size, criterion, at)
+    return {name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()}
 
 
 def _table(model: ShipModel) -> Structure:
@@ -303,7 +305,9 @@ def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]
     return noise
 
 
-def _told(model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]) -> TrialInformation:
+def _information_of(
+    model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
+) -> TrialInformation:
     condition: dict[str, float] = {}
     inflation: dict[str, float] = {}
     for q in model.table.equations:
@@ -362,7 +366,7 @@ def _errors(information: Floats, size: Floats) -> Floats:
     return np.sqrt(np.diag(_covariance(information, size)))
 
 
-def _spread(information: Floats, size: Floats, criterion: str, at: int) -> float:
+def _uncertainty(information: Floats, size: Floats, criterion: str, at: int) -> float:
     """What the criterion shrinks, in the units of a relative standard error."""
     covariance = _covariance(information, size)
     if criterion == "c":

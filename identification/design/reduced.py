@@ -68,10 +68,6 @@ def identify_reduced(
     **arguments
         Of `identify`.
 
-    Returns
-    -------
-    ReducedIdentification
-
     Raises
     ------
     InputError

@@ -143,7 +143,9 @@ def backward_elimination(
     while len(kept) > 1:
         errors = path[-1].relative_errors
         uncertain = {i for i in kept if errors[labels[i]] > threshold} | _collinear(features, kept)
-        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -errors[labels[i]])):
+        # rounded, so that of two terms that say the same every computer drops the first
+        error = {i: float(f"{errors[labels[i]]:.6g}") for i in uncertain}
+        for term in sorted(uncertain, key=lambda i: (labels[i] in prefer, -error[i], i)):
             fewer = [i for i in kept if i != term]
             step = _step(features, targets, labels, fewer, labels[term], path[-1].r_squared)
             if step.held_out >= best - tolerance:
@@ -308,18 +310,18 @@ def _step(
     features: Floats, targets: Floats, labels: Sequence[str], kept: Sequence[int], changed: str, before: float
 ) -> ReductionStep:
     X = features[:, kept]
-    machine = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
+    estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
     names = tuple(labels[i] for i in kept)
-    deviation = np.sqrt(np.diag(machine.covariance_))
-    size = np.abs(machine.coef_)
+    deviation = np.sqrt(np.diag(estimator.covariance_))
+    size = np.abs(estimator.coef_)
     relative = np.divide(deviation, size, out=np.full(len(names), np.inf), where=size > 0.0)
-    residual = targets - X @ machine.coef_
+    residual = targets - X @ estimator.coef_
     power = float(targets @ targets)
     r_squared = 1.0 - float(residual @ residual) / power
     return ReductionStep(
         names,
         changed,
-        dict(zip(names, machine.coef_.tolist(), strict=True)),
+        dict(zip(names, estimator.coef_.tolist(), strict=True)),
         dict(zip(names, relative.tolist(), strict=True)),
         r_squared,
         1.0 - _held_out_error(X, targets) / power,

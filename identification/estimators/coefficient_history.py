@@ -1,4 +1,4 @@
-"""The course of a model's coefficients over a trial, as a recursive method sees them."""
+"""The history of a model's coefficients over a trial, as a recursive method estimates them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class CoefficientHistory:
     """Coefficients over time.
 
     Attributes
@@ -43,9 +43,11 @@ class Course:
     values: Floats
 
     def __getitem__(self, name: str) -> Floats:
-        """The course of one coefficient, shape (n_rows,)."""
+        """The history of one coefficient, shape (n_rows,)."""
         if name not in self.names:
-            raise InputError(f"course: no coefficient {name!r}, expected one of {', '.join(self.names)}")
+            raise InputError(
+                f"coefficient history: no coefficient {name!r}, expected one of {', '.join(self.names)}"
+            )
         return self.values[:, self.names.index(name)]
 
     @property
@@ -54,7 +56,7 @@ class Course:
         return dict(zip(self.names, self.values[-1].tolist(), strict=True))
 
 
-def follow(
+def coefficient_history(
     source: Samples | Trial | Sequence[Trial],
     structure: str | Structure,
     particulars: Particulars,
@@ -62,7 +64,7 @@ def follow(
     *,
     shaft_speed: float = 0.0,
     **sampling: Any,
-) -> Course:
+) -> CoefficientHistory:
     """Run a recursive method over trials and keep every estimate.
 
     Parameters
@@ -81,18 +83,14 @@ def follow(
     **sampling
         `samples`, `window`, `gear`, `smooth` of `build_samples`.
 
-    Returns
-    -------
-    Course
-
     Raises
     ------
     InputError
         For a method that is not recursive.
     """
     table = get_structure(structure) if isinstance(structure, str) else structure
-    machine = get_method(method).machine() if isinstance(method, str) else method
-    if not isinstance(machine, Recursion):
+    estimator = get_method(method).estimator() if isinstance(method, str) else method
+    if not isinstance(estimator, Recursion):
         raise InputError(
             f"method: {method!r} found, which fits all samples at once; expected a recursive one"
         )
@@ -102,7 +100,11 @@ def follow(
     else:
         trials = [source] if isinstance(source, Trial) else list(source)
         regression = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    courses = [clone(machine).follow(regression.features[q], regression.targets[q]) for q in table.equations]
+    histories = [
+        clone(estimator).fit_history(regression.features[q], regression.targets[q]) for q in table.equations
+    ]
     matrix = table.acceleration_matrix(ship, shaft_speed)
-    values = np.linalg.solve(matrix, np.hstack(courses).T).T
-    return Course(table.coefficient_names, regression.start + regression.duration, regression.trial, values)
+    values = np.linalg.solve(matrix, np.hstack(histories).T).T
+    return CoefficientHistory(
+        table.coefficient_names, regression.start + regression.duration, regression.trial, values
+    )

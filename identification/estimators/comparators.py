@@ -1,4 +1,4 @@
-"""Scikit-learn's estimators as machines of `identify`, to compare with."""
+"""Scikit-learn's estimators in the form that `identify` fits, to compare with."""
 
 from __future__ import annotations
 
@@ -7,10 +7,8 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
 
-from identification.estimators.lssvm import check_weight, validated
+from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import MAD
 from identification.regression.decomposition import centre_and_scale
 from shipgym.errors import InputError
@@ -20,7 +18,8 @@ Floats = NDArray[np.float64]
 ITERATIONS = 20_000
 
 
-class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class LinearSupportVectorMachine(LinearRegressor):
     """Support vector regression with a linear kernel and the epsilon-insensitive loss.
 
     Scikit-learn's `LinearSVR`. Features and targets are scaled to a root mean square of 1 before.
@@ -49,13 +48,10 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         Whether the solver reached its tolerance.
     """
 
-    def __init__(
-        self, C: float = 100.0, epsilon: float = 1e-3, fit_intercept: bool = True, seed: int = 0
-    ) -> None:
-        self.C = C
-        self.epsilon = epsilon
-        self.fit_intercept = fit_intercept
-        self.seed = seed
+    C: float = 100.0
+    epsilon: float = 1e-3
+    fit_intercept: bool = True
+    seed: int = 0
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
@@ -70,7 +66,7 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         centre, scale = centre_and_scale(X, True, self.fit_intercept)
         mean = float(y.mean()) if self.fit_intercept else 0.0
         size = float(np.sqrt(np.mean((y - mean) ** 2))) or 1.0
-        machine = LinearSVR(
+        estimator = LinearSVR(
             C=self.C,
             epsilon=self.epsilon,
             fit_intercept=self.fit_intercept,
@@ -81,14 +77,14 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         scaled = (X - centre) / scale
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ConvergenceWarning)
-            machine.fit(scaled, (y - mean) / size)
+            estimator.fit(scaled, (y - mean) / size)
         self.converged_ = not caught
-        self.coef_ = machine.coef_ * size / scale
-        self.intercept_ = mean + size * float(np.sum(machine.intercept_)) - float(centre @ self.coef_)
-        self._spread(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
+        self.coef_ = estimator.coef_ * size / scale
+        self.intercept_ = mean + size * float(np.sum(estimator.intercept_)) - float(centre @ self.coef_)
+        self._estimate_covariance(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
         return self
 
-    def _spread(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
+    def _estimate_covariance(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
         """Weights, moment and covariance of Huber's estimator at the errors found."""
         scale_of_error = MAD * float(np.median(np.abs(error)))
         large = np.abs(error) > scale_of_error
@@ -100,10 +96,3 @@ class LinearSupportVectorMachine(RegressorMixin, BaseEstimator):  # type: ignore
         variance = size**2 * float(np.sum((self.weights_ * error) ** 2)) / freedom
         unscaled = scaled * scale
         self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples of shape (n_samples, n_features)."""
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_ + self.intercept_
-        return prediction

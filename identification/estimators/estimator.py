@@ -1,16 +1,22 @@
-"""What every estimator offers that `identify` may fit to the regression of an equation."""
+"""What every estimator offers that `identify` may fit to an equation, and what a method may look at."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from identification.regression.samples import Samples
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
 Floats = NDArray[np.float64]
 
 
-class Machine(Protocol):
+class Estimator(Protocol):
     """A linear estimator in scikit-learn's manner.
 
     Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the directions dropped),
@@ -40,7 +46,29 @@ class Machine(Protocol):
         ...
 
 
-def weights(machine: Machine, features: Floats) -> Floats:
-    """Weight of each sample, shape (n_samples,), 1 where the machine knows none."""
-    given: Floats | None = getattr(machine, "weights_", None)
+def weights(estimator: Estimator, features: Floats) -> Floats:
+    """Weight of each sample, shape (n_samples,), 1 where the estimator knows none."""
+    given: Floats | None = getattr(estimator, "weights_", None)
     return np.ones(len(features)) if given is None else given
+
+
+@dataclass(frozen=True, eq=False)
+class FitTask:
+    """All that a method may look at.
+
+    Attributes
+    ----------
+    samples : Samples
+        The regression of each equation.
+    blank : ShipModel
+        The model but for its coefficients.
+    trials : sequence of Trial
+        Those behind the samples.
+    """
+
+    samples: Samples
+    blank: ShipModel
+    trials: Sequence[Trial]
+
+
+Estimators = dict[str, Estimator]

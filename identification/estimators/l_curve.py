@@ -43,10 +43,6 @@ def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outsi
         s / (s^2 + 1/C).
     outside : float
         Squared norm of the part of the targets that no direction reaches.
-
-    Returns
-    -------
-    LCurve
     """
     missed = projections**2
     explained_miss = (projections * (1.0 - singular_values * filters)) ** 2

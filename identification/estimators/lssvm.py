@@ -1,25 +1,23 @@
 """Least-squares support vector machines for regression, the linear kernel in primal form.
 
-With a linear kernel the machine is ridge regression with a free intercept. One singular value
+With a linear kernel this is ridge regression with a free intercept. One singular value
 decomposition of the centred and scaled features, X = U S V', gives the coefficients for every C:
-V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system, which
-`dense_dual` keeps as printed.
+V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from numbers import Real
-from typing import Any, Self, TypeGuard
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import cho_factor, cho_solve
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.metrics.pairwise import pairwise_kernels
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
+from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import reweighted
 from identification.regression.decomposition import Decomposition, centre_and_scale, decompose
 from shipgym.checks import check_choice, check_whole
@@ -29,10 +27,11 @@ Floats = NDArray[np.float64]
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
-NEARLY_ONE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
+LEAST_SHARE = 0.1  # a term belongs to a dropped direction with at least this share of its largest
 
 
-class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class LSSVM(LinearRegressor):
     """Least-squares support vector regression (Suykens & Vandewalle 1999; Cao 2015).
 
     Minimises w'w / 2 + C / 2 sum e^2 subject to y = w'x + b + e.
@@ -82,40 +81,17 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Number of features.
     """
 
-    def __init__(
-        self,
-        C: float = 1e6,
-        kernel: str = "linear",
-        scale: bool | ArrayLike = True,
-        fit_intercept: bool = True,
-        gamma: float | None = None,
-        degree: int = 3,
-        coef0: float = 1.0,
-        robust: bool = False,
-    ) -> None:
-        self.C = C
-        self.kernel = kernel
-        self.scale = scale
-        self.fit_intercept = fit_intercept
-        self.gamma = gamma
-        self.degree = degree
-        self.coef0 = coef0
-        self.robust = robust
+    C: float = 1e6
+    kernel: str = "linear"
+    scale: bool | ArrayLike = True
+    fit_intercept: bool = True
+    gamma: float | None = None
+    degree: int = 3
+    coef0: float = 1.0
+    robust: bool = False
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         check_choice(self.kernel, KERNELS, "kernel")
         check_weight(self.C)
         X, y = validated(self, X, y)
@@ -153,29 +129,17 @@ class LSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return kernel
 
     def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
+        """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
+        if self.kernel == "linear":
+            return super().predict(X)
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats
-        if self.kernel == "linear":
-            prediction = features @ self.coef_
-        else:
-            prediction = self._kernel((features - self.centre_) / self.scale_) @ self.dual_coef_
-        prediction += self.intercept_
-        return prediction
+        prediction: Floats = self._kernel((features - self.centre_) / self.scale_) @ self.dual_coef_
+        return prediction + self.intercept_
 
 
-class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class TruncatedLSSVM(LinearRegressor):
     """Truncated least-squares support vector machine, linear kernel (Xu 2020, section 3.2).
 
     Keeps the `rank_` largest singular values of the centred and scaled features. That equals truncating
@@ -214,38 +178,16 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         For each dropped direction the features it is made of.
     """
 
-    def __init__(
-        self,
-        C: float = np.inf,
-        rank: int | None = None,
-        selection: str = "l-curve",
-        scale: bool | ArrayLike = True,
-        fit_intercept: bool = True,
-        explained_variance: float = 0.9999,
-        robust: bool = False,
-    ) -> None:
-        self.C = C
-        self.rank = rank
-        self.selection = selection
-        self.scale = scale
-        self.fit_intercept = fit_intercept
-        self.explained_variance = explained_variance
-        self.robust = robust
+    C: float = np.inf
+    rank: int | None = None
+    selection: str = "l-curve"
+    scale: bool | ArrayLike = True
+    fit_intercept: bool = True
+    explained_variance: float = 0.9999
+    robust: bool = False
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         check_choice(self.selection, SELECTIONS, "selection")
         check_weight(self.C)
         if self.rank is not None:
@@ -292,28 +234,11 @@ class TruncatedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             return gcv_rank(self.l_curve_, problem.n_free)
         return variance_rank(problem.singular_values[:distinct], self.explained_variance)
 
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_ + self.intercept_
-        return prediction
-
 
 def take(
     estimator: Any, problem: Decomposition, filters: Floats, X: Floats, y: Floats, weights: Floats | None
 ) -> Floats:
-    """Set the attributes of a linear machine from its filtered decomposition; returns the residuals."""
+    """Set the attributes of a linear estimator from its filtered decomposition; returns the residuals."""
     scaled = problem.directions.T @ (filters * problem.projections)
     shrink = problem.singular_values * filters
     root = (problem.directions.T * filters) / problem.scale[:, None]
@@ -329,8 +254,8 @@ def take(
     effective = residual if weights is None else residual * weights
     estimator.noise_variance_ = float(effective @ effective) / freedom if freedom > 0.5 else np.nan
     # Huber's sandwich: the residuals that count are the weighted ones, the moment is that of all samples
-    spread = 1.0 if weights is None else len(y) / float(weights.sum())
-    estimator.covariance_ = estimator.noise_variance_ * spread * (root @ root.T)
+    unequal = 1.0 if weights is None else len(y) / float(weights.sum())
+    estimator.covariance_ = estimator.noise_variance_ * unequal * (root @ root.T)
     return residual
 
 
@@ -344,35 +269,4 @@ def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool
 
 def _members(direction: Floats) -> tuple[int, ...]:
     share = np.abs(direction) / np.max(np.abs(direction))
-    return tuple(int(i) for i in np.flatnonzero(share >= NEARLY_ONE))
-
-
-def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
-    """Features and targets as arrays of numbers, as scikit-learn checks them.
-
-    Its checks of what is sound already take as long as the decomposition: sound arrays do without.
-    """
-    if _sound(X, 2) and _sound(y, 1) and len(X) == len(y) >= 2 and X.shape[1] > 0:
-        estimator.n_features_in_ = X.shape[1]
-        vars(estimator).pop("feature_names_in_", None)
-        return X, y
-    checked: tuple[Floats, Floats] = validate_data(
-        estimator, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2
-    )
-    return checked[0], np.asarray(checked[1], dtype=np.float64)
-
-
-def _sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
-    """Whether these are an array of finite numbers of double precision, and nothing else."""
-    if type(values) is not np.ndarray or values.dtype != np.float64 or values.ndim != n_dimensions:
-        return False
-    return bool(np.isfinite(values).all())
-
-
-def check_weight(value: Any, argument: str = "C") -> float:
-    """Return a weight of errors: a number above 0, infinity included."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
-        raise InputError(
-            f"{argument}: {value!r} found, expected a number above 0 (infinity gives least squares)"
-        )
-    return float(value)
+    return tuple(int(i) for i in np.flatnonzero(share >= LEAST_SHARE))

@@ -1,18 +1,19 @@
-"""Methods of identification: which machine is fitted to the regression of each equation."""
+"""Methods of identification: which estimator is fitted to the regression of each equation."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
+from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -20,46 +21,18 @@ from identification.estimators.recursive import (
     StochasticGradient,
 )
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
+from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples
-from identification.search import Optimiser, TunedLSSVM
 from identification.search.free_running import fit_free_running
-from shipgym.checks import check_choice, check_number, did_you_mean
+from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.trials.identify_table import OPTIONS
-from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Machines = dict[str, Machine]
 
 
-@dataclass(frozen=True, eq=False)
-class FitTask:
-    """All that a method may look at.
-
-    Attributes
-    ----------
-    samples : Samples
-        The regression of each equation.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those behind the samples.
-    """
-
-    samples: Samples
-    blank: ShipModel
-    trials: Sequence[Trial]
-
-
-def each_equation(make: Callable[[], Machine], task: FitTask) -> Machines:
-    """Fit one machine to each equation by itself."""
+def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+    """Fit one estimator to each equation by itself."""
     return fit_all(make, task.samples)
-
-
-def _meant(setting: str) -> str:
-    """The option that is meant by one that does not exist."""
-    return "" if setting in OPTIONS else did_you_mean(setting, OPTIONS)
 
 
 @dataclass(frozen=True)
@@ -70,25 +43,25 @@ class Method:
     ----------
     name : str
         As `identify` knows it.
-    machine : callable
-        Makes an unfitted machine from settings.
+    estimator : callable
+        Makes an unfitted estimator from settings.
     regularised : bool
         Whether the guard against models that run away may penalise it.
     fit : callable
-        Fits machines, made by its first argument, to the task that is its second, and returns them by
+        Fits estimators, made by its first argument, to the task that is its second, and returns them by
         equation. By default each equation by itself, from the samples alone.
     refined : bool
         Whether what was fitted is the start of a refinement by simulation (`refine`).
     """
 
     name: str
-    machine: Callable[..., Machine]
-    regularised: bool
-    fit: Callable[[Callable[[], Machine], FitTask], Machines] = each_equation
+    estimator: Callable[..., Estimator]
+    regularised: bool = True
+    fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = each_equation
     refined: bool = False
 
-    def machines(self, settings: Mapping[str, Any], task: FitTask) -> Machines:
-        """Machines of all equations, fitted with the settings.
+    def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
+        """Estimators of all equations, fitted with the settings.
 
         Raises
         ------
@@ -99,14 +72,14 @@ class Method:
         if unknown:
             raise InputError(
                 f"settings: {', '.join(unknown)} found, which method {self.name!r} does not know; leave them "
-                f"out, or choose the method that they are for.{_meant(unknown[0])}"
+                f"out, or choose the method that they are for"
             )
-        return self.fit(partial(self.machine, **settings), task)
+        return self.fit(partial(self.estimator, **settings), task)
 
     def knows(self, setting: str) -> bool:
-        """Whether the machine has a setting of that name."""
+        """Whether the estimator has a setting of that name."""
         try:
-            self.machine(**{setting: 1})
+            self.estimator(**{setting: 1})
         except TypeError:
             return False
         except InputError:  # the value does not fit, the name does
@@ -114,102 +87,89 @@ class Method:
         return True
 
 
-def _least_squares(scale: bool = True, robust: bool = False) -> Machine:
+def _least_squares(scale: bool = True, robust: bool = False) -> Estimator:
     return TruncatedLSSVM(selection="full", fit_intercept=False, scale=scale, robust=robust)
 
 
-def _ls_svm(C: float = 1e6, **settings: Any) -> Machine:
-    return LSSVM(C=C, fit_intercept=False, **settings)
-
-
-def _tls_svm(**settings: Any) -> Machine:
-    return TruncatedLSSVM(fit_intercept=False, **settings)
-
-
-def _ridge(alpha: float = 1e-6, **settings: Any) -> Machine:
+def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
     """Ridge regression as scikit-learn has it: its penalty is 1 / C, on columns as they are by default."""
     alpha = check_number(alpha, "alpha", at_least=0.0)
     settings = {"scale": False, **settings}
     return LSSVM(C=1.0 / alpha if alpha else np.inf, fit_intercept=False, **settings)
 
 
-def _tuned(optimiser: str | Optimiser, **settings: Any) -> Machine:
-    return TunedLSSVM(optimiser=optimiser, fit_intercept=False, **settings)
-
-
-def _support_vectors(**settings: Any) -> Machine:
-    return LinearSupportVectorMachine(fit_intercept=False, **settings)
-
-
-def searched(make: Callable[[], Machine], task: FitTask) -> Machines:
-    """Fit machines that choose their own C, which may look at trials: as blocks, or by simulating them."""
+def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+    """Fit estimators that choose their own C, which may look at trials: as blocks, or by simulating them."""
     template, samples = make(), task.samples
     assert isinstance(template, TunedLSSVM)
     if template.objective == "free-running":
-        return dict(fit_free_running(template, samples, task.blank, task.trials))
+        return dict(fit_free_running(template, task))
     return {
         q: clone(template).fit(samples.features[q], samples.targets[q], samples.trial)
         for q in samples.features
     }
 
 
-def _nisg(omega: float = 0.5, **settings: Any) -> Machine:
-    return StochasticGradient(omega=omega, **settings)
-
-
-def _mils(**settings: Any) -> Machine:
-    return MultiInnovationLeastSquares(inverse_free=False, **settings)
-
-
-def _rm_svm(**settings: Any) -> Machine:
-    return RMSVM(**settings)
-
-
-def _fit_rm_svm(make: Callable[[], Machine], task: FitTask) -> Machines:
-    return fit_rm_svm(cast("Callable[[], RMSVM]", make), task.samples, task.blank, task.trials)
-
+_TLS_SVM = partial(TruncatedLSSVM, fit_intercept=False)
+_TUNED = partial(TunedLSSVM, fit_intercept=False)
+_MILS = partial(MultiInnovationLeastSquares, inverse_free=False)
 
 METHODS = {
     method.name: method
     for method in (
         Method("ls", _least_squares, regularised=False),
-        Method("ridge", _ridge, regularised=True),
-        Method("ls-svm", _ls_svm, regularised=True),
-        Method("tls-svm", _tls_svm, regularised=True),
-        Method("cv-lssvr", partial(_tuned, optimiser="grid"), regularised=True, fit=searched),
-        Method("pso-lssvr", partial(_tuned, optimiser="pso"), regularised=True, fit=searched),
-        Method("abc-lssvr", partial(_tuned, optimiser="abc"), regularised=True, fit=searched),
-        Method("de-lssvr", partial(_tuned, optimiser="de"), regularised=True, fit=searched),
-        Method("svr", _support_vectors, regularised=True),
+        Method("ridge", _ridge),
+        Method("ls-svm", partial(LSSVM, fit_intercept=False)),
+        Method("tls-svm", _TLS_SVM),
+        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=searched),
+        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=searched),
+        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=searched),
+        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=searched),
+        Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
         Method("rls", RecursiveLeastSquares, regularised=False),
         Method("sg", StochasticGradient, regularised=False),
-        Method("nisg", _nisg, regularised=False),
-        Method("mils", _mils, regularised=False),
+        Method("nisg", partial(StochasticGradient, omega=0.5), regularised=False),
+        Method("mils", _MILS, regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
-        Method("output-error", _tls_svm, regularised=True, refined=True),
-        Method("rm-svm", _rm_svm, regularised=True, fit=_fit_rm_svm),
+        Method("output-error", _TLS_SVM, refined=True),
+        Method("rm-svm", RMSVM, fit=fit_rm_svm),
     )
 }
 
+#: Estimators that look at more than the samples of one equation.
+FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
 
-def get_method(name: str) -> Method:
-    """A method by name.
+
+def get_method(method: str | Any) -> Method:
+    """A method by name, or that of an estimator object.
+
+    The estimator of each equation is a copy of the object, without a constant term: the equations of motion
+    have none but that of the structure.
 
     Raises
     ------
     InputError
-        If there is none of that name.
+        If there is none of that name, and for an object without `fit`.
     """
-    return METHODS[check_choice(name, METHODS, "method")]
+    if isinstance(method, str):
+        return METHODS[check_choice(method, METHODS, "method")]
+    if not hasattr(method, "fit"):
+        raise InputError(
+            f"method: {method!r} found, expected one of {quoted(METHODS)}, or an estimator "
+            "with scikit-learn's interface: fit(X, y) that sets coef_"
+        )
+    together = [fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)]
+    fit = together[0] if together else each_equation
+    return Method(type(method).__name__, lambda: without_constant(method), regularised=False, fit=fit)
 
 
-def fit_all(machine: Callable[[], Machine], samples: Samples) -> Machines:
-    """One machine for each equation, fitted."""
-    return {q: machine().fit(samples.features[q], samples.targets[q]) for q in samples.features}
+def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
+    """One estimator for each equation, fitted."""
+    return {q: estimator().fit(samples.features[q], samples.targets[q]) for q in samples.features}
 
 
-def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Machines:
-    """Machines whose terms are held back by what they do in a hard turn.
+def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
+    """Estimators whose terms are held back by what they do in a hard turn.
 
     Ridge regression in which each feature is scaled by its size in a hard turn over a window: the
     penalty falls on what is invisible in the data and large in the turn.
@@ -222,10 +182,6 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Mac
         Size of each term in a hard turn (`guard.hard_turn_features`).
     strength : float
         Of the penalty, relative to the terms' contribution in the hard turn.
-
-    Returns
-    -------
-    dict of str to LSSVM
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)

@@ -17,18 +17,36 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.estimators.linear import LinearRegressor, settings
 from identification.estimators.lssvm import LSSVM
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
 
 
-class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class Recursion(LinearRegressor):
     """What the recursive methods share; samples are taken in time order, without intercept.
+
+    Parameters
+    ----------
+    forgetting : float
+        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient of the
+        least-squares forms becomes less certain than it was at the start, so that nothing winds up while the
+        ship sails straight.
+    C : float
+        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
+    scale : bool or array-like of shape (n_features,)
+        Divide the regressors by their root mean square, or by given values.
+    start_samples : int
+        Samples from which LS-SVR makes the start; 0 starts from zero.
+    start_interval : int
+        Take every n-th sample for it.
+    start_C : float
+        Weight of the errors of that LS-SVR.
 
     Attributes
     ----------
@@ -45,12 +63,12 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         What the regressors are divided by inside.
     """
 
-    forgetting: float
-    scale: bool | ArrayLike
-    C: float
-    start_samples: int
-    start_interval: int
-    start_C: float  # noqa: N815
+    forgetting: float = 1.0
+    C: float = 1e6
+    scale: bool | ArrayLike = True
+    start_samples: int = 0
+    start_interval: int = 1
+    start_C: float = 1e6  # noqa: N815
 
     def __sklearn_tags__(self) -> Any:
         """A recursion has no intercept, which some of scikit-learn's test data would need."""
@@ -59,23 +77,11 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         return tags
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Run over samples in time order, from the beginning.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
-        self.follow(X, y)
+        """Run over samples of shape (n_samples, n_features), in time order, from the beginning."""
+        self.fit_history(X, y)
         return self
 
-    def follow(self, X: ArrayLike, y: ArrayLike) -> Floats:
+    def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
         """Fit, and return the estimate after each sample.
 
         Parameters
@@ -96,7 +102,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
-        course = np.concatenate(
+        history = np.concatenate(
             [
                 np.tile(self.coef_, (gathered, 1)),
                 self._run(features[gathered:, None], targets[gathered:, None])[:, 0],
@@ -106,7 +112,7 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         multiplicity[picked] = 1.0
         multiplicity[gathered:] = 1.0
         self._summarise(features, targets, multiplicity)
-        return course
+        return history
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
@@ -119,10 +125,6 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             Regressors; where signals share them, their axis may be absent.
         y : float or array-like of shape (n_samples,) or (n_samples, n_signals)
             What they explain.
-
-        Returns
-        -------
-        self
 
         Raises
         ------
@@ -157,29 +159,12 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         unscaled: Floats = self._P / np.multiply.outer(self.scale_, self.scale_)
         return unscaled[0] if len(unscaled) == 1 else unscaled
 
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self, "coef_")
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_
-        return prediction
-
     def _check(self) -> None:
         check_number(self.forgetting, "forgetting", above=0.0, at_most=1.0)
         check_number(self.C, "C", above=0.0)
         check_number(self.start_C, "start_C", above=0.0)
-        _whole(self.start_samples, "start_samples", 0)
-        _whole(self.start_interval, "start_interval", 1)
+        check_whole(self.start_samples, "start_samples", at_least=0)
+        check_whole(self.start_interval, "start_interval", at_least=1)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Zero coefficients with the covariance C, in scales that the samples give."""
@@ -204,23 +189,23 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 
     def _start_from(self, features: Floats, targets: Floats) -> None:
         """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
-        machine = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
-        self._theta[0] = machine.coef_ * self.scale_ / self._unit[0]
-        self.coef_ = machine.coef_
+        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
+        self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
+        self.coef_ = estimator.coef_
         if hasattr(self, "_P"):
-            self._P[0] = machine.inverse_moment_ * np.outer(self.scale_, self.scale_)
+            self._P[0] = estimator.inverse_moment_ * np.outer(self.scale_, self.scale_)
         else:
             self._r += np.sum((features / self.scale_) ** 2)
 
     def _run(self, features: Floats, targets: Floats) -> Floats:
         """Take in samples of shape (n_samples, n_signals, n_features); estimate after each of them."""
         scaled: Floats = np.ascontiguousarray(features / self.scale_)
-        course: Floats = np.empty(features.shape)
-        self._advance(scaled, np.ascontiguousarray(targets / self._unit), course)
-        course *= self._unit[:, None] / self.scale_
-        if len(course):
-            self.coef_ = course[-1, 0].copy() if course.shape[1] == 1 else course[-1].copy()
-        return course
+        history: Floats = np.empty(features.shape)
+        self._advance(scaled, np.ascontiguousarray(targets / self._unit), history)
+        history *= self._unit[:, None] / self.scale_
+        if len(history):
+            self.coef_ = history[-1, 0].copy() if history.shape[1] == 1 else history[-1].copy()
+        return history
 
     def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
         """Weights and covariance of what the recursion tends to."""
@@ -235,68 +220,26 @@ class Recursion(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             self.weights_.sum() - float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C))), 1.0
         )
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
-        spread = (scaled.T * self.weights_**2) @ scaled
-        self.covariance_ = self.noise_variance_ * (inverse @ spread @ inverse) / unscale
+        middle = (scaled.T * self.weights_**2) @ scaled
+        self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
 
     @abstractmethod
     def _begin_memory(self, features: Floats) -> None: ...
 
     @abstractmethod
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None: ...
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
 
 
-class MultiInnovationLeastSquares(Recursion):
-    """Multi-innovation least squares: each step corrects by the last few innovations together.
+class _LeastSquares(Recursion):
+    """Least squares that correct by the last few innovations together."""
 
-    Parameters
-    ----------
-    innovations : int
-        How many samples each step uses.
-    omega : float
-        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
-    inverse_free : bool
-        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
-        the matrix of innovations solved (MILS).
-    forgetting : float
-        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient becomes less
-        certain than it was at the start, so that nothing winds up while the ship sails straight.
-    C : float
-        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
-    scale : bool or array-like of shape (n_features,)
-        Divide the regressors by their root mean square, or by given values.
-    start_samples : int
-        Samples from which LS-SVR makes the start; 0 starts from zero.
-    start_interval : int
-        Take every so manieth sample for it.
-    start_C : float
-        Of that LS-SVR.
-    """
-
-    def __init__(
-        self,
-        innovations: int = 5,
-        omega: float = 0.0,
-        inverse_free: bool = True,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.innovations = innovations
-        self.omega = omega
-        self.inverse_free = inverse_free
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    innovations: int = 1
+    omega: float = 0.0
+    inverse_free: bool = True
 
     def _check(self) -> None:
         super()._check()
-        _whole(self.innovations, "innovations", 1)
+        check_whole(self.innovations, "innovations", at_least=1)
         check_number(self.omega, "omega", at_least=0.0)
 
     def _begin_memory(self, features: Floats) -> None:
@@ -304,7 +247,7 @@ class MultiInnovationLeastSquares(Recursion):
         self._P = np.tile(self.C * np.eye(m), (signals, 1, 1))
         self._ceiling = np.full((signals, m), float(self.C))
 
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         from identification.estimators.recursive_kernels import matrix_updates, scalar_updates
 
         first = len(self._past[1])
@@ -312,7 +255,7 @@ class MultiInnovationLeastSquares(Recursion):
         kernel = scalar_updates if self.inverse_free else matrix_updates
         kernel(
             phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
-            float(self.omega), course,
+            float(self.omega), history,
         )  # fmt: skip
         kept = min(self.innovations - 1, len(y))
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
@@ -323,36 +266,36 @@ class MultiInnovationLeastSquares(Recursion):
         super()._summarise(features, targets, multiplicity * used)
 
 
-class RecursiveLeastSquares(MultiInnovationLeastSquares):
+class RecursiveLeastSquares(_LeastSquares):
     """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
+
+    Its parameters are those of `Recursion`.
+    """
+
+
+@settings()
+class MultiInnovationLeastSquares(_LeastSquares):
+    """Multi-innovation least squares: each step corrects by the last few innovations together.
 
     Parameters
     ----------
     forgetting, C, scale, start_samples, start_interval, start_C
-        As in `MultiInnovationLeastSquares`.
+        As in `Recursion`.
+    innovations : int
+        How many samples each step uses.
+    omega : float
+        Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
+    inverse_free : bool
+        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
+        the matrix of innovations solved (MILS).
     """
 
-    innovations = 1
-    omega = 0.0
-    inverse_free = True
-
-    def __init__(
-        self,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    innovations: int = 5
+    omega: float = 0.0
+    inverse_free: bool = True
 
 
+@settings()
 class StochasticGradient(Recursion):
     """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
 
@@ -361,33 +304,14 @@ class StochasticGradient(Recursion):
 
     Parameters
     ----------
+    forgetting, C, scale, start_samples, start_interval, start_C
+        As in `Recursion`; here the sum of squares that divides the steps forgets, and C is that of the ridge
+        in `inverse_moment_`.
     omega : float
-        Of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
-    forgetting : float
-        Factor by which the sum of squares that divides the steps forgets; 1 as printed.
-    C : float
-        Of the ridge in `inverse_moment_`.
-    scale, start_samples, start_interval, start_C
-        As in `MultiInnovationLeastSquares`.
+        Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     """
 
-    def __init__(
-        self,
-        omega: float = 0.0,
-        forgetting: float = 1.0,
-        C: float = 1e6,
-        scale: bool | ArrayLike = True,
-        start_samples: int = 0,
-        start_interval: int = 1,
-        start_C: float = 1e6,
-    ) -> None:
-        self.omega = omega
-        self.forgetting = forgetting
-        self.C = C
-        self.scale = scale
-        self.start_samples = start_samples
-        self.start_interval = start_interval
-        self.start_C = start_C
+    omega: float = 0.0
 
     def _check(self) -> None:
         super()._check()
@@ -396,10 +320,10 @@ class StochasticGradient(Recursion):
     def _begin_memory(self, features: Floats) -> None:
         self._r = np.zeros(len(self._theta))
 
-    def _advance(self, phi: Floats, y: Floats, course: Floats) -> None:
+    def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         from identification.estimators.recursive_kernels import gradient_updates
 
-        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), course)
+        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history)
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
@@ -425,8 +349,3 @@ def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
             "phi, y: a value that is not finite found, expected numbers; repair the samples first"
         )
     return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets
-
-
-def _whole(value: Any, where: str, least: int) -> None:
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{where}: {value!r} found, expected a whole number of at least {least}")

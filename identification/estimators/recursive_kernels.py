@@ -73,11 +73,11 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
 @compiled
 def scalar_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, course: Any,
+    omega: float, history: Any,
 ) -> None:  # fmt: skip
     """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one.
 
-    Rows before `first` are history. `theta`, `P` are changed in place; `course` receives each theta.
+    Rows before `first` are history. `theta`, `P` are changed in place; `history` receives each theta.
     """
     m = theta.shape[1]
     gain = np.empty(m)
@@ -87,13 +87,13 @@ def scalar_updates(
                 forget(P[s], forgetting, ceiling[s])
             for i in range(max(t - innovations + 1, 0), t + 1):
                 rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, gain)
-            course[t - first, s] = theta[s]
+            history[t - first, s] = theta[s]
 
 
 @compiled
 def matrix_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, course: Any,
+    omega: float, history: Any,
 ) -> None:  # fmt: skip
     """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
     for t in range(first, phi.shape[0]):
@@ -105,17 +105,17 @@ def matrix_updates(
             errors = y[low : t + 1, s] - theta[s] @ Phi
             for i in range(errors.size):
                 errors[i] = innovation(errors[i], omega)
-            spread = P[s] @ Phi
-            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ spread, np.ascontiguousarray(spread.T)).T
+            PPhi = P[s] @ Phi
+            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ PPhi, np.ascontiguousarray(PPhi.T)).T
             theta[s] += np.ascontiguousarray(L) @ errors
-            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(spread.T)
+            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(PPhi.T)
             P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
-            course[t - first, s] = theta[s]
+            history[t - first, s] = theta[s]
 
 
 @compiled
 def gradient_updates(
-    phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, course: Any
+    phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, history: Any
 ) -> None:
     """Stochastic gradient, theta += phi e / r, r += |phi|^2 (Song 2020, equations 3-3 to 3-8)."""
     for t in range(phi.shape[0]):
@@ -128,4 +128,4 @@ def gradient_updates(
             step = innovation(error, omega) / r[s] if r[s] > 0.0 else 0.0
             for j in range(theta.shape[1]):
                 theta[s, j] += step * phi[t, s, j]
-            course[t, s] = theta[s]
+            history[t, s] = theta[s]

@@ -2,7 +2,7 @@
 
 Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
 minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitive band and solver are those of
-the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression machines).
+the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression estimators).
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import validate_data
 
-from identification.estimators.estimator import Machine
-from identification.regression.samples import Samples
+from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.linear import LinearRegressor, settings
+from identification.regression.coefficients import with_accelerations
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
@@ -33,20 +33,20 @@ from shipgym.ships import GreyBox, ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Machines = dict[str, Machine]
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
-BARE = 0.0  # weight of the errors at which nothing is added to the reference ship
-WEIGHTS = (BARE, *np.geomspace(0.01, 100.0, 9).tolist())
-NEARLY = 1.1  # times the least error is as good
+NO_CORRECTION = 0.0  # weight of the errors at which nothing is added to the reference ship
+WEIGHTS = (NO_CORRECTION, *np.geomspace(0.01, 100.0, 9).tolist())
+ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
 FIRST_BAND = 0.1
 MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
 MOST_SWEEPS = 20_000  # of coordinate descent through the samples
 PIECES = 3  # into which a single trial is cut to choose the weight of the errors
 
 
-class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class RMSVM(LinearRegressor):
     """The linear correction of one equation: epsilon-SVR with standardised features and targets.
 
     Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised features and e in
@@ -84,23 +84,13 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         Number of features.
     """
 
-    def __init__(
-        self,
-        C: float | None = None,
-        epsilon: float | None = None,
-        objective: str = "rmse",
-        regression: str = "svr",
-        free_constant: bool = False,
-        constant: int | None = None,
-        folds: str = TRIALS,
-    ) -> None:
-        self.C = C
-        self.epsilon = epsilon
-        self.objective = objective
-        self.regression = regression
-        self.free_constant = free_constant
-        self.constant = constant
-        self.folds = folds
+    C: float | None = None
+    epsilon: float | None = None
+    objective: str = "rmse"
+    regression: str = "svr"
+    free_constant: bool = False
+    constant: int | None = None
+    folds: str = TRIALS
 
     def check(self) -> None:
         """Refuse settings that cannot be.
@@ -118,25 +108,13 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             check_number(self.epsilon, "epsilon", at_least=0.0, hint="in standard deviations of the target")
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-        y : array-like of shape (n_samples,)
-            Targets.
-
-        Returns
-        -------
-        self
-        """
+        """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         self.check()
         checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         features: Floats = checked[0]
         target = np.asarray(checked[1], dtype=np.float64)
         weight = 1.0 if self.C is None else float(self.C)
-        if weight == BARE:
+        if weight == NO_CORRECTION:
             self.coef_ = np.zeros(features.shape[1])
             self.inverse_moment_ = np.zeros((features.shape[1],) * 2)
         else:
@@ -155,13 +133,13 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             centre, level = np.where(free, rows.mean(axis=0), 0.0), float(target.mean())
         scale = np.sqrt(np.mean((rows - centre) ** 2, axis=0))
         scale = np.where((scale > 0.0) & free, scale, 1.0)
-        spread = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
-        Z, e = ((rows - centre) / scale)[:, free], (target - level) / spread
+        deviation = float(np.sqrt(np.mean((target - level) ** 2))) or 1.0
+        Z, e = ((rows - centre) / scale)[:, free], (target - level) / deviation
         slope, offset = self._solve(Z, e, weight, band)
         self.coef_ = np.zeros(X.shape[1])
-        self.coef_[free] = slope * spread / scale[free]
+        self.coef_[free] = slope * deviation / scale[free]
         if self.constant is not None:
-            self.coef_[self.constant] = level + spread * offset - centre @ self.coef_
+            self.coef_[self.constant] = level + deviation * offset - centre @ self.coef_
         penalty = np.diag(np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0))
         self.inverse_moment_ = np.linalg.pinv(X.T @ X + penalty, hermitian=True)
 
@@ -175,25 +153,8 @@ class RMSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             return np.asarray(ridge.coef_, dtype=float), float(ridge.intercept_)
         if not has_offset:
             return _through_zero(Z, e, weight / len(e), band), 0.0
-        machine = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
-        return np.asarray(machine.coef_, dtype=float).ravel(), float(machine.intercept_[0])
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_
-        return prediction
+        estimator = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
+        return np.asarray(estimator.coef_, dtype=float).ravel(), float(estimator.intercept_[0])
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -214,21 +175,15 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
             return np.asarray(both.coef_, dtype=float).ravel()
 
 
-def fit_rm_svm(
-    make: Callable[[], RMSVM], samples: Samples, blank: ShipModel, trials: Sequence[Trial]
-) -> Machines:
+def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
     Parameters
     ----------
     make : callable
-        Makes an unfitted machine with the settings asked for.
-    samples : Samples
-        The regression (`grey_box.structure_samples`).
-    blank : ShipModel
-        The bare reference ship as a model of the target.
-    trials : sequence of Trial
-        Those behind the samples.
+        Makes an unfitted `RMSVM` with the settings asked for.
+    task : FitTask
+        Its model is the bare reference ship as a model of the target.
 
     Returns
     -------
@@ -240,60 +195,53 @@ def fit_rm_svm(
     InputError
         For a model without a reference ship.
     """
-    asked = make()
+    asked, samples = make(), task.samples
+    assert isinstance(asked, RMSVM)
     asked.check()
-    if not isinstance(blank.table, GreyBox):
+    if not isinstance(task.blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {blank.structure!r}, expected structure 'grey-box', "
+            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected 'grey-box', "
             "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
             "file; or choose another method, such as 'tls-svm'"
         )
-    tuner = _Tuner(asked, samples, blank, trials)
+    tuner = _Tuner(asked, task)
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
-    machines: Machines = {}
+    estimators: Estimators = {}
     for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
-        machine = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
-        machine.chosen_ = {"C": weight, "epsilon": band}
+        estimator = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
+        estimator.chosen_ = {"C": weight, "epsilon": band}
         if search is not None:
-            machine.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
-        machines[q] = machine
-    return machines
+            estimator.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
+        estimators[q] = estimator
+    return estimators
 
 
 class _Tuner:
     """Fits with different settings, and simulations with what they give."""
 
-    def __init__(self, asked: RMSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]) -> None:
-        self.asked, self.blank, self.trials = asked, blank, trials
-        self.samples = samples
-        self.thin = max(1, -(-len(samples) // MOST_ROWS))
+    def __init__(self, asked: RMSVM, task: FitTask) -> None:
+        self.asked, self.samples, self.blank, self.trials = asked, task.samples, task.blank, task.trials
+        self.thin = max(1, -(-len(task.samples) // MOST_ROWS))
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
-        """The machine of one equation for some of the rows."""
+        """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
             names = [term.name for term in self.blank.table.terms(equation)]
             constant = names.index("0") if self.asked.free_constant and "0" in names else None
-            settings = {"C": weight, "epsilon": band, "constant": constant}
-            settings = self.asked.get_params() | settings
+            chosen = {"C": weight, "epsilon": band, "constant": constant}
             used = np.flatnonzero(rows)[:: self.thin]
             X, y = self.samples.features[equation][used], self.samples.targets[equation][used]
-            self._known[key] = RMSVM(**settings).fit(X, y)
+            self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
         return self._known[key]
 
     def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
-        table = self.blank.table
-        fits = [
-            self.fitted(q, weight, band, rows).coef_
-            for q, band in zip(self.samples.features, bands, strict=True)
-        ]
-        matrix = table.acceleration_matrix(self.blank.particulars, self.blank.service_shaft_speed)
-        values = np.linalg.solve(matrix, np.concatenate(fits))
-        return replace(
-            self.blank, coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True))
+        equations = zip(self.samples.features, bands, strict=True)
+        return with_accelerations(
+            self.blank, {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
         )
 
     def weight(self) -> float:
@@ -311,8 +259,8 @@ class _Tuner:
             for weight in WEIGHTS
         ])  # fmt: skip
         if not np.isfinite(errors.min()):
-            return BARE
-        return float(WEIGHTS[int(np.flatnonzero(errors <= NEARLY * errors.min())[0])])
+            return NO_CORRECTION
+        return float(WEIGHTS[int(np.flatnonzero(errors <= ERROR_TOLERANCE * errors.min())[0])])
 
     def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
         """Rows to fit, and the trial or the piece of the only trial that is held out."""
@@ -337,7 +285,7 @@ class _Tuner:
     def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
         count = len(self.samples.features)
-        if self.asked.epsilon is not None or weight == BARE or self.asked.regression == "ls-svm":
+        if self.asked.epsilon is not None or weight == NO_CORRECTION or self.asked.regression == "ls-svm":
             return np.full(count, FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon), None
         everything = np.ones(len(self.samples), dtype=bool)
 

@@ -7,12 +7,11 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
-from sklearn.utils.validation import check_is_fitted, validate_data
 
-from identification.estimators.lssvm import LSSVM, check_weight, validated
+from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
+from identification.estimators.lssvm import LSSVM
+from identification.search import get_optimiser
 from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
-from identification.search.optimisers import get_optimiser
 from identification.search.search import Optimiser
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
@@ -31,7 +30,8 @@ LINEAR = (
 )
 
 
-class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
+@settings()
+class TunedLSSVM(LinearRegressor):
     """LS-SVM with a linear kernel and C found by a search over its logarithm (Zhu 2018, section 5.3).
 
     Parameters
@@ -64,25 +64,14 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         For the provenance.
     """
 
-    def __init__(
-        self,
-        optimiser: str | Mapping[str, Any] | Optimiser = "abc",
-        objective: str = "k-fold",
-        bounds: tuple[float, float] = (1e-2, 1e12),
-        folds: int | str = 5,
-        seed: int = 0,
-        scale: bool | ArrayLike = True,
-        fit_intercept: bool = True,
-        robust: bool = False,
-    ) -> None:
-        self.optimiser = optimiser
-        self.objective = objective
-        self.bounds = bounds
-        self.folds = folds
-        self.seed = seed
-        self.scale = scale
-        self.fit_intercept = fit_intercept
-        self.robust = robust
+    optimiser: str | Mapping[str, Any] | Optimiser = "abc"
+    objective: str = "k-fold"
+    bounds: tuple[float, float] = (1e-2, 1e12)
+    folds: int | str = 5
+    seed: int = 0
+    scale: bool | ArrayLike = True
+    fit_intercept: bool = True
+    robust: bool = False
 
     def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Search for C and fit to samples.
@@ -95,10 +84,6 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             Targets.
         groups : array-like of shape (n_samples,), optional
             Trial of each sample, for folds="trials".
-
-        Returns
-        -------
-        self
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_whole(self.seed, "seed", at_least=0)
@@ -109,7 +94,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
             )
         optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
         X, y = validated(self, X, y)
-        objective = self._objective(X, y, groups, self._machine(10.0 ** bounds[1]))
+        objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
         search = optimiser.minimise(objective, [bounds], self.seed)
         return self.settle(X, y, 10.0 ** float(search.x[0]), search)
 
@@ -131,9 +116,9 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
     def settle(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
-        machine = self._machine(C).fit(X, y)
+        estimator = self._estimator(C).fit(X, y)
         for name in LINEAR:
-            setattr(self, name, getattr(machine, name))
+            setattr(self, name, getattr(estimator, name))
         self.C_, self.search_ = C, search
         self.chosen_ = {
             "C": C,
@@ -143,7 +128,7 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         }
         return self
 
-    def _machine(self, C: float) -> LSSVM:
+    def _estimator(self, C: float) -> LSSVM:
         return LSSVM(C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust)
 
     def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM) -> ErrorOfC:
@@ -153,20 +138,3 @@ class TunedLSSVM(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         folds = min(self.folds, len(y)) if isinstance(self.folds, int) else self.folds
         blocks = time_blocks(len(y), folds, groups)
         return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets of samples.
-
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features.
-
-        Returns
-        -------
-        array of shape (n_samples,)
-        """
-        check_is_fitted(self)
-        features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_ + self.intercept_
-        return prediction

@@ -22,10 +22,6 @@ def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) ->
         The model but for its coefficients.
     accelerations : mapping of str to array of shape (n_terms,)
         Coefficients of the terms of each equation, SI units.
-
-    Returns
-    -------
-    ShipModel
     """
     matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
     values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.regressed]))

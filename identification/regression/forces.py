@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
+from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import on_one_thread
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -94,10 +95,6 @@ def force_regression(
         Length, water density; mass, centre of gravity and yaw gyradius where `model_inertia`.
     model_inertia : bool
         Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`); it is taken out.
-
-    Returns
-    -------
-    ForceRegression
 
     Raises
     ------
@@ -183,14 +180,14 @@ def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
     return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
 
 
-def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, Floats]:
+def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
     """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
 
     Parameters
     ----------
     regression : ForceRegression
         Of captive tests.
-    machine : Machine
+    estimator : Estimator
         Without intercept; it is fitted.
 
     Returns
@@ -201,13 +198,13 @@ def fit_forces(regression: ForceRegression, machine: Machine) -> tuple[Floats, F
     """
     scales = regression.scales()
     features, targets = regression.features / scales[:, None], regression.targets / scales
-    machine.fit(features, targets)
-    half = features @ machine.inverse_moment_
+    estimator.fit(features, targets)
+    half = features @ estimator.inverse_moment_
     variances = force_variances(
-        regression.equation, targets - machine.predict(features), np.sum(half * features, axis=1)
+        regression.equation, targets - estimator.predict(features), np.sum(half * features, axis=1)
     )
     covariance = (half.T * variances[regression.equation]) @ half
-    return machine.coef_, 0.5 * (covariance + covariance.T)
+    return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
 def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
@@ -270,17 +267,17 @@ def identify_forces(
     Returns
     -------
     ShipModel
-        With covariance of the coefficients, errors taken as white; its provenance holds R^2 of X, Y, N.
+        With covariance of the coefficients, for white errors; its provenance holds R^2 of X, Y, N.
 
     Raises
     ------
     InputError
         For a structure of free-running trials, and what `force_regression` refuses.
     """
-    from identification.estimators.methods import get_method
-
     table = get_structure(structure)
     check_choice(method, METHODS, "method")
+    if rank is not None and method != "tls-svm":
+        raise InputError(f"rank: {rank} found with method {method!r}, which keeps all; choose 'tls-svm'")
     if not isinstance(table, SharedStructure):
         raise InputError(
             f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
@@ -289,8 +286,17 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, table, particulars, model_inertia)
-    machine = get_method(method).machine(**({} if rank is None else {"rank": rank}))
-    coefficients, covariance = fit_forces(regression, machine)
+    estimator = TruncatedLSSVM(
+        selection="full" if method == "ls" else "l-curve", rank=rank, fit_intercept=False
+    )
+    coefficients, covariance = fit_forces(regression, estimator)
+    provenance = {
+        "structure": structure,
+        "method": method,
+        "rank": estimator.rank_,
+        "r_squared": regression.r_squared(coefficients),
+        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
+    }
     return ShipModel(
         name=particulars.name if name is None else name,
         structure=structure,
@@ -298,11 +304,5 @@ def identify_forces(
         steering=steering or SteeringGear(),
         coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
         covariance=covariance,
-        provenance={
-            "structure": structure,
-            "method": method,
-            "rank": int(getattr(machine, "rank_", len(coefficients))),
-            "r_squared": regression.r_squared(coefficients),
-            "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
-        },
+        provenance=provenance,
     )

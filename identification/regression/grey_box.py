@@ -15,7 +15,6 @@ from identification.validation.prediction import predict, trial_metrics
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel, Structure, grey_box
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -71,25 +70,17 @@ def chosen_box(
 
 
 def structure_samples(
-    trials: Sequence[Trial],
-    structure: Structure,
-    particulars: Particulars,
-    samples: str = "spline",
-    window: int | None = None,
-    gear: SteeringGear | None = None,
-    smooth: bool | str = True,
-    shaft_speed: float = 0.0,
+    trials: Sequence[Trial], structure: Structure, particulars: Particulars, **sampling: Any
 ) -> Samples:
     """The regression of any structure; arguments as in `build_samples`.
 
     For a grey box the target is what the reference ship's acceleration, converted to the target and
     integrated over the same window, leaves of the change of velocity.
     """
-    rest = (particulars, samples, window, gear, smooth, shaft_speed)
     if not isinstance(structure, GreyBox):
-        return build_samples(trials, structure, *rest)
+        return build_samples(trials, structure, particulars, **sampling)
     widened = _Widened(**{field.name: getattr(structure, field.name) for field in fields(structure)})
-    built = build_samples(trials, widened, *rest)
+    built = build_samples(trials, widened, particulars, **sampling)
     return replace(
         built,
         features={q: features[:, :-1] for q, features in built.features.items()},

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from identification.regression.gear import estimated_gear
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
+from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
@@ -19,7 +19,8 @@ from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.identify_table import Options
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
@@ -52,25 +53,11 @@ class Problem:
 
 def pose(
     trials: Sequence[Trial],
-    structure: str = "abkowitz",
-    samples: str = "spline",
-    particulars: Particulars | Mapping[str, Any] | None = None,
-    steering: SteeringGear | None = None,
-    *,
-    service_shaft_speed: float | None = None,
-    name: str | None = None,
-    window: int | None = None,
-    smooth: bool = True,
-    preprocessing: str | None = None,
-    repair: bool = False,
-    hold_out: Sequence[str] = (),
-    reference_model: str | ShipModel | None = None,
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
+    steering: SteeringGear | None,
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
-
-    Returns
-    -------
-    Problem
 
     Raises
     ------
@@ -78,24 +65,25 @@ def pose(
         For trials that excite nothing, lack channels or samples or are of another ship, and for particulars
         that do not suffice.
     """
-    everything = _held_out(trials, hold_out)
+    everything = _held_out(trials, options.hold_out)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
         )
-    used = [repaired(trial) if repair else trial for trial in _used(everything)]
-    table, similarity = _table(structure, reference_model, particulars, used)
+    used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
+    table, similarity = _table(options.structure, options.reference_model, particulars, used)
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
-    shaft = _shaft_speed(service_shaft_speed, used, table)
+    shaft = _shaft_speed(options.service_shaft_speed, used, table)
     regression = structure_samples(
-        used, table, ship, samples, window, steering, preprocessing or smooth, shaft
-    )
+        used, table, ship, samples=options.samples, window=options.window, gear=steering,
+        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
+    )  # fmt: skip
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
-    blank = _blank(ship["name"] if name is None else name, table, ship, gear, shaft, used)
+    blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
     return Problem(tuple(everything), tuple(used), blank, regression, similarity)
 
 

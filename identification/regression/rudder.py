@@ -7,14 +7,17 @@ the lag of the gear are found from the samples of the rudder angle alone.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
+from scipy.optimize import brentq, minimize_scalar
 
+from identification.regression.preprocess import is_noisy
 from shipgym.ships.steering import SteeringGear
+from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -24,6 +27,9 @@ RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
 EXPLAINED = 0.85  # share of the intervals that the gear has to explain
 FEWEST_SAMPLES = 8  # per change of order: with fewer the gear explains noise
 BISECTIONS = 60
+USUAL_LIMIT_DEG = 35.0
+MOVING = 0.5  # of the fastest move: faster ones are taken for the gear's own rate
+FAST_QUANTILE = 0.995  # of the rates of records with noise
 
 
 @dataclass(frozen=True)
@@ -82,10 +88,6 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
         s and rad.
     gear : SteeringGear, optional
         Tried first; a gear estimated from the samples takes its place where it explains them better.
-
-    Returns
-    -------
-    Rudder
     """
     t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
     candidates = [estimate_gear(t, delta)]
@@ -231,17 +233,9 @@ def _switch_time(
     def miss(time: float) -> float:
         return float(_flow(_flow(start, first, time, rate, lag), second, step - time, rate, lag)) - end
 
-    low, high = 0.0, step
-    at_low, at_high = miss(low), miss(high)
-    if at_low * at_high > 0.0:
+    if miss(0.0) * miss(step) > 0.0:
         return None
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        if miss(middle) * at_low > 0.0:
-            low = middle
-        else:
-            high = middle
-    return 0.5 * (low + high)
+    return float(brentq(miss, 0.0, step, xtol=1e-15 * step))
 
 
 def _ramp_ends(
@@ -258,3 +252,27 @@ def _ramp_ends(
         inside = (ramp > 1e-9) & (ramp < length)
         ends += [(float(time), int(lag > 0.0)) for time in (begin + ramp)[inside]]
     return ends
+
+
+def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
+    """Limit, rate and lag of a steering gear from the rudder angles of trials.
+
+    The limit is 35 degrees or the largest angle recorded. Rate and lag are those that explain records
+    without noise exactly; records with noise give the median rate of the fast moves, and no lag.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        With `delta`.
+    """
+    limit = max(USUAL_LIMIT_DEG, *(float(np.degrees(np.abs(trial["delta"]).max())) for trial in trials))
+    clean = [t for t in trials if not is_noisy(t.t, (t[channel] for channel in "uvr"))]
+    exact = [rudder for trial in clean if (rudder := rebuild(trial.t, trial["delta"])).follows_gear]
+    if exact:
+        rate = float(np.median([rudder.rate for rudder in exact]))
+        lag = float(np.median([rudder.time_constant for rudder in exact]))
+    else:
+        rates = np.concatenate([np.abs(np.diff(trial["delta"])) / np.diff(trial.t) for trial in trials])
+        fastest = float(np.quantile(rates[rates > 0.0], FAST_QUANTILE))
+        rate, lag = float(np.median(rates[rates >= MOVING * fastest])), 0.0
+    return SteeringGear(min(limit, 90.0), float(np.degrees(rate)), lag)

@@ -8,18 +8,24 @@ quadrature on splines through the samples, broken where the rudder has corners.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline, make_interp_spline
 from scipy.ndimage import median_filter
 
 from identification.regression import preprocess
-from identification.regression.memory import eliminated, twice_integrated
-from identification.regression.rudder import Rudder, rebuild, straight
+from identification.regression.integrals import (
+    Channels,
+    Integrals,
+    spline_integrals,
+    step_integrals,
+    twice_integrated,
+)
+from identification.regression.rudder import rebuild, straight
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
@@ -28,11 +34,8 @@ from shipgym.ships.structures import Structure
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Channels = Mapping[str, Floats]
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
-DEGREE = 3
-NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
 LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
 SHORTEST_GAP = 0.15  # unless it is shorter than this part of the time to sail one ship length
@@ -69,6 +72,17 @@ class Samples:
 
     def __len__(self) -> int:
         return len(self.start)
+
+    def select(self, rows: NDArray[Any]) -> Samples:
+        """Some of the rows, by mask or index."""
+        return replace(
+            self,
+            features={q: X[rows] for q, X in self.features.items()},
+            targets={q: y[rows] for q, y in self.targets.items()},
+            start=self.start[rows],
+            duration=self.duration[rows],
+            trial=self.trial[rows],
+        )
 
 
 def build_samples(
@@ -107,10 +121,6 @@ def build_samples(
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
 
-    Returns
-    -------
-    Samples
-
     Raises
     ------
     InputError
@@ -122,24 +132,8 @@ def build_samples(
         check_whole(window, "window", at_least=1, hint="in sampling steps")
     preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
     check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
-    parts = []
-    for index, trial in enumerate(trials):
-        if window is not None and window >= len(trial):
-            raise InputError(
-                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
-                f"{window} steps; give a smaller window"
-            )
-
-        def terms(equation: str, channels: Channels) -> Floats:
-            return structure.features(equation, channels, particulars, shaft_speed)
-
-        pieces = between_gaps(trial, particulars, FEWEST_SAMPLES if window is None else window + 1)
-        steps = default_window(max(pieces, key=len), particulars) if window is None else window
-        parts += [
-            _one_trial(piece, index, structure, terms, samples, steps, gear, preprocessing)
-            for piece in pieces
-            if len(piece) > steps
-        ]
+    sampling = _Sampling(structure, particulars, samples, window, gear, preprocessing, shaft_speed)
+    parts = [part for index, trial in enumerate(trials) for part in sampling.parts(trial, index)]
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
@@ -148,6 +142,60 @@ def build_samples(
         np.concatenate([part.trial for part in parts]),
         max(part.window for part in parts),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Sampling:
+    """How a trial becomes rows of the regression; arguments of `build_samples`, checked."""
+
+    structure: Structure
+    particulars: Particulars
+    samples: str
+    window: int | None
+    gear: SteeringGear | None
+    preprocessing: str
+    shaft_speed: float
+
+    def parts(self, trial: Trial, index: int) -> list[Samples]:
+        """The rows of a trial, of each piece between gaps."""
+        if self.window is not None and self.window >= len(trial):
+            raise InputError(
+                f"trial {trial.name!r}: {len(trial)} samples found, expected more than the window of "
+                f"{self.window} steps; give a smaller window"
+            )
+        fewest = FEWEST_SAMPLES if self.window is None else self.window + 1
+        pieces = between_gaps(trial, self.particulars, fewest)
+        window = self.window or default_window(max(pieces, key=len), self.particulars)
+        return [self._part(piece, index, window) for piece in pieces if len(piece) > window]
+
+    def _part(self, trial: Trial, index: int, window: int) -> Samples:
+        t, equations = trial.t, self.structure.equations
+        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.preprocessing)
+        integrals, moments = self._integrals(trial, channels)
+        if "q" in integrals:
+            memory = twice_integrated(t, integrals.pop("q"), moments["q"])
+            integrals["r"] = np.hstack([integrals["r"], memory])
+        first = np.arange(0, len(t) - window, max(window // 2, 1))
+        last = first + window
+        features, targets = {}, {}
+        for q, steps in integrals.items():
+            summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+            features[q] = steps if window == 1 else summed[last] - summed[first]
+            targets[q] = channels[q][last] - channels[q][first]
+        part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
+        return without_memory(part) if "q" in equations else part
+
+    def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
+        """Integrals of the terms over each step, and their moments."""
+        t, equations = trial.t, self.structure.equations
+        if self.samples != "spline":
+            return step_integrals(t, channels, equations, self._terms, self.samples == "euler")
+        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
+        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], self.gear)
+        return spline_integrals(t, channels, equations, self._terms, rudder)
+
+    def _terms(self, equation: str, channels: Channels) -> Floats:
+        return self.structure.features(equation, channels, self.particulars, self.shaft_speed)
 
 
 def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
@@ -225,120 +273,45 @@ def default_window(trial: Trial, particulars: Particulars) -> int:
     return needed
 
 
-def _one_trial(
-    trial: Trial,
-    index: int,
-    structure: Structure,
-    terms: Callable[[str, Channels], Floats],
-    samples: str,
-    window: int,
-    gear: SteeringGear | None,
-    preprocessing: str,
-) -> Samples:
-    t = trial.t
-    channels = preprocess.smoothed_channels(trial, structure.required_channels, preprocessing)
-    if samples == "spline":
-        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
-        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], gear)
-        integrals, moments = _spline_integrals(t, channels, structure, terms, rudder)
-    else:
-        integrals, moments = {}, {}
-        for q in structure.equations:
-            values = terms(q, channels)
-            mean = values[:-1] if samples == "euler" else 0.5 * (values[:-1] + values[1:])
-            integrals[q] = mean * np.diff(t)[:, None]
-            moments[q] = 0.5 * integrals[q] * np.diff(t)[:, None]
-    if "q" in integrals:
-        memory = twice_integrated(t, integrals.pop("q"), moments["q"])
-        integrals["r"] = np.hstack([integrals["r"], memory])
-    first = np.arange(0, len(t) - window, max(window // 2, 1))
-    last = first + window
-    features, targets = {}, {}
-    for q, steps in integrals.items():
-        summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
-        features[q] = steps if window == 1 else summed[last] - summed[first]
-        targets[q] = channels[q][last] - channels[q][first]
-    part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
-    return eliminated(part) if "q" in structure.equations else part
+def without_memory(part: Samples) -> Samples:
+    """Rows of one trial from which the unknown memory of yaw is eliminated: one window less the next.
 
-
-def _spline_integrals(
-    t: Floats,
-    channels: Channels,
-    structure: Structure,
-    terms: Callable[[str, Channels], Floats],
-    rudder: Rudder,
-) -> tuple[dict[str, Floats], dict[str, Floats]]:
-    """Integral of the terms over each sampling step, arrays of shape (n_samples - 1, n_terms).
-
-    And their first moments about the end of the step.
-    """
-    edges = np.union1d(t, rudder.corners)
-    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
-    times = middle[:, None] + half[:, None] * NODES
-    at_nodes: dict[str, Floats] = {}
-    for name, values in channels.items():
-        at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
-    step = np.searchsorted(t, middle, side="right") - 1
-    starts = np.flatnonzero(np.diff(step, prepend=-1))
-    weights = half[:, None] * WEIGHTS
-    to_end = t[step + 1][:, None] - times
-    integrals, moments = {}, {}
-    for q in structure.equations:
-        values = terms(q, at_nodes).reshape(*times.shape, -1)
-        integrals[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights), starts, axis=0)
-        moments[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights * to_end), starts, axis=0)
-    return integrals, moments
-
-
-def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:
-    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
-    if name == "delta":
-        return rudder
-    if name == "n":
-        return lambda times: np.interp(times, t, values)
-    return broken_spline(t, values, rudder)
-
-
-def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
-    """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
-
-    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the
-    acceleration of the rudder jumps, the third does.
+    Of rdot = (terms of `r`) + q, qdot = (terms of `q`) the memory q is not measured. At the start of a window
+    it is the same constant in the mean yaw acceleration of two windows of one trial once the terms of `q`,
+    integrated from the start of the trial, stand on the right; so their difference is free of it. That is the
+    regression of the second-order equation weighted by two boxes convolved, a modulating function
+    (Shinbrot 1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a
+    measured channel is formed.
 
     Parameters
     ----------
-    t, values : array of shape (n_samples,)
-        s and the unit of the channel.
-    rudder : Rudder
-        With the corners.
+    part : Samples
+        Of one trial, the memory's terms among those of yaw.
 
     Returns
     -------
-    BSpline
+    Samples
+        Of the rows that have a window after theirs; yaw in units of a change of velocity as before.
+
+    Raises
+    ------
+    InputError
+        For a trial of fewer than two windows.
     """
-    if len(t) <= DEGREE:
-        return make_interp_spline(t, values, k=1)
-    interior = list(range(2, len(t) - 2))  # not-a-knot ends
-    broken: list[float] = []
-    for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
-        multiplicity = DEGREE - 1 - int(smoothness)
-        nearest = sorted(interior, key=lambda i: abs(t[i] - corner))[:multiplicity]
-        after = int(np.searchsorted(t, corner))
-        if any(abs(i - after) > 2 for i in nearest) or len(nearest) < multiplicity:
-            continue  # too close to another corner or to an end
-        kept = [i for i in interior if i not in nearest]
-        if _solvable(t, _knots(t, kept, [*broken, *[corner] * multiplicity])):
-            interior, broken = kept, [*broken, *[corner] * multiplicity]
-    return make_interp_spline(t, values, k=DEGREE, t=_knots(t, interior, broken))
-
-
-def _knots(t: Floats, interior: Sequence[int], broken: Sequence[float]) -> Floats:
-    inner = np.sort(np.concatenate([t[list(interior)], np.asarray(broken, dtype=float)]))
-    return np.concatenate([np.repeat(t[0], DEGREE + 1), inner, np.repeat(t[-1], DEGREE + 1)])
-
-
-def _solvable(t: Floats, knots: Floats) -> bool:
-    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
-    inner = slice(1, len(t) - 1)
-    return bool(np.all((knots[: len(t)][inner] < t[inner]) & (t[inner] < knots[DEGREE + 1 :][inner])))
+    end = part.start + part.duration
+    following = np.searchsorted(part.start, end - 1e-9 * part.duration)
+    rows = np.flatnonzero(following < len(part))
+    if not rows.size:
+        raise InputError(
+            f"window: a trial of {len(part)} windows found, expected at least two after each other for a "
+            "structure with a memory of yaw; give a smaller window, or longer trials"
+        )
+    after = following[rows]
+    chosen = part.select(rows)
+    scale = 0.5 * (part.duration[rows] + part.duration[after])
+    features, targets = part.features["r"] / part.duration[:, None], part.targets["r"] / part.duration
+    return replace(
+        chosen,
+        features=chosen.features | {"r": (features[after] - features[rows]) * scale[:, None]},
+        targets=chosen.targets | {"r": (targets[after] - targets[rows]) * scale},
+    )

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.report.predictions import legend_above, overview_figure, prediction_figure
+from identification.fit import Fit
+from identification.report.predictions import overview_figure, prediction_figure
 from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
 from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
@@ -21,6 +22,7 @@ from shipgym.plots import (
     axis,
     compact,
     graph_objects,
+    label,
     layout,
     line,
     subplots,
@@ -30,7 +32,6 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-    from identification.result import IdentificationResult
 
 Floats = NDArray[np.float64]
 
@@ -42,27 +43,32 @@ NORMAL_95 = 1.96
 SHOWN = (-1.5, 3.5)  # of an interval, by the size of the coefficient
 
 
-def all_figures(result: IdentificationResult) -> dict[str, Figure]:
-    """Every figure of a result by its name; see `IdentificationResult.plots`."""
-    fitted = [trial for trial in result.trials if trial.use == "fit"]
-    found = {"fit": fit_figure(result), "residuals": residual_figure(result)}
-    if truncated(result):
-        found["l-curve"] = l_curve_figure(result)
-    if result.searches:
-        found["search"] = search_figure(result)
-    found["coefficients"] = coefficients_figure(result)
+def all_figures(fit: Fit) -> dict[str, Figure]:
+    """Every figure of a fit by its name; see `IdentificationResult.plots`."""
+    fitted = [trial for trial in fit.trials if trial.use == "fit"]
+    found = regression_figures(fit) | {"coefficients": coefficients_figure(fit)}
     if all("psi" in trial and "delta" in trial for trial in fitted):
-        found["trials"] = overview_figure(fitted, result.predictions)
+        found["trials"] = overview_figure(fitted, fit.predictions)
     return found | {
-        f"prediction: {trial.name}": prediction_figure(trial, result.predictions[trial.name])
-        for trial in result.trials
+        f"prediction: {trial.name}": prediction_figure(trial, fit.predictions[trial.name])
+        for trial in fit.trials
         if trial.use == "validate"
     }
 
 
-def fit_figure(result: IdentificationResult) -> Figure:
+def regression_figures(fit: Fit) -> dict[str, Figure]:
+    """Figures of the regression by name; "l-curve" and "search" only where a method has one."""
+    found = {"fit": fit_figure(fit), "residuals": residual_figure(fit)}
+    if truncated(fit):
+        found["l-curve"] = l_curve_figure(fit)
+    if fit.searches:
+        found["search"] = search_figure(fit)
+    return found
+
+
+def fit_figure(fit: Fit) -> Figure:
     """Mean acceleration over each window, as the trials have it and as the regression explains it."""
-    samples, equations = result.samples, list(result.machines)
+    samples, equations = fit.samples, list(fit.estimators)
     figure = subplots(
         len(equations), 2, column_widths=[0.7, 0.3], horizontal_spacing=0.1,
         vertical_spacing=0.24 / len(equations),
@@ -71,39 +77,39 @@ def fit_figure(result: IdentificationResult) -> Figure:
     breaks = np.flatnonzero(np.diff(samples.trial[drawn])) + 1
     for row, q in enumerate(equations, start=1):
         factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
-        seen = (samples.targets[q] * factor)[drawn]
-        told = (result.machines[q].predict(samples.features[q]) * factor)[drawn]
+        measured = (samples.targets[q] * factor)[drawn]
+        explained = (fit.estimators[q].predict(samples.features[q]) * factor)[drawn]
         for values, name, colour, width in (
-            (seen, "trials", MEASURED, 1.2),
-            (told, "regression", MODEL, 1.7),
+            (measured, "trials", MEASURED, 1.2),
+            (explained, "regression", MODEL, 1.7),
         ):
-            course = np.insert(values, breaks, np.nan)  # a gap between trials
+            drawn_values = np.insert(values, breaks, np.nan)  # a gap between trials
             figure.add_trace(
-                line(np.arange(len(course)), course, name, colour, width, showlegend=row == 1), row=row, col=1
+                line(np.arange(len(drawn_values)), drawn_values, name, colour, width, showlegend=row == 1),
+                row=row,
+                col=1,
             )
         figure.add_trace(
             graph_objects().Scatter(
-                x=compact(told), y=compact(seen), mode="markers", showlegend=False,
+                x=compact(explained), y=compact(measured), mode="markers", showlegend=False,
                 marker={"color": translucent(MODEL, 0.35), "size": 4}, hoverinfo="skip",
             ), row=row, col=2,
         )  # fmt: skip
-        ends = [min(seen.min(), told.min()), max(seen.max(), told.max())]
+        ends = [min(measured.min(), explained.min()), max(measured.max(), explained.max())]
         figure.add_trace(line(ends, ends, "equal", MUTED, 1.0, showlegend=False), row=row, col=2)
         last = row == len(equations)
-        figure.update_xaxes(axis("window, trial after trial" if last else ""), row=row, col=1)
-        figure.update_yaxes(axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5), row=row, col=1)
-        figure.update_xaxes(axis("regression" if last else "", nticks=4), row=row, col=2)
-        figure.update_yaxes(axis("", nticks=5), row=row, col=2)
-    height = 190 * len(equations) + 80
-    figure.update_layout(layout(height, legend=legend_above(height, 8), hovermode="closest"))
+        own_axis = axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)
+        label(figure, "window, trial after trial" if last else "", own_axis, row=row, col=1)
+        label(figure, axis("regression" if last else "", nticks=4), axis(nticks=5), row=row, col=2)
+    figure.update_layout(layout(190 * len(equations) + 80, hovermode="closest"))
     return figure
 
 
-def residual_figure(result: IdentificationResult) -> Figure:
+def residual_figure(fit: Fit) -> Figure:
     """Autocorrelation of the residuals and their cross-correlation with the rudder, with 95 % bounds."""
-    errors, equations = residuals(result.machines, result.samples), list(result.machines)
-    rows = without_overlap(result.samples)
-    rudder = rudder_at_windows(result)
+    errors, equations = residuals(fit.estimators, fit.samples), list(fit.estimators)
+    rows = without_overlap(fit.samples)
+    rudder = rudder_at_windows(fit)
     figure = subplots(
         len(equations), 2, horizontal_spacing=0.1, vertical_spacing=0.24 / len(equations),
         titles=["with themselves", "with the rudder" if rudder is not None else ""],
@@ -111,11 +117,11 @@ def residual_figure(result: IdentificationResult) -> Figure:
     bound = NORMAL_95 / np.sqrt(len(rows))
     for row, q in enumerate(equations, start=1):
         own = autocorrelation(errors[q][rows], LAGS)
-        courses: list[tuple[NDArray[Any], Any]] = [(np.arange(1, len(own) + 1), own)]
+        correlations: list[tuple[NDArray[Any], Any]] = [(np.arange(1, len(own) + 1), own)]
         if rudder is not None:
             lags = np.arange(-LAGS, LAGS + 1)
-            courses.append((lags, cross_correlation(errors[q][rows], rudder[rows], lags)))
-        for column, (lags, values) in enumerate(courses, start=1):
+            correlations.append((lags, cross_correlation(errors[q][rows], rudder[rows], lags)))
+        for column, (lags, values) in enumerate(correlations, start=1):
             place = {"row": row, "col": column}
             figure.add_trace(_bars(lags, values), **place)
             for side in (-bound, bound):
@@ -125,17 +131,11 @@ def residual_figure(result: IdentificationResult) -> Figure:
                     line(ends, [side, side], "95 % bounds of white noise", LIMIT, 1.2, line_dash="dash",
                          showlegend=legend), **place,
                 )  # fmt: skip
-            figure.update_xaxes(axis("lag, windows" if row == len(equations) else ""), **place)
-            largest = max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound)
-            figure.update_yaxes(
-                axis(EQUATIONS[q] if column == 1 else "", range=[-min(largest, 1.05), min(largest, 1.05)]),
-                **place,
-            )
+            largest = min(max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05)
+            own_axis = axis(EQUATIONS[q] if column == 1 else "", range=[-largest, largest])
+            label(figure, "lag, windows" if row == len(equations) else "", own_axis, **place)
     height = 170 * len(equations) + 100
-    figure.update_layout(
-        layout(height, margin={"l": 62, "r": 18, "t": 66, "b": 44}, legend=legend_above(height),
-               hovermode="closest", bargap=0.5)
-    )  # fmt: skip
+    figure.update_layout(layout(height, titled=True, hovermode="closest", bargap=0.5))
     return figure
 
 
@@ -146,10 +146,10 @@ def _bars(lags: NDArray[Any], values: Any) -> Any:
     )  # fmt: skip
 
 
-def rudder_at_windows(result: IdentificationResult) -> Floats | None:
+def rudder_at_windows(fit: Fit) -> Floats | None:
     """Rudder in the middle of each row's window, rad; None where a trial has none."""
-    samples = result.samples
-    used = [trial for trial in result.trials if trial.use == "fit"]
+    samples = fit.samples
+    used = [trial for trial in fit.trials if trial.use == "fit"]
     if not all("delta" in trial for trial in used):
         return None
     middle, angles = samples.start + 0.5 * samples.duration, np.empty(len(samples))
@@ -159,23 +159,24 @@ def rudder_at_windows(result: IdentificationResult) -> Floats | None:
     return angles
 
 
-def truncated(result: IdentificationResult) -> dict[str, TruncatedLSSVM]:
-    """The machines, by equation, that chose or were given a rank."""
+def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
+    """The estimators, by equation, that chose or were given a rank."""
     return {
-        q: machine
-        for q, machine in result.machines.items()
-        if isinstance(machine, TruncatedLSSVM) and (machine.selection != "full" or machine.rank is not None)
+        q: estimator
+        for q, estimator in fit.estimators.items()
+        if isinstance(estimator, TruncatedLSSVM)
+        and (estimator.selection != "full" or estimator.rank is not None)
     }
 
 
-def l_curve_figure(result: IdentificationResult) -> Figure:
+def l_curve_figure(fit: Fit) -> Figure:
     """Size of residuals and of solution for every rank, one panel for each equation."""
-    curves = truncated(result)
+    curves = truncated(fit)
     titles = [f"{EQUATIONS[q]}: rank {m.rank_} of {len(m.l_curve_.residual_norm)}" for q, m in curves.items()]
     figure = subplots(1, len(curves), titles=titles, horizontal_spacing=0.09)
     go = graph_objects()
-    for column, machine in enumerate(curves.values(), start=1):
-        curve, rank = machine.l_curve_, machine.rank_
+    for column, estimator in enumerate(curves.values(), start=1):
+        curve, rank = estimator.l_curve_, estimator.rank_
         ranks = [str(k) for k in range(1, len(curve.residual_norm) + 1)]
         place = {"row": 1, "col": column}
         x, y = compact(curve.residual_norm), compact(curve.solution_norm)
@@ -193,10 +194,9 @@ def l_curve_figure(result: IdentificationResult) -> Figure:
                 marker={"color": LIMIT, "size": 9}, hoverinfo="skip", cliponaxis=False,
             ), **place,
         )  # fmt: skip
-        figure.update_xaxes(_logarithmic("norm of the residuals", x), **place)
-        figure.update_yaxes(_logarithmic("norm of the solution" if column == 1 else "", y), **place)
-    margin = {"l": 70, "r": 18, "t": 76, "b": 48}
-    figure.update_layout(layout(360, margin=margin, legend=legend_above(360), hovermode="closest"))
+        solution_axis = _logarithmic("norm of the solution" if column == 1 else "", y)
+        label(figure, _logarithmic("norm of the residuals", x), solution_axis, **place)
+    figure.update_layout(layout(360, titled=True, left=70, hovermode="closest"))
     return figure
 
 
@@ -206,11 +206,11 @@ def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
     return axis(title, type="log", dtick="D2" if few else 1, tickformat="~g")
 
 
-def search_figure(result: IdentificationResult) -> Figure:
+def search_figure(fit: Fit) -> Figure:
     """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
-    searches = {EQUATIONS.get(q, q): search for q, search in result.searches.items()}
+    searches = {EQUATIONS.get(q, q): search for q, search in fit.searches.items()}
     logarithmic = all(search.variable == LOG_C for search in searches.values())
-    titles = ["best objective, by its last", "best C" if logarithmic else f"best {BAND}"]
+    titles = ["best objective, relative to the final one", "best C" if logarithmic else f"best {BAND}"]
     figure = subplots(1, 2, titles=titles, horizontal_spacing=0.1)
     common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
     for k, ((name, search), colour) in enumerate(zip(searches.items(), PALETTE, strict=False)):
@@ -220,22 +220,19 @@ def search_figure(result: IdentificationResult) -> Figure:
         if k == 0 or not common:
             figure.add_trace(line(rounds, objective, name, colour, showlegend=False), row=1, col=1)
         figure.add_trace(line(rounds, best, name, colour), row=1, col=2)
-    for column in (1, 2):
-        figure.update_xaxes(axis("round", rangemode="tozero"), row=1, col=column)
-    figure.update_yaxes(axis(""), row=1, col=1)
     decades = {"type": "log", "tickformat": ".0e"} if logarithmic else {"range": [0.0, 1.0]}
-    figure.update_yaxes(axis("", **decades), row=1, col=2)
-    margin = {"l": 62, "r": 18, "t": 76, "b": 48}
-    figure.update_layout(layout(340, margin=margin, legend=legend_above(340), hovermode="closest"))
+    for column, own_axis in enumerate((axis(), axis(**decades)), start=1):
+        label(figure, axis("round", rangemode="tozero"), own_axis, row=1, col=column)
+    figure.update_layout(layout(340, titled=True, hovermode="closest"))
     return figure
 
 
-def coefficients_figure(result: IdentificationResult) -> Figure:
-    """95 % interval of each coefficient by its size: those that reach 0 are not told from it."""
+def coefficients_figure(fit: Fit) -> Figure:
+    """95 % interval of each coefficient by its size; one that reaches 0 is not significant."""
     go = graph_objects()
-    names = list(result.coefficients)
-    values = np.array(list(result.coefficients.values()))
-    errors = np.array(list(result.standard_errors.values()))
+    names = list(fit.coefficients)
+    values = np.array(list(fit.coefficients.values()))
+    errors = np.array(list(fit.standard_errors.values()))
     size = np.where(values == 0.0, 1.0, np.abs(values))
     half = NORMAL_95 * np.nan_to_num(errors) / size
     columns = 1 if len(names) < 12 else 2
@@ -243,7 +240,7 @@ def coefficients_figure(result: IdentificationResult) -> Figure:
     figure = subplots(1, columns, horizontal_spacing=0.16)
     for column in range(columns):
         part = slice(column * rows, (column + 1) * rows)
-        for sure, name, colour in ((True, "told from 0", MODEL), (False, "not told from 0", "#b3bcc7")):
+        for sure, name, colour in ((True, "significant", MODEL), (False, "not significant", "#b3bcc7")):
             own = np.flatnonzero(((half < 1.0) & (values != 0.0))[part] == sure)
             centre = np.sign(values[part][own]) ** 2
             low, high = (np.clip(centre + side * half[part][own], *SHOWN) for side in (-1.0, 1.0))
@@ -259,15 +256,10 @@ def coefficients_figure(result: IdentificationResult) -> Figure:
                 ), row=1, col=column + 1,
             )  # fmt: skip
         shown = names[part]
-        figure.update_xaxes(
-            axis("per cent of the estimate", range=[-130, 330], zeroline=True, zerolinecolor=LIMIT),
-            row=1, col=column + 1,
-        )  # fmt: skip
-        figure.update_yaxes(
-            axis("", tickvals=list(range(len(shown))), ticktext=shown, range=[rows - 0.5, -0.5]),
-            row=1, col=column + 1,
-        )  # fmt: skip
-    height = 20 * rows + 110
-    margin = {"l": 84, "r": 18, "t": 40, "b": 48}
-    figure.update_layout(layout(height, margin=margin, legend=legend_above(height, 8), hovermode="closest"))
+        estimate_axis = axis(
+            "per cent of the estimate", range=[-130, 330], zeroline=True, zerolinecolor=LIMIT
+        )
+        names_axis = axis(tickvals=list(range(len(shown))), ticktext=shown, range=[rows - 0.5, -0.5])
+        label(figure, estimate_axis, names_axis, row=1, col=column + 1)
+    figure.update_layout(layout(20 * rows + 110, left=84, hovermode="closest"))
     return figure

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from shipgym.plots import AXES, MEASURED, MODEL, axis, layout, line, subplots
+from shipgym.plots import AXES, MEASURED, MODEL, axis, label, layout, line, subplots
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
@@ -38,13 +38,8 @@ def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | N
             figure.add_trace(
                 line(prediction.t, values, "heading change, model", MODEL, 1.9, showlegend=first), **place
             )
-        figure.update_xaxes(axis("time, s" if place["row"] == rows else ""), **place)
-        figure.update_yaxes(axis("deg" if place["col"] == 1 else ""), **place)
-    figure.update_layout(
-        layout(
-            230 * rows + 80, margin={"l": 62, "r": 18, "t": 60, "b": 44}, legend=legend_above(230 * rows + 80)
-        )
-    )
+        label(figure, "time, s" if place["row"] == rows else "", "deg" if place["col"] == 1 else "", **place)
+    figure.update_layout(layout(230 * rows + 80, titled=True))
     return figure
 
 
@@ -65,11 +60,11 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
                 line(predicted.t, factor * predicted[channel], "predicted", MODEL, 2.0, showlegend=k == 0),
                 **place,
             )
-        figure.update_xaxes(axis("time, s" if k > 2 else ""), **place)
-        figure.update_yaxes(axis(title if channel != "delta" else "rudder (given), deg"), **place)
+        title = title if channel != "delta" else "rudder (given), deg"
+        label(figure, "time, s" if k > 2 else "", title, **place)
     if "x" in measured.channels and "y" in measured.channels:
         _add_paths(figure, measured, predicted)
-    figure.update_layout(layout(600, legend=legend_above(600, 8), hovermode="closest"))
+    figure.update_layout(layout(600, hovermode="closest"))
     return figure
 
 
@@ -89,20 +84,6 @@ def _add_paths(figure: Figure, measured: Trial, predicted: Trial | None) -> None
             figure.add_trace(line(x, y, name, colour, width, showlegend=False), **place)
     ahead_axis, aside_axis = "along the first course, m", "to starboard, m"
     if measured.kind == "turning-circle":
-        figure.update_xaxes(axis(aside_axis), **place)
-        figure.update_yaxes(axis(ahead_axis, scaleanchor="x6", scaleratio=1), **place)
+        label(figure, aside_axis, axis(ahead_axis, scaleanchor="x6", scaleratio=1), **place)
     else:
-        figure.update_xaxes(axis(ahead_axis), **place)
-        figure.update_yaxes(axis(aside_axis, autorange="reversed"), **place)
-
-
-def legend_above(height: int, lift: int = 26) -> dict[str, Any]:
-    """A legend above the titles of the panels."""
-    plot_height = height - 120
-    return {
-        "orientation": "h",
-        "x": 0.0,
-        "y": 1.0 + lift / plot_height,
-        "yanchor": "bottom",
-        "font": {"size": 12},
-    }
+        label(figure, ahead_axis, axis(aside_axis, autorange="reversed"), **place)

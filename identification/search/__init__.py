@@ -1,12 +1,19 @@
-"""Search for settings: optimisers behind one signature, what they minimise, and their machine."""
+"""Search for settings: optimisers behind one signature, by name."""
 
-from identification.estimators.tuned import TunedLSSVM
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from numpy.typing import ArrayLike
+
 from identification.search.bee_colony import ArtificialBeeColony
 from identification.search.differential_evolution import DifferentialEvolution
 from identification.search.grid_search import GridSearch
-from identification.search.optimisers import OPTIMISERS, get_optimiser, minimise
 from identification.search.particle_swarm import ParticleSwarm
-from identification.search.search import Optimiser, SearchResult
+from identification.search.search import Objective, Optimiser, SearchResult
+from shipgym.checks import check_choice
+from shipgym.errors import InputError
 
 __all__ = [
     "OPTIMISERS",
@@ -16,7 +23,50 @@ __all__ = [
     "Optimiser",
     "ParticleSwarm",
     "SearchResult",
-    "TunedLSSVM",
     "get_optimiser",
     "minimise",
 ]
+
+OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
+    "abc": ArtificialBeeColony,
+    "pso": ParticleSwarm,
+    "grid": GridSearch,
+    "de": DifferentialEvolution,
+}
+
+
+def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
+    """An optimiser by name with its usual settings, as a table `{"name": "abc", "rounds": 60}`, or as given.
+
+    Raises
+    ------
+    InputError
+        For a name or a setting that is not known.
+    """
+    if hasattr(optimiser, "minimise"):
+        return optimiser
+    settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
+    name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
+    try:
+        return OPTIMISERS[name](**settings)
+    except TypeError as error:
+        raise InputError(f"optimiser: {', '.join(settings)} found for {name!r}: {error}") from None
+
+
+def minimise(
+    objective: Objective, bounds: ArrayLike, seed: int = 0, optimiser: str | Optimiser = "abc"
+) -> SearchResult:
+    """Minimise an objective within a box by any optimiser.
+
+    Parameters
+    ----------
+    objective : callable
+        Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
+    bounds : array-like of shape (n_dimensions, 2)
+        Lower and upper bound of each dimension.
+    seed : int
+        The same seed gives the same search.
+    optimiser : {"abc", "pso", "grid", "de"} or Optimiser
+        By name with its usual settings, or one with your own.
+    """
+    return get_optimiser(optimiser).minimise(objective, bounds, seed)

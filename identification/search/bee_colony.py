@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds, check_count
+from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from shipgym.checks import check_whole
 
 Floats = NDArray[np.float64]
 
@@ -18,7 +19,7 @@ class ArtificialBeeColony:
 
     Employed bees move each food source along one dimension towards or away from another; onlookers do the
     same to sources drawn by their fitness; a source that did not improve for too long is left and
-    drawn anew. All bees of a stage fly at once, from the same sources, so that the objective is
+    drawn anew. All bees of a stage move at once, from the same sources, so that the objective is
     evaluated for a batch of candidates; of several onlookers at one source the best counts.
 
     Parameters
@@ -37,9 +38,9 @@ class ArtificialBeeColony:
 
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise; see `Optimiser.minimise`."""
-        n = check_count(self.sources, 2, "sources")
-        check_count(self.rounds, 1, "rounds")
-        check_count(self.limit, 1, "limit")
+        n = check_whole(self.sources, "sources", at_least=2)
+        check_whole(self.rounds, "rounds", at_least=1)
+        check_whole(self.limit, "limit", at_least=1)
         low, high = check_bounds(bounds)
         rng = np.random.default_rng(seed)
         record = Recorder(objective)
@@ -47,11 +48,11 @@ class ArtificialBeeColony:
         values = record(sources)
         record.end_round()
         idle = np.zeros(n, dtype=np.int64)
-        everyone = np.arange(n)
+        all_sources = np.arange(n)
         for _ in range(self.rounds):
             for bees in ("employed", "onlookers"):
                 if bees == "employed":
-                    chosen = everyone
+                    chosen = all_sources
                 else:
                     chosen = np.searchsorted(_chances(values), rng.random(n), side="right")
                 moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)

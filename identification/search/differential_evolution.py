@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds, check_count
+from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from shipgym.checks import check_whole
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class DifferentialEvolution:
         """Minimise; see `Optimiser.minimise`."""
         from scipy.optimize import Bounds, differential_evolution
 
-        check_count(self.members, 5, "members")
-        check_count(self.rounds, 1, "rounds")
+        check_whole(self.members, "members", at_least=5)
+        check_whole(self.rounds, "rounds", at_least=1)
         low, high = check_bounds(bounds)
         record = Recorder(objective)
 

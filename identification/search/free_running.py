@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.estimator import FitTask
+from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
 from identification.regression.decomposition import decompose
-from identification.regression.samples import Samples
-from identification.search import TunedLSSVM, get_optimiser
+from identification.search import get_optimiser
 from identification.validation.prediction import predict
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
@@ -50,27 +51,22 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     return float(np.mean(np.minimum(errors, RAN_AWAY)))
 
 
-def fit_free_running(
-    settings: TunedLSSVM, samples: Samples, blank: ShipModel, trials: Sequence[Trial]
-) -> dict[str, TunedLSSVM]:
-    """Machines of all equations, their C chosen together by the error of simulated trials.
+def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSVM]:
+    """Estimators of all equations, their C chosen together by the error of simulated trials.
 
     Parameters
     ----------
     settings : TunedLSSVM
         Not fitted; gives optimiser, bounds, seed and scale.
-    samples : Samples
-        The regression.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those to simulate.
+    task : FitTask
+        Its trials are simulated.
 
     Returns
     -------
     dict of str to TunedLSSVM
         By equation; the variables of their common search are log10 C in the order of the equations.
     """
+    samples, blank, trials = task.samples, task.blank, task.trials
     equations = blank.table.regressed
     whitened = {
         q: decompose(samples.features[q], samples.targets[q], settings.scale, settings.fit_intercept)
@@ -90,9 +86,11 @@ def fit_free_running(
     search = optimiser.minimise(
         lambda candidates: np.array([error(x) for x in candidates]), bounds, settings.seed
     )
-    machines = {}
+    estimators = {}
     for k, q in enumerate(equations):
         own = replace(search, x=search.x[k : k + 1], course=search.course[:, k : k + 1])
-        machine = TunedLSSVM(**settings.get_params(deep=False))
-        machines[q] = machine.settle(samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own)
-    return machines
+        estimator = TunedLSSVM(**settings.get_params(deep=False))
+        estimators[q] = estimator.settle(
+            samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own
+        )
+    return estimators

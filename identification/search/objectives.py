@@ -72,10 +72,6 @@ def held_out_error(
         As of `LSSVM` and `decomposition.triangle`.
     blocks : array of shape (n_samples,)
         Index of each sample's block, 0 to n_blocks - 1.
-
-    Returns
-    -------
-    ErrorOfC
     """
     rows = [blocks == k for k in range(int(blocks.max()) + 1)]
     parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]
@@ -92,14 +88,14 @@ def held_out_error(
 
 
 def _errors(
-    fits: Sequence[Decomposition], judged: Sequence[Floats], n_samples: int, fit_intercept: bool
+    fits: Sequence[Decomposition], triangles: Sequence[Floats], n_samples: int, fit_intercept: bool
 ) -> ErrorOfC:
     """Errors of fits on the samples of which the triangles are given."""
     first = int(fit_intercept)
-    rows, n_features = len(judged[0]), len(judged[0]) - 1 - first
+    rows, n_features = len(triangles[0]), len(triangles[0]) - 1 - first
     offset = np.empty((len(fits), 1, rows))
     gain, squares = np.zeros((len(fits), n_features, rows)), np.zeros((len(fits), 1, n_features))
-    for k, (fit, R) in enumerate(zip(fits, judged, strict=True)):
+    for k, (fit, R) in enumerate(zip(fits, triangles, strict=True)):
         features, target = R[:, first:-1], R[:, -1]
         if fit_intercept:
             features = features - R[:, :1] * fit.centre

@@ -61,10 +61,6 @@ class Optimiser(Protocol):
             Lower and upper bound of each dimension.
         seed : int
             The same seed gives the same search.
-
-        Returns
-        -------
-        SearchResult
         """
         ...
 
@@ -139,10 +135,3 @@ def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     if not np.all(np.isfinite(box)) or not np.all(box[:, 0] < box[:, 1]):
         raise InputError(f"bounds: {box.tolist()} found, expected finite numbers, the lower one first")
     return box[:, 0], box[:, 1]
-
-
-def check_count(value: int, least: int, argument: str) -> int:
-    """Return a count of an optimiser's settings."""
-    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-        raise InputError(f"{argument}: {value!r} found, expected an integer of at least {least}")
-    return int(value)

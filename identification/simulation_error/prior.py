@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.estimators.methods import FitTask, Machines, Method
+from identification.estimators.methods import Method
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
@@ -41,7 +41,7 @@ BLOCKS = 5  # of time, into which a single trial is cut
 #: Virtual trials of a reference ship: rudder and heading of zigzags, rudder of turns, degrees.
 ZIGZAGS = ((10.0, 10.0, False), (20.0, 20.0, True), (35.0, 20.0, False))
 TURNS = (35.0, -35.0, 15.0, -15.0)
-LONG, STEP = 20.0, 0.05  # ship lengths at service speed
+DURATION_LENGTHS, STEP_LENGTHS = 20.0, 0.05  # of the virtual trials, ship lengths at service speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,10 +88,6 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         A model, its name or file; "auto" for the shipped one most like the target.
     blank : ShipModel
         The target but for its coefficients.
-
-    Returns
-    -------
-    Prior
 
     Raises
     ------
@@ -143,7 +139,7 @@ def virtual_trials(model: ShipModel) -> list[Trial]:
         With the channel n.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
-    timing = {"duration": LONG * travel, "dt": STEP * travel}
+    timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
     runs = [zigzag(model, min(rudder, limit), heading, port, **timing) for rudder, heading, port in ZIGZAGS]
     runs += [turning_circle(model, float(np.clip(rudder, -limit, limit)), **timing) for rudder in TURNS]
@@ -175,10 +171,6 @@ def with_prior(
     folds : {"trials", "largest-rudder"}
         What the strength is chosen by (`choose_strength`).
 
-    Returns
-    -------
-    Method
-
     Raises
     ------
     InputError
@@ -208,9 +200,9 @@ def _fit(
     prior: Prior,
     strength: float | None,
     folds: str,
-    make: Callable[[], Machine],
+    make: Callable[[], Estimator],
     task: FitTask,
-) -> Machines:
+) -> Estimators:
     report: dict[str, Any] = {"prior_source": prior.name}
     if strength is None:
         strength, scores = choose_strength(make, method, prior, task, folds)
@@ -218,33 +210,33 @@ def _fit(
         best, strength = strength, _steady_strength(make, method, prior, strength, task)
         if strength > best:
             report["prior_raised_from"] = best
-    machines = fit_toward(make, method, prior, strength, task)
+    estimators = fit_toward(make, method, prior, strength, task)
     report["prior_strength"] = None if np.isinf(strength) else strength  # JSON knows no infinity
-    for machine in machines.values():
-        machine.prior_ = report  # type: ignore[attr-defined]
-    return machines
+    for estimator in estimators.values():
+        estimator.prior_ = report  # type: ignore[attr-defined]
+    return estimators
 
 
 def _steady_strength(
-    make: Callable[[], Machine], method: Method, prior: Prior, least: float, task: FitTask
+    make: Callable[[], Estimator], method: Method, prior: Prior, least: float, task: FitTask
 ) -> float:
     """The least strength, from a given one on, with which the model does not run away; that one if none."""
     for strength in STRENGTHS[STRENGTHS.index(least) :]:
-        machines = fit_toward(make, method, prior, strength, task)
-        if not reasons_unstable(with_coefficients(task.blank, machines), task.trials):
+        estimators = fit_toward(make, method, prior, strength, task)
+        if not reasons_unstable(with_coefficients(task.blank, estimators), task.trials):
             return float(strength)
     return least
 
 
 def fit_toward(
-    make: Callable[[], Machine], method: Method, prior: Prior, strength: float, task: FitTask
-) -> Machines:
-    """Machines pulled toward a prior with a given strength.
+    make: Callable[[], Estimator], method: Method, prior: Prior, strength: float, task: FitTask
+) -> Estimators:
+    """Estimators pulled toward a prior with a given strength.
 
     Parameters
     ----------
     make : callable
-        Makes an unfitted machine.
+        Makes an unfitted estimator.
     method : Method
         Fits them where there is no pull.
     prior : Prior
@@ -252,45 +244,43 @@ def fit_toward(
         From 0, which is the method as it is, to infinity, which is the prior.
     task : FitTask
         With the regression.
-
-    Returns
-    -------
-    dict of str to Machine
     """
     if strength == 0.0:
         return method.fit(make, task)
     return {q: _toward(make(), task.samples, q, prior, strength) for q in task.samples.features}
 
 
-def _toward(machine: Machine, samples: Samples, q: str, prior: Prior, strength: float) -> Machine:
+def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float) -> Estimator:
     X, centre, known = samples.features[q], prior.centre[q], prior.known[q]
     rest = samples.targets[q] - X @ centre
     if np.isinf(strength):
-        return _held(machine, X, rest, centre, known)
+        return _held(estimator, X, rest, centre, known)
     pull = strength * np.sqrt(len(X)) * float(np.mean(samples.duration)) * prior.roots[q]
-    machine.fit(np.vstack([X, pull]), np.concatenate([rest, np.zeros(len(pull))]))
-    machine.coef_ = machine.coef_ + centre
-    if hasattr(machine, "weights_"):
-        machine.weights_ = machine.weights_[: len(X)]
-    return machine
+    estimator.fit(np.vstack([X, pull]), np.concatenate([rest, np.zeros(len(pull))]))
+    estimator.coef_ = estimator.coef_ + centre
+    if hasattr(estimator, "weights_"):
+        estimator.weights_ = estimator.weights_[: len(X)]
+    return estimator
 
 
-def _held(machine: Machine, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]) -> Machine:
+def _held(
+    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]
+) -> Estimator:
     """The prior's own coefficients; those it does not tell are fitted."""
     free = np.flatnonzero(~known)
-    machine.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
+    estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
     coefficients, moment, covariance = centre.copy(), np.zeros((len(known),) * 2), np.zeros((len(known),) * 2)
     if free.size:
-        coefficients[free] = machine.coef_
-        moment[np.ix_(free, free)] = machine.inverse_moment_
-        covariance[np.ix_(free, free)] = machine.covariance_
-    machine.coef_, machine.inverse_moment_, machine.covariance_ = coefficients, moment, covariance
-    machine.n_features_in_ = len(known)  # type: ignore[attr-defined]
-    return machine
+        coefficients[free] = estimator.coef_
+        moment[np.ix_(free, free)] = estimator.inverse_moment_
+        covariance[np.ix_(free, free)] = estimator.covariance_
+    estimator.coef_, estimator.inverse_moment_, estimator.covariance_ = coefficients, moment, covariance
+    estimator.n_features_in_ = len(known)  # type: ignore[attr-defined]
+    return estimator
 
 
 def choose_strength(
-    make: Callable[[], Machine], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
+    make: Callable[[], Estimator], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
 ) -> tuple[float, dict[str, float]]:
     """The strongest pull that is as good as the best on samples held out.
 
@@ -319,8 +309,8 @@ def choose_strength(
     mean = errors.mean(axis=1)
     best = int(np.argmin(mean))
     excess = errors - errors[best]
-    spread = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
-    as_good = np.flatnonzero(excess.mean(axis=1) <= spread)
+    standard_error = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
+    as_good = np.flatnonzero(excess.mean(axis=1) <= standard_error)
     return float(STRENGTHS[int(as_good[-1])]), {
         f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)
     }
@@ -331,33 +321,22 @@ def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:
     samples = task.samples
     if folds == LARGEST_RUDDER:
         largest = of_largest_rudder(task.trials, "prior_folds")
-        fit = _rows(samples, ~largest[samples.trial])
-        yield from ((fit, _rows(samples, samples.trial == held)) for held in np.flatnonzero(largest))
+        fit = samples.select(~largest[samples.trial])
+        yield from ((fit, samples.select(samples.trial == held)) for held in np.flatnonzero(largest))
         return
     if samples.trial.max() > samples.trial.min():
         groups = samples.trial
     else:
         groups = np.minimum(np.arange(len(samples)) * BLOCKS // len(samples), BLOCKS - 1)
     for group in np.unique(groups):
-        yield _rows(samples, groups != group), _rows(samples, groups == group)
+        yield samples.select(groups != group), samples.select(groups == group)
 
 
-def _rows(samples: Samples, rows: NDArray[np.bool_]) -> Samples:
-    return replace(
-        samples,
-        features={q: X[rows] for q, X in samples.features.items()},
-        targets={q: y[rows] for q, y in samples.targets.items()},
-        start=samples.start[rows],
-        duration=samples.duration[rows],
-        trial=samples.trial[rows],
-    )
-
-
-def _error(machines: Mapping[str, Machine], held: Samples) -> float:
+def _error(estimators: Mapping[str, Estimator], held: Samples) -> float:
     """Mean over the equations of the square error by the square of the target."""
     ratios = [
-        np.mean((held.targets[q] - held.features[q] @ machine.coef_) ** 2)
+        np.mean((held.targets[q] - held.features[q] @ estimator.coef_) ** 2)
         / max(float(np.mean(held.targets[q] ** 2)), np.finfo(float).tiny)
-        for q, machine in machines.items()
+        for q, estimator in estimators.items()
     ]
     return float(np.mean(ratios))

@@ -100,8 +100,10 @@ class Refinement:
         return {name: getattr(self, name) for name in names} | {"extra_trials": extra, "anchor": anchor}
 
 
-def split_settings(settings: Mapping[str, Any]) -> tuple[Refinement, dict[str, Any]]:
-    """The settings of the refinement, and those left for the machine it starts from."""
+def split_settings(settings: Mapping[str, Any], refined: bool) -> tuple[Refinement | None, dict[str, Any]]:
+    """The settings of the refinement, None for a method without one, and those left for its estimator."""
+    if not refined:
+        return None, dict(settings)
     names = {item.name for item in fields(Refinement)}
     own = {name: value for name, value in settings.items() if name in names}
     return Refinement(**own), {name: value for name, value in settings.items() if name not in names}
@@ -169,7 +171,7 @@ def refine(
         model = problem.model(solution.parameters)
         reasons = reasons_unstable(model, trials)
         if not reasons:
-            fit = replace(start, model=model, machines=problem.machines(solution.parameters))
+            fit = replace(start, model=model, estimators=problem.estimators(solution.parameters))
             covariance, influences = problem.covariance(solution, prior, memory)
             report = settings.plain() | problem.report(solution) | {"decision": "refined", "pull": prior}
             report |= {"rejected": rejected} if rejected else {}
@@ -231,7 +233,7 @@ class _Problem:
             count += len(further)
         free, offsets = settings.segment_start == "free", settings.rudder_offsets
         self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
-        values = np.concatenate([start.machines[q].coef_ for q in blank.table.equations])
+        values = np.concatenate([start.estimators[q].coef_ for q in blank.table.equations])
         self.first = np.concatenate([values / self.sizes, np.zeros(len(trials) if offsets else 0)])
 
     def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
@@ -312,15 +314,15 @@ class _Problem:
         coefficients = dict(zip(names, values.tolist(), strict=True))
         return replace(self.start.model, coefficients=coefficients)
 
-    def machines(self, parameters: Floats) -> dict[str, Any]:
-        """Copies of the start's machines with the refined coefficients, for the diagnostics."""
-        machines, first = {}, 0
-        for q, machine in self.start.machines.items():
-            last = first + len(machine.coef_)
-            machines[q] = copy.copy(machine)
-            machines[q].coef_ = (parameters * np.resize(self.sizes, len(parameters)))[first:last]
+    def estimators(self, parameters: Floats) -> dict[str, Any]:
+        """Copies of the start's estimators with the refined coefficients, for the diagnostics."""
+        estimators, first = {}, 0
+        for q, estimator in self.start.estimators.items():
+            last = first + len(estimator.coef_)
+            estimators[q] = copy.copy(estimator)
+            estimators[q].coef_ = (parameters * np.resize(self.sizes, len(parameters)))[first:last]
             first = last
-        return machines
+        return estimators
 
     def covariance(self, solution: _Solution, prior: float, memory: float) -> tuple[Floats, list[Floats]]:
         """Sandwich covariance of the coefficients of the accelerations, and each stretch's influence.

@@ -89,10 +89,6 @@ def cut(
         Whether the second set is added.
     smooth : callable
         Of times and values: gives the state at the start of a segment.
-
-    Returns
-    -------
-    list of Segment
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     segments = []

@@ -21,7 +21,7 @@ AUTO = "auto"
 #: Rudder area by length and draught of ships whose particulars lack it: Mei 2019, Table 4.
 RUDDER_SHARE = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
 #: Correlations so close are those of one hull: the ship nearest in length is taken.
-ALIKE = 0.01
+CORRELATION_TOLERANCE = 0.01
 
 
 def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
@@ -127,9 +127,9 @@ def select_reference(
     vectors = {name: similarity_vector(_known(name, ship), printed) for name, ship in usable.items()}
     found = correlations(similarity_vector(particulars, printed), vectors)
     best = max(found.values())
-    alike = [name for name, value in found.items() if value > best - ALIKE]
-    lengths = {name: usable[name].particulars.length / particulars.length for name in alike}
-    return min(alike, key=lambda name: (abs(np.log(lengths[name])), -found[name])), found
+    closest = [name for name, value in found.items() if value > best - CORRELATION_TOLERANCE]
+    lengths = {name: usable[name].particulars.length / particulars.length for name in closest}
+    return min(closest, key=lambda name: (abs(np.log(lengths[name])), -found[name])), found
 
 
 def _fits(ship: ShipModel, channels: Collection[str]) -> bool:

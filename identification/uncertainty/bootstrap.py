@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import on_one_thread
 from identification.regression.samples import Samples
@@ -49,16 +49,16 @@ def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random
 
 @on_one_thread
 def bootstrap_covariance(
-    machines: Mapping[str, Machine], samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
+    estimators: Mapping[str, Estimator], samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
 ) -> Floats:
     """Covariance of the coefficients of all equations by a block bootstrap over time.
 
-    Machines that choose their rank or regularisation keep what they chose. LS-SVMs are fitted again, other
-    linear machines take the linear step that the drawn residuals give.
+    Estimators that choose their rank or regularisation keep what they chose. LS-SVMs are fitted again, other
+    linear estimators take the linear step that the drawn residuals give.
 
     Parameters
     ----------
-    machines : mapping of str to Machine
+    estimators : mapping of str to Estimator
         Fitted to `samples`, by equation.
     samples : Samples
         The regression.
@@ -77,11 +77,11 @@ def bootstrap_covariance(
     rng = np.random.default_rng(seed)
     groups = [np.flatnonzero(samples.trial == trial) for trial in np.unique(samples.trial)]
     lengths = [_rows_in(memory, samples.start[rows]) for rows in groups]
-    errors = residuals(machines, samples)
+    errors = residuals(estimators, samples)
     found = []
     for _ in range(draws):
         rows = moving_blocks(groups, lengths, rng)
-        found.append(np.concatenate([_again(machines[q], samples, q, rows, errors[q]) for q in machines]))
+        found.append(np.concatenate([_again(estimators[q], samples, q, rows, errors[q]) for q in estimators]))
     return np.asarray(np.cov(np.array(found).T))
 
 
@@ -118,12 +118,12 @@ def _rows_in(memory: float, start: Floats) -> int:
     return max(round(memory / spacing), 1) if spacing > 0.0 else 1
 
 
-def _again(machine: Machine, samples: Samples, equation: str, rows: Rows, errors: Floats) -> Floats:
+def _again(estimator: Estimator, samples: Samples, equation: str, rows: Rows, errors: Floats) -> Floats:
     """Coefficients from the drawn rows."""
     features, targets = samples.features[equation], samples.targets[equation]
-    if isinstance(machine, TruncatedLSSVM | LSSVM) and not hasattr(machine, "search_"):
-        refit = clone(machine)
-        if isinstance(machine, TruncatedLSSVM):
-            refit.set_params(rank=machine.rank_)
+    if isinstance(estimator, TruncatedLSSVM | LSSVM) and not hasattr(estimator, "search_"):
+        refit = clone(estimator)
+        if isinstance(estimator, TruncatedLSSVM):
+            refit.set_params(rank=estimator.rank_)
         return np.asarray(refit.fit(features[rows], targets[rows]).coef_)
-    return np.asarray(machine.coef_ + machine.inverse_moment_ @ (features[rows].T @ errors[rows]))
+    return np.asarray(estimator.coef_ + estimator.inverse_moment_ @ (features[rows].T @ errors[rows]))

@@ -7,33 +7,33 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Machine, weights
+from identification.estimators.estimator import Estimator, weights
 from identification.estimators.threads import on_one_thread
 from identification.regression.samples import Samples
 
 Floats = NDArray[np.float64]
-Machines = Mapping[str, Machine]
+Estimators = Mapping[str, Estimator]
 
 
-def residuals(machines: Machines, samples: Samples) -> dict[str, Floats]:
+def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
     """Target less prediction of each equation, arrays of shape (n_rows,)."""
-    return {q: samples.targets[q] - machines[q].predict(samples.features[q]) for q in machines}
+    return {q: samples.targets[q] - estimators[q].predict(samples.features[q]) for q in estimators}
 
 
 @on_one_thread
-def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) -> Floats:
+def joint_covariance(estimators: Estimators, samples: Samples, memory: float = 0.0) -> Floats:
     """Covariance of the coefficients of all equations, residuals correlated across equations and in time.
 
     With the coefficients of each equation a linear map of its targets, the covariance follows from that
     of the residuals. Without memory they are independent in time (classical formula, with the
     covariance of the residuals between equations); with memory it is estimated as by Newey & West
     1987 (Econometrica 55(3)) with Bartlett's weights, each trial by itself. Exact features are assumed.
-    Of a machine that weights its samples it is the residuals times their weights that count (Huber's
+    Of an estimator that weights its samples it is the residuals times their weights that count (Huber's
     sandwich).
 
     Parameters
     ----------
-    machines : mapping of str to Machine
+    estimators : mapping of str to Estimator
         Fitted to `samples` without intercept, by equation.
     samples : Samples
         The regression.
@@ -46,22 +46,22 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
         In the order of the equations and their features.
     """
     errors = {
-        q: error * weights(machines[q], samples.features[q])
-        for q, error in residuals(machines, samples).items()
+        q: error * weights(estimators[q], samples.features[q])
+        for q, error in residuals(estimators, samples).items()
     }
-    freedom = {q: effective_freedom(machines[q], samples.features[q]) for q in machines}
-    maps = {q: samples.features[q] @ machines[q].inverse_moment_ for q in machines}
+    freedom = {q: effective_freedom(estimators[q], samples.features[q]) for q in estimators}
+    maps = {q: samples.features[q] @ estimators[q].inverse_moment_ for q in estimators}
     if memory <= 0.0:
         blocks = [
             [
                 (errors[p] @ errors[q]) / np.sqrt(freedom[p] * freedom[q]) * (maps[p].T @ maps[q])
-                for q in machines
+                for q in estimators
             ]
-            for p in machines
+            for p in estimators
         ]
         return np.block(blocks)
     scores = np.hstack(
-        [maps[q] * (errors[q] * np.sqrt(len(samples) / freedom[q]))[:, None] for q in machines]
+        [maps[q] * (errors[q] * np.sqrt(len(samples) / freedom[q]))[:, None] for q in estimators]
     )
     total = np.zeros((scores.shape[1],) * 2)
     for trial in np.unique(samples.trial):
@@ -71,10 +71,10 @@ def joint_covariance(machines: Machines, samples: Samples, memory: float = 0.0) 
     return 0.5 * (total + total.T)
 
 
-def effective_freedom(machine: Machine, features: Floats) -> float:
+def effective_freedom(estimator: Estimator, features: Floats) -> float:
     """Samples less effective number of parameters, at least 1."""
-    moment = features.T @ (features * weights(machine, features)[:, None])
-    used = float(np.einsum("ij,ji->", machine.inverse_moment_, moment))
+    moment = features.T @ (features * weights(estimator, features)[:, None])
+    used = float(np.einsum("ij,ji->", estimator.inverse_moment_, moment))
     return max(len(features) - used, 1.0)
 
 

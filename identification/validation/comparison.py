@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,17 @@ import numpy as np
 
 from identification.estimators.methods import METHODS, Method, get_method
 from identification.pipeline import identify
+from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.cross_validation import cross_validate
 from identification.validation.prediction import COMPARED
+from identification.validation.ranking import Ranking, Standing
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json, write_text
 from shipgym.ships.grey_boxes import GREY_BOX
+from shipgym.trials.identify_table import OPTIONS
 from shipgym.trials.trial import Trial
-from shipgym.whole_file import write_text
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "output-error")
@@ -28,75 +29,8 @@ USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "out
 COMPARISON_FILES = ("comparison.json", "comparison.html", *(f"model-{name}.json" for name in METHODS))
 
 
-@dataclass(frozen=True)
-class Standing:
-    """How well a method predicts the trials held out.
-
-    Attributes
-    ----------
-    method : str
-        Its name.
-    stable : bool
-        Whether its model passed the guard.
-    ran_away : int
-        Trials held out on which its simulation ran away.
-    error : float or None
-        Root mean square error of the simulated u, v, r and psi by the standard deviation of what was
-        measured, mean over channels and trials: 0 for perfect, 1 for no better than a constant. None where
-        one ran away.
-    heading_deg, yaw_rate_deg_s : float or None
-        Root mean square error, mean over the trials on which it did not run away.
-    errors : dict of str to float or None
-        `error` of each trial.
-    """
-
-    method: str
-    stable: bool
-    ran_away: int
-    error: float | None
-    heading_deg: float | None
-    yaw_rate_deg_s: float | None
-    errors: dict[str, float | None]
-
-
-@dataclass(frozen=True, eq=False)
-class Comparison:
-    """Methods on the same trials, ranked.
-
-    Attributes
-    ----------
-    standings : tuple of Standing
-        The best first: those that run away on fewest trials, and among them the smallest error.
-    results : dict of str to IdentificationResult
-        By method, identified from all trials to fit.
-    refused : dict of str to str
-        Why a method could not be fitted.
-    left_out : dict of str to tuple of str
-        Settings that a method does not know and was not given.
-    in_turn : bool
-        Whether no trial was marked `validate`, so that each trial to fit was held out in turn.
-    """
-
-    standings: tuple[Standing, ...]
-    results: dict[str, IdentificationResult]
-    refused: dict[str, str]
-    left_out: dict[str, tuple[str, ...]]
-    in_turn: bool
-
-    @property
-    def best(self) -> IdentificationResult:
-        """What the first of the ranking identified."""
-        return self.results[self.standings[0].method]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain values, ready for JSON."""
-        return {
-            "held_out": "each trial in turn" if self.in_turn else "trials marked validate",
-            "ranking": [asdict(standing) for standing in self.standings],
-            "refused": self.refused,
-            "settings_left_out": {name: list(left) for name, left in self.left_out.items()},
-            "settings": next(iter(self.results.values())).settings | {"method": list(self.results)},
-        }
+class Comparison(Ranking):
+    """Methods on the same trials, ranked; `Ranking` lists its attributes."""
 
     def save(self, folder: str | Path) -> None:
         """Write `comparison.json`, `comparison.html` and each method's `model-METHOD.json`.
@@ -106,8 +40,6 @@ class Comparison:
         InputError
             If plotly is not installed.
         """
-        from identification.report.comparison import comparison_page
-
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         written = comparison_page(self)
@@ -118,7 +50,7 @@ class Comparison:
 
 
 def compare_methods(
-    trials: Sequence[Trial], methods: Sequence[str] | None = None, **arguments: Any
+    trials: Sequence[Trial], methods: Sequence[Any] | None = None, **arguments: Any
 ) -> Comparison:
     """Identify by several methods and rank them on trials held out.
 
@@ -129,14 +61,10 @@ def compare_methods(
     ----------
     trials : sequence of Trial
         As for `identify`.
-    methods : sequence of str, optional
-        By default `USUAL`, and `rm-svm` for a grey box.
+    methods : sequence of str or estimator, optional
+        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box.
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not know.
-
-    Returns
-    -------
-    Comparison
 
     Raises
     ------
@@ -145,7 +73,8 @@ def compare_methods(
         where no method can be fitted.
     """
     names = list(methods) if methods is not None else _usual(arguments.get("structure"))
-    chosen = {name: get_method(name) for name in names}
+    given = {get_method(method).name: method for method in names}
+    chosen = {name: get_method(method) for name, method in given.items()}
     if not chosen:
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
     held = {trial.name for trial in trials if trial.use == "validate"} | _named(arguments)
@@ -162,8 +91,8 @@ def compare_methods(
     for name in chosen:
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
         try:
-            result = identify(trials, method=name, **own)
-            seen[name] = _in_turn(fitted, name, own) if not held else _seen(result)
+            result = identify(trials, method=given[name], **own)
+            seen[name] = _in_turn(fitted, given[name], own) if not held else _seen(result)
             results[name] = result
         except InputError as error:
             refused[name] = str(error)
@@ -186,8 +115,7 @@ def _usual(structure: str | None) -> list[str]:
 
 def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Settings that each method does not know, which some other one does."""
-    own = inspect.signature(identify).parameters
-    settings = [name for name in arguments if name not in own]
+    settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
 
     def known(method: Method, setting: str) -> bool:
@@ -207,7 +135,7 @@ def _seen(result: IdentificationResult) -> dict[str, Any]:
     return {name: m for name, m in result.metrics["trials"].items() if m["use"] == "validate"}
 
 
-def _in_turn(trials: Sequence[Trial], method: str, arguments: Mapping[str, Any]) -> dict[str, Any]:
+def _in_turn(trials: Sequence[Trial], method: Any, arguments: Mapping[str, Any]) -> dict[str, Any]:
     """Metrics of each trial, predicted by a model identified from the others."""
     own = {key: value for key, value in arguments.items() if key not in ("hold_out", "uncertainty")}
     return cross_validate(trials, method=method, **own)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimators.estimator import Machine
+from identification.estimators.estimator import Estimator
 from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
@@ -152,13 +152,13 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
 
 
 def diagnose(
-    machines: Mapping[str, Machine], samples: Samples, structure: Structure
+    estimators: Mapping[str, Estimator], samples: Samples, structure: Structure
 ) -> dict[str, EquationDiagnostics]:
     """Diagnostics of each equation.
 
     Parameters
     ----------
-    machines : mapping of str to Machine
+    estimators : mapping of str to Estimator
         Fitted to `samples`, by equation.
     samples : Samples
         The regression.
@@ -170,20 +170,20 @@ def diagnose(
     dict of str to EquationDiagnostics
         By equation: those of `u`, `v`, `r` that the structure has.
     """
-    errors = residuals(machines, samples)
+    errors = residuals(estimators, samples)
     apart = without_overlap(samples)
     found = {}
-    for q, machine in machines.items():
+    for q, estimator in estimators.items():
         names = structure.regression_names(q)
         features, target, error = samples.features[q], samples.targets[q], errors[q]
         size = np.sqrt(np.mean(features**2, axis=0))
         scaled = features / np.where(size > 0.0, size, 1.0)
         singular = np.linalg.svd(scaled, compute_uv=False)
-        groups = getattr(machine, "collinear_groups_", ())
+        groups = getattr(estimator, "collinear_groups_", ())
         found[q] = EquationDiagnostics(
             samples=len(target),
             terms=len(names),
-            rank=int(getattr(machine, "rank_", len(singular))),
+            rank=int(getattr(estimator, "rank_", len(singular))),
             condition_number=float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0])),
             r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
             residual_rms=float(np.sqrt(np.mean(error**2))),

@@ -1,4 +1,4 @@
-"""Which trials a choice is judged by: each held out in turn, or those of the largest rudder."""
+"""Which trials a choice is validated on: each held out in turn, or those of the largest rudder."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from shipgym.trials.trial import Trial
 
 TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
-ALIKE = 0.9  # of the largest rudder counts as the largest
+LEAST_RUDDER_SHARE = 0.9  # of the largest rudder; from there on a rudder counts as the largest
 
 
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
@@ -38,7 +38,7 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
         If all of them have the same rudder.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
-    largest: NDArray[np.bool_] = rudders > ALIKE * rudders.max()
+    largest: NDArray[np.bool_] = rudders > LEAST_RUDDER_SHARE * rudders.max()
     if largest.all():
         raise InputError(
             f"{where}: {LARGEST_RUDDER!r} found, but all trials to fit ({len(trials)}) reach "

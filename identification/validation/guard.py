@@ -25,12 +25,12 @@ RUDDERS_DEG = (35.0, 10.0)
 #: Ship lengths sailed at service speed between reversals of the rudder.
 REVERSALS = (2.5, 5.0, 10.0, 20.0)
 #: Length of a trial manoeuvre, ship lengths at service speed.
-LONG = 50.0
+DURATION_LENGTHS = 50.0
 STEP = 0.02  # of the time to sail one ship length
 
 #: No manoeuvre at service power takes a ship beyond these, by service speed and by speed by length.
-FASTEST = 1.5
-QUICKEST = 3.0
+LARGEST_SPEED = 1.5
+LARGEST_YAW_RATE = 3.0
 
 #: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
 #: SIMMAN 2008 slows down to 0.37 at r L / U = 0.8 and a drift of 20 degrees.
@@ -94,7 +94,7 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
         (f"trial {trial.name!r}, open loop", partial(open_loop, model, trial), float(trial["u"].min()))
         for trial in trials
     )
-    timing = (LONG * travel, STEP * travel)
+    timing = (DURATION_LENGTHS * travel, STEP * travel)
     turns = (
         (f"turning circle, {side:+.0f} deg", partial(turning_circle, model, side, *timing), 0.0)
         for side in sides
@@ -115,7 +115,7 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
 
 def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
     """Rudder hard over from side to side, at intervals in ship lengths."""
-    steps = np.arange(round(LONG / STEP))
+    steps = np.arange(round(DURATION_LENGTHS / STEP))
     commands = np.tile(model.service_command, (len(steps), 1))
     commands[:, 0] = np.where(steps // round(interval / STEP) % 2 == 0, 1.0, -1.0) * np.radians(rudder_deg)
     return model.simulate(commands, STEP * model.particulars["length"] / model.particulars["speed"])
@@ -128,10 +128,10 @@ def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -
     except UnstableModelError as error:
         return f"ran away after {error.time_s:.0f} s"
     length, speed = model.particulars["length"], model.particulars["speed"]
-    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > FASTEST * speed:
+    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > LARGEST_SPEED * speed:
         return f"surge speed from {trial['u'].min():.3g} to {trial['u'].max():.3g} m/s"
     if np.abs(trial["v"]).max() > speed:
         return f"sway speed of {np.abs(trial['v']).max():.3g} m/s"
-    if np.abs(trial["r"]).max() * length > QUICKEST * speed:
+    if np.abs(trial["r"]).max() * length > LARGEST_YAW_RATE * speed:
         return f"yaw rate of {np.degrees(np.abs(trial['r']).max()):.3g} deg/s"
     return None

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from identification.estimators.estimator import Machine
-from identification.estimators.methods import FitTask, Method, fit_held
+from identification.estimators.estimator import Estimator, FitTask
+from identification.estimators.methods import Method, fit_held
 from identification.regression.coefficients import with_accelerations
-from identification.regression.samples import Samples
 from identification.validation.guard import STRENGTHS, hard_turn_features, reasons_unstable
 from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 
 @dataclass(frozen=True)
@@ -23,7 +21,7 @@ class GuardedFit:
     ----------
     model : ShipModel
         With the identified coefficients.
-    machines : dict of str to Machine
+    estimators : dict of str to Estimator
         By equation.
     stable : bool
         Whether the model passed the guard.
@@ -32,7 +30,7 @@ class GuardedFit:
     """
 
     model: ShipModel
-    machines: dict[str, Machine]
+    estimators: dict[str, Estimator]
     stable: bool
     report: dict[str, Any]
 
@@ -40,9 +38,7 @@ class GuardedFit:
 def guarded_fit(
     method: Method,
     settings: Mapping[str, Any],
-    samples: Samples,
-    blank: ShipModel,
-    trials: Sequence[Trial],
+    task: FitTask,
     guarded: bool = True,
 ) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
@@ -50,15 +46,11 @@ def guarded_fit(
     Parameters
     ----------
     method : Method
-        Makes the machines.
+        Makes the estimators.
     settings : mapping
-        Of the machines.
-    samples : Samples
-        The regression.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those behind the samples.
+        Of the estimators.
+    task : FitTask
+        The regression, the model but for its coefficients, and the trials.
     guarded : bool
         Whether penalties may be tried.
 
@@ -72,14 +64,15 @@ def guarded_fit(
     InputError
         For settings that the method does not know.
     """
-    machines = method.machines(settings, FitTask(samples, blank, trials))
-    model = with_coefficients(blank, machines)
+    samples, blank, trials = task.samples, task.blank, task.trials
+    estimators = method.fitted(settings, task)
+    model = with_coefficients(blank, estimators)
     reasons = reasons_unstable(model, trials)
     if not reasons:
-        return GuardedFit(model, machines, True, {"decision": "stable as fitted"})
+        return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
     rejected = {"rejected": reasons}
     if not (guarded and method.regularised):
-        return GuardedFit(model, machines, False, {"decision": "runs away, not guarded", **rejected})
+        return GuardedFit(model, estimators, False, {"decision": "runs away, not guarded", **rejected})
     sizes = hard_turn_features(blank.table, blank.particulars, blank.service_shaft_speed)
     for strength in STRENGTHS:
         held = fit_held(samples, sizes, strength)
@@ -87,9 +80,9 @@ def guarded_fit(
         if not reasons_unstable(candidate, trials):
             report = {"decision": "penalised by hard turn", "strength": strength, **rejected}
             return GuardedFit(candidate, held, True, report)
-    return GuardedFit(model, machines, False, {"decision": "runs away under every penalty", **rejected})
+    return GuardedFit(model, estimators, False, {"decision": "runs away under every penalty", **rejected})
 
 
-def with_coefficients(blank: ShipModel, machines: Mapping[str, Machine]) -> ShipModel:
+def with_coefficients(blank: ShipModel, estimators: Mapping[str, Estimator]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
-    return with_accelerations(blank, {q: machine.coef_ for q, machine in machines.items()})
+    return with_accelerations(blank, {q: estimator.coef_ for q, estimator in estimators.items()})

@@ -1,44 +1,9 @@
-"""Pages of results: one HTML file with its figures, which loads nothing from anywhere."""
+"""Pages of results: one HTML file each, made from a template, which loads nothing from anywhere.
 
-from shipgym.pages.elements import (
-    MINUS,
-    NONE,
-    Html,
-    badge,
-    columns,
-    figure,
-    fixed,
-    html,
-    join,
-    note,
-    number,
-    paragraph,
-    percent,
-    section,
-    table,
-)
-from shipgym.pages.page import card, cards, header, page, plotly_script, verdict
+A page extends `shipgym.pages/page.html` and is made of the macros in `shipgym.pages/parts.html`.
+"""
 
-__all__ = [
-    "MINUS",
-    "NONE",
-    "Html",
-    "badge",
-    "card",
-    "cards",
-    "columns",
-    "figure",
-    "fixed",
-    "header",
-    "html",
-    "join",
-    "note",
-    "number",
-    "page",
-    "paragraph",
-    "percent",
-    "plotly_script",
-    "section",
-    "table",
-    "verdict",
-]
+from shipgym.pages.numbers import MINUS, NONE, fixed, number, percent
+from shipgym.pages.templates import environment, plotly_script, render
+
+__all__ = ["MINUS", "NONE", "environment", "fixed", "number", "percent", "plotly_script", "render"]

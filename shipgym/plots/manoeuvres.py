@@ -14,7 +14,6 @@ from shipgym.manoeuvres.spirals import Spiral, spiral_indices
 from shipgym.manoeuvres.turning import turning_indices
 from shipgym.manoeuvres.zigzags import switch_heading_deg
 from shipgym.plots.style import (
-    GRID,
     LIMIT,
     MEASURED,
     MODEL,
@@ -22,17 +21,17 @@ from shipgym.plots.style import (
     PALETTE,
     axis,
     graph_objects,
+    label,
     layout,
+    line,
     subplots,
 )
-from shipgym.plots.style import line as drawn
 from shipgym.plots.trials import AXES, history_figure, quantity, thinned
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-ROOM_ABOVE = {"l": 62, "r": 18, "t": 66, "b": 48}  # for legend and titles of panels
 EXCITATION = ("delta_command", "delta", "n_command", "n", "psi", "r", "speed", "drift")
 
 
@@ -57,22 +56,21 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     """
     figure = graph_objects().Figure()
     heading = np.degrees(trial["psi"] - trial["psi"][0])
-    label = {"hovertemplate": "%{y:.2f} deg"}
-    figure.add_trace(drawn(trial.t, heading, "heading change", MODEL, 2.0, **label))
-    figure.add_trace(drawn(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **label))
+    hover = {"hovertemplate": "%{y:.2f} deg"}
+    figure.add_trace(line(trial.t, heading, "heading change", MODEL, 2.0, **hover))
+    figure.add_trace(line(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **hover))
     switch = switch_heading_deg(trial)
     if switch is not None:
         ends = [trial.t[0], trial.t[-1]]
         for side in (switch, -switch):
             figure.add_trace(
-                drawn(
+                line(
                     ends, [side] * 2, "switch heading", LIMIT, 1.1, line_dash="dot", hoverinfo="skip",
                     showlegend=side > 0,
                 )
             )  # fmt: skip
     figure.update_layout(layout(height))
-    figure.update_xaxes(axis("time, s"))
-    figure.update_yaxes(axis("heading change and rudder, deg", zeroline=True, zerolinecolor=GRID))
+    label(figure, "time, s", axis("heading change and rudder, deg", zero=True))
     return figure
 
 
@@ -106,7 +104,7 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
     aside = (east * np.cos(psi0) - north * np.sin(psi0)) / lpp
     side = 1.0 if trial["psi"][-1] >= psi0 else -1.0
     figure = graph_objects().Figure()
-    figure.add_trace(drawn(aside, ahead, "path", MODEL, 2.0))
+    figure.add_trace(line(aside, ahead, "path", MODEL, 2.0))
     advance, transfer, diameter = (
         indices.advance_lengths, indices.transfer_lengths, indices.tactical_diameter_lengths,
     )  # fmt: skip
@@ -119,10 +117,8 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
         wide = [0.0, side * diameter]
         _dimension(figure, wide, [level] * 2, f"tactical diameter {diameter:.2f} L", PALETTE[3])
     figure.update_layout(layout(height, hovermode="closest"))
-    figure.update_xaxes(axis("to starboard, ship lengths", zeroline=True, zerolinecolor=GRID))
-    figure.update_yaxes(
-        axis("ahead, ship lengths", scaleanchor="x", scaleratio=1, zeroline=True, zerolinecolor=GRID)
-    )
+    ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)
+    label(figure, axis("to starboard, ship lengths", zero=True), ahead_axis)
     return figure
 
 
@@ -131,7 +127,7 @@ def _dimension(figure: Figure, x: list[float], y: list[float], name: str, colour
     across = "line-ew" if x[0] == x[1] else "line-ns"
     mark = {"symbol": across, "size": 11, "line": {"width": 1.6, "color": colour}}
     figure.add_trace(
-        drawn(x, y, name, colour, 1.5, marker=mark, hoverinfo="name").update(mode="lines+markers")
+        line(x, y, name, colour, 1.5, marker=mark, hoverinfo="name").update(mode="lines+markers")
     )
 
 
@@ -162,7 +158,7 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
         turn = int(np.argmin(angles) if np.argmax(angles) < np.argmin(angles) else np.argmax(angles))
         ways = {"there": (slice(0, turn + 1), MODEL), "and back": (slice(turn, None), PALETTE[1])}
     for name, (part, colour) in ways.items():
-        way = drawn(angles[part], rates[part], name, colour, 1.6, **points)
+        way = line(angles[part], rates[part], name, colour, 1.6, **points)
         figure.add_trace(way.update(mode="lines+markers"))
     try:
         indices = spiral_indices(spiral)
@@ -173,16 +169,15 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     if width > step:
         name = f"loop, {width:.2f} deg wide"
         figure.add_trace(
-            drawn([middle - width / 2, middle + width / 2], [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name")
+            line([middle - width / 2, middle + width / 2], [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name")
         )
     figure.update_layout(layout(height, hovermode="closest"))
-    figure.update_xaxes(axis("rudder, deg", zeroline=True, zerolinecolor=GRID))
-    figure.update_yaxes(axis("yaw rate, deg/s", zeroline=True, zerolinecolor=GRID))
+    label(figure, axis("rudder, deg", zero=True), axis("yaw rate, deg/s", zero=True))
     return figure
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
-    """Yaw rate of pull-outs over the time since the rudder was put amidships; a stable ship's meet.
+    """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
 
     Parameters
     ----------
@@ -206,11 +201,11 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
         angle = np.abs(rudder(trial))
         release = trial.t[min(int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1, len(trial) - 1)]
         part = thinned(trial)
-        label = f"{name}: {left:.3f} deg/s left"
-        figure.add_trace(drawn(trial.t[part] - release, np.degrees(trial["r"][part]), label, colour))
+        residual = f"{name}: {left:.3f} deg/s left"
+        figure.add_trace(line(trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour))
     figure.update_layout(layout(height))
-    figure.update_xaxes(axis("time since the rudder was put amidships, s", zeroline=True, zerolinecolor=GRID))
-    figure.update_yaxes(axis("yaw rate, deg/s", zeroline=True, zerolinecolor=GRID))
+    time_axis = axis("time since the rudder was put amidships, s", zero=True)
+    label(figure, time_axis, axis("yaw rate, deg/s", zero=True))
     return figure
 
 
@@ -247,11 +242,10 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
     figure = subplots(1, len(panels), horizontal_spacing=0.09)
     for column, (x, y, name, below, beside) in enumerate(panels, start=1):
         colour = MODEL if name != "shaft" else MEASURED
-        trace = drawn(x[part], y[part], name, colour, showlegend=column != 2)
+        trace = line(x[part], y[part], name, colour, showlegend=column != 2)
         figure.add_trace(trace, row=1, col=column)
-        figure.update_xaxes(axis(below), row=1, col=column)
-        figure.update_yaxes(axis(beside, zeroline=True, zerolinecolor=GRID), row=1, col=column)
-    figure.update_layout(layout(height, hovermode="closest", margin=ROOM_ABOVE))
+        label(figure, below, axis(beside, zero=True), row=1, col=column)
+    figure.update_layout(layout(height, titled=True, hovermode="closest"))
     return figure
 
 

@@ -55,13 +55,17 @@ def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: An
     return figure
 
 
-def layout(height: int, **changes: Any) -> dict[str, Any]:
+def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:
     """The layout that all figures share: white, a light grid, the legend above.
 
     Parameters
     ----------
     height : int
         In pixels; the width is that of the page.
+    titled : bool
+        Whether panels have titles, which need room below the legend.
+    left : int
+        Margin for the labels of the vertical axis, pixels.
     **changes : Any
         Entries of a plotly layout that replace these.
     """
@@ -71,20 +75,24 @@ def layout(height: int, **changes: Any) -> dict[str, Any]:
         "font": {"family": FONT, "size": 12, "color": INK},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
-        "margin": {"l": 62, "r": 18, "t": 34, "b": 44},
-        "legend": {"orientation": "h", "x": 0.0, "y": 1.0, "yanchor": "bottom", "font": {"size": 12}},
+        "margin": {"l": left, "r": 18, "t": 64 if titled else 36, "b": 46},
+        "legend": {
+            "orientation": "h", "x": 0.0, "y": 1.0, "yref": "container", "yanchor": "top",
+            "font": {"size": 12},
+        },
         "hoverlabel": {"font": {"family": FONT, "size": 12}},
         "hovermode": "x unified",
-    }
+    }  # fmt: skip
     return shared | changes
 
 
-def axis(title: str = "", **changes: Any) -> dict[str, Any]:
-    """An axis in the shared style, with its title (quantity and unit)."""
+def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
+    """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
         "gridcolor": GRID,
-        "zeroline": False,
+        "zeroline": zero,
+        "zerolinecolor": GRID,
         "linecolor": "#c5ccd6",
         "showline": True,
         "ticks": "outside",
@@ -95,8 +103,20 @@ def axis(title: str = "", **changes: Any) -> dict[str, Any]:
     return shared | changes
 
 
+def label(
+    figure: Figure,
+    x: str | dict[str, Any],
+    y: str | dict[str, Any],
+    row: int | None = None,
+    col: int | None = None,
+) -> None:
+    """Style the axes of a figure or of one panel: each a title, or an `axis` with more than that."""
+    figure.update_xaxes(axis(x) if isinstance(x, str) else x, row=row, col=col)
+    figure.update_yaxes(axis(y) if isinstance(y, str) else y, row=row, col=col)
+
+
 def compact(values: ArrayLike) -> NDArray[np.float32]:
-    """Values in single precision: half the size in a file, and as fine as any screen."""
+    """Values in single precision: half the size in a file, and finer than a pixel."""
     return np.asarray(values, dtype=np.float32)
 
 
@@ -105,9 +125,9 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     labels = list(labels)
     others = [label for label in labels if label != "measured"]
     styles = {
-        label: {"color": PALETTE[index % len(PALETTE)], "width": 2.0} for index, label in enumerate(others)
+        label: {"colour": PALETTE[index % len(PALETTE)], "width": 2.0} for index, label in enumerate(others)
     }
-    return styles | {label: {"color": MEASURED, "width": 1.5} for label in labels if label == "measured"}
+    return styles | {label: {"colour": MEASURED, "width": 1.5} for label in labels if label == "measured"}
 
 
 def translucent(colour: str, opacity: float) -> str:

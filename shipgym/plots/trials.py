@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
-from shipgym.plots.style import axis, compact, graph_objects, layout, line_styles, subplots
+from shipgym.plots.style import axis, graph_objects, label, layout, line, line_styles, subplots
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-#: Axis title and factor from SI of each channel and of what follows from u and v; m/s and degrees.
+#: Axis title and factor from SI of each channel and of what u and v give; m/s and degrees.
 AXES: dict[str, tuple[str, float]] = {
     "x": ("north, m", 1.0),
     "y": ("east, m", 1.0),
@@ -38,7 +38,7 @@ MOST_SAMPLES = 3000  # drawn of one line; spirals have many more
 
 
 def quantity(trial: Trial, name: str) -> NDArray[np.float64] | None:
-    """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None where it does not tell.
+    """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None without them.
 
     The drift angle is positive where the ship moves to port of her heading.
     """
@@ -79,30 +79,21 @@ def history_figure(
     shown = [name for name in channels if any(quantity(trial, name) is not None for trial in trials.values())]
     if not shown:
         raise InputError(f"figure: no trial with any of the channels {', '.join(channels)}")
-    go, styles = graph_objects(), line_styles(trials)
+    styles = line_styles(trials)
     figure = subplots(len(shown), 1, shared_xaxes=True, vertical_spacing=0.16 / len(shown))
     for row, channel in enumerate(shown, start=1):
         title, factor = AXES[channel]
-        for label, trial in trials.items():
+        for name, trial in trials.items():
             values = quantity(trial, channel)
             if values is None:
                 continue
-            drawn = thinned(trial)
-            figure.add_trace(
-                go.Scatter(
-                    x=compact(trial.t[drawn]),
-                    y=compact(factor * values[drawn]),
-                    name=label,
-                    legendgroup=label,
-                    showlegend=row == 1,
-                    line=styles[label],
-                    hovertemplate="%{y:.3g}",
-                ),
-                row=row,
-                col=1,
+            part, style = (
+                thinned(trial),
+                {"showlegend": row == 1, "hovertemplate": "%{y:.3g}", **styles[name]},
             )
-        figure.update_yaxes(axis(title), row=row, col=1)
-        figure.update_xaxes(axis("time, s" if row == len(shown) else ""), row=row, col=1)
+            trace = line(trial.t[part], factor * values[part], name, **style)
+            figure.add_trace(trace, row=row, col=1)
+        label(figure, "time, s" if row == len(shown) else "", title, row=row, col=1)
     figure.update_layout(layout(ROW_HEIGHT * len(shown) + 70))
     return figure
 
@@ -126,24 +117,13 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     InputError
         If no trial has a position, or plotly is not installed.
     """
-    located = {
-        label: trial for label, trial in trials.items() if "x" in trial.channels and "y" in trial.channels
-    }
+    located = {name: trial for name, trial in trials.items() if {"x", "y"} <= set(trial.channels)}
     if not located:
         raise InputError("figure: no trial with the channels x and y")
-    go = graph_objects()
-    figure = go.Figure()
-    styles = line_styles(trials)
-    for label, trial in located.items():
-        figure.add_trace(
-            go.Scatter(
-                x=compact(trial["y"][thinned(trial)]),
-                y=compact(trial["x"][thinned(trial)]),
-                name=label,
-                line=styles[label],
-            )
-        )
+    figure, styles = graph_objects().Figure(), line_styles(trials)
+    for name, trial in located.items():
+        part = thinned(trial)
+        figure.add_trace(line(trial["y"][part], trial["x"][part], name, **styles[name]))
     figure.update_layout(layout(height, hovermode="closest"))
-    figure.update_xaxes(axis(AXES["y"][0]))
-    figure.update_yaxes(axis(AXES["x"][0], scaleanchor="x", scaleratio=1))
+    label(figure, AXES["y"][0], axis(AXES["x"][0], scaleanchor="x", scaleratio=1))
     return figure

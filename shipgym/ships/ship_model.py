@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
 from shipgym.ships.manoeuvring_model import ManoeuvringModel

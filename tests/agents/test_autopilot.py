@@ -11,7 +11,7 @@ from agents.verification.index_uncertainty import manoeuvre_spread
 from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from identification import identify
-from identification.validation.warnings import concerns
+from identification.validation.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
 from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy
@@ -87,7 +87,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
         )
     else:
         random_policy(load_model("kvlcc2")).save(path)
-    said = "cross_track.*paths are flown by" if made_for == "paths" else "the scale of '.*' is"
+    said = "cross_track.*for paths there is" if made_for == "paths" else "the scale of '.*' is"
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
@@ -109,7 +109,7 @@ def test_the_same_seed_gives_the_same_numbers(chain):
     result = chain[1]
     again = verify(result.model, 24, 1)
     for first, second in zip(result.verification.pilots, again.pilots, strict=True):
-        assert np.array_equal(first.flights.cost, second.flights.cost)
+        assert np.array_equal(first.episodes.cost, second.episodes.cost)
 
 
 def test_every_autopilot_ends_on_the_new_course(chain):
@@ -140,7 +140,7 @@ def test_a_rudder_of_the_wrong_sign_is_noticed(demo, tmp_path):
     (tmp_path / "ship.toml").write_text(text)
     ship = ShipFile.load(tmp_path / "ship.toml")
     result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
-    assert "likely a wrong rudder_positive" in concerns(result)[0]
+    assert "likely a wrong rudder_positive" in model_warnings(result)[0]
 
 
 def test_unstable_draws_count_as_failed_and_are_never_dropped():

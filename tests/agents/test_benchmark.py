@@ -7,11 +7,11 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
 from agents.benchmarking.contestants import contestants
-from agents.benchmarking.designs import design
-from agents.benchmarking.suite import load_suite
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
+from agents.controllers.designs import design
+from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
@@ -81,22 +81,22 @@ def test_workers_find_the_same_bit_for_bit(folder, tmp_path):
         np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
 
 
-def test_what_was_flown_is_kept_and_not_flown_again(folder, copy, monkeypatch):
+def test_what_was_done_is_kept_and_not_done_again(folder, copy, monkeypatch):
     parts = copy / "parts"
     parts.mkdir()
     for path in (folder / "parts").iterdir():
         (parts / path.name).write_bytes(path.read_bytes())
     with pytest.raises(InputError, match=r"holds results already.*--resume"):
         benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
-    flown = []
+    asked = []
     monkeypatch.setattr(
-        "agents.benchmarking.run.fly_task",
-        lambda policy, *rest: flown.append(policy.name) or original(policy, *rest),
+        "agents.benchmarking.run.evaluate",
+        lambda policy, *rest: asked.append(policy.name) or original(policy, *rest),
     )
-    from agents.rollouts.flying import fly_task as original
+    from agents.rollouts.metrics import evaluate as original
 
     result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
-    assert flown == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
+    assert asked == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
     np.testing.assert_array_equal(result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm"))
     assert load_results(copy).summary["contestants"].keys() == {"pid", "lq", "los"}
 
@@ -171,13 +171,7 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     }
     for name, content in kept.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
-    monkeypatch.setattr("agents.benchmarking.direct_search.tuned_file", lambda suite: tmp_path / "tuned.json")
-    monkeypatch.setattr(
-        "agents.benchmarking.oracle_costs.suite_file", lambda suite, what: tmp_path / f"{what}.json"
-    )
-    monkeypatch.setattr(
-        "agents.benchmarking.summary.suite_file", lambda suite, what: tmp_path / f"{what}.json"
-    )
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
     look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
     assert look.summary["reference"] == {}  # costs of all episodes say nothing of the first two
     monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
@@ -232,7 +226,7 @@ def test_wrong_task_and_suite():
         benchmark("pid", suite="shipgym-v2")
 
 
-def test_what_was_flown_is_true(folder):
+def test_what_the_results_say_is_true(folder):
     checks = verify(folder)
     assert [check.exact for check in checks] == [True, True]
     assert {check.episodes for check in checks} == {N}

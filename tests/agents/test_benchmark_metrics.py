@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from agents import LQ, PID, fly
-from agents.benchmarking.suite import BenchmarkTask
-from agents.rollouts.flying import fly_task
-from agents.rollouts.metrics import reversals, step_figures, worst_step_cost
+from agents import LQ, PID, sail
+from agents.rollouts.metrics import evaluate, reversals, step_figures, worst_step_cost
+from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
 
 KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})
@@ -32,27 +31,27 @@ def steady(rudder):
     return Steers(lambda call, seen: np.full((len(seen), 1), rudder, dtype=np.float32))
 
 
-def test_costs_and_errors_are_those_of_a_flight(lq):
-    flown = fly_task(lq, KEEPING, SEEDS).episodes
-    flight = fly(lq, KEEPING.ship, KEEPING.task, SEEDS)
-    np.testing.assert_allclose(flown["cost"], flight.cost, rtol=1e-14)
-    np.testing.assert_allclose(flown["cost_rudder_rate"], flight.rudder_rate_cost, rtol=1e-14)
-    np.testing.assert_allclose(flown["heading_rmse_deg"], flight.heading_rmse_deg, rtol=1e-14)
-    np.testing.assert_allclose(flown["rudder_travel_deg_min"], flight.rudder_travel_deg_min, rtol=1e-12)
-    np.testing.assert_array_equal(flown["duration_s"], flight.duration_s)
+def test_costs_and_errors_are_those_of_course_keeping(lq):
+    found = evaluate(lq, KEEPING, SEEDS).figures
+    alone = sail(lq, KEEPING.ship, KEEPING.task, SEEDS)
+    np.testing.assert_allclose(found["cost"], alone.cost, rtol=1e-14)
+    np.testing.assert_allclose(found["cost_rudder_rate"], alone.rudder_rate_cost, rtol=1e-14)
+    np.testing.assert_allclose(found["heading_rmse_deg"], alone.heading_rmse_deg, rtol=1e-14)
+    np.testing.assert_allclose(found["rudder_travel_deg_min"], alone.rudder_travel_deg_min, rtol=1e-12)
+    np.testing.assert_array_equal(found["duration_s"], alone.duration_s)
 
 
 def test_an_episode_does_not_depend_on_those_beside_it(lq):
-    many, one = fly_task(lq, PATH, SEEDS), fly_task(lq, PATH, SEEDS[2:3])
-    for name, values in one.episodes.items():
-        np.testing.assert_array_equal(values[0], many.episodes[name][2], err_msg=name)
+    many, one = evaluate(lq, PATH, SEEDS), evaluate(lq, PATH, SEEDS[2:3])
+    for name, values in one.figures.items():
+        np.testing.assert_array_equal(values[0], many.figures[name][2], err_msg=name)
 
 
 @pytest.mark.parametrize("task", [KEEPING, PATH], ids=lambda task: task.name)
-def test_the_worst_step_is_what_the_kernels_charge_for_the_rest(task):
-    flown = fly_task(steady(1.0), task, SEEDS[:2])  # hard over: she turns until control is lost, or aground
-    end, steps = flown.episodes["cost_end"], flown.recording.steps
-    assert flown.episodes["terminated"].all()
+def test_the_worst_step_is_what_the_tasks_charge_for_the_rest(task):
+    found = evaluate(steady(1.0), task, SEEDS[:2])  # hard over: she turns until control is lost, or aground
+    end, steps = found.figures["cost_end"], found.run.steps
+    assert found.figures["terminated"].all()
     np.testing.assert_allclose(
         end, worst_step_cost(task.task) * (task.task.episode_steps - steps), rtol=1e-12
     )
@@ -62,19 +61,19 @@ def test_straight_running_needs_the_fuel_of_straight_running():
     calm = BenchmarkTask(
         "calm", "course-keeping", "kvlcc2", options={"course_change_deg": 0.0, "episode_steps": 100}
     )
-    flown = fly_task(LQ.from_model(calm.ship), calm, SEEDS[:2]).episodes
-    np.testing.assert_allclose(flown["fuel"], 1.0, atol=2e-3)
-    assert np.isnan(flown["overshoot_percent"]).all()  # no change of course, no figure
+    found = evaluate(LQ.from_model(calm.ship), calm, SEEDS[:2]).figures
+    np.testing.assert_allclose(found["fuel"], 1.0, atol=2e-3)
+    assert np.isnan(found["overshoot_percent"]).all()  # no change of course, no figure
 
 
 def test_hard_over_makes_no_way_along_the_course_and_costs_more_fuel(lq):
-    turns = fly_task(steady(0.3), KEEPING, SEEDS[:2]).episodes["fuel"]
-    assert (turns > 1.2 * fly_task(lq, KEEPING, SEEDS[:2]).episodes["fuel"]).all()
+    turns = evaluate(steady(0.3), KEEPING, SEEDS[:2]).figures["fuel"]
+    assert (turns > 1.2 * evaluate(lq, KEEPING, SEEDS[:2]).figures["fuel"]).all()
 
 
 def test_a_path_is_followed_to_its_end_and_the_corridor_is_left_or_not(lq):
-    kept = fly_task(lq, PATH, SEEDS).episodes
-    left = fly_task(steady(0.2), PATH, SEEDS).episodes
+    kept = evaluate(lq, PATH, SEEDS).figures
+    left = evaluate(steady(0.2), PATH, SEEDS).figures
     assert kept["success"].all()
     assert not kept["left_corridor"].any()
     assert not kept["terminated"].any()  # to arrive is no loss of control
@@ -118,35 +117,35 @@ FAILURES = {
 
 @pytest.mark.parametrize("how", FAILURES)
 def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(how):
-    sails = fly_task(steady(0.0), KEEPING, SEEDS[:3])
-    flown = fly_task(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
+    sails = evaluate(steady(0.0), KEEPING, SEEDS[:3])
+    found = evaluate(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
     concerned = np.array([False, True, False]) if how == "nan for one ship" else np.ones(3, dtype=np.bool_)
-    assert (flown.episodes["failed"] > 0.0).tolist() == concerned.tolist()
-    assert "step 50" in flown.failure
-    steps = flown.recording.steps
+    assert (found.figures["failed"] > 0.0).tolist() == concerned.tolist()
+    assert "step 50" in found.run.failure
+    steps = found.run.steps
     assert (steps[concerned] == 50.0).all()
     np.testing.assert_allclose(
-        flown.episodes["cost_end"][concerned], (250 - 50) * worst_step_cost(KEEPING.task), rtol=1e-12
+        found.figures["cost_end"][concerned], (250 - 50) * worst_step_cost(KEEPING.task), rtol=1e-12
     )
-    for name, values in flown.episodes.items():
-        np.testing.assert_array_equal(values[~concerned], sails.episodes[name][~concerned], err_msg=name)
+    for name, values in found.figures.items():
+        np.testing.assert_array_equal(values[~concerned], sails.figures[name][~concerned], err_msg=name)
 
 
 def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
-    flown = fly_task(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
-    assert flown.episodes["failed"].all()
-    np.testing.assert_allclose(flown.episodes["cost"], 250 * worst_step_cost(KEEPING.task))
-    assert np.isnan(flown.episodes["heading_rmse_deg"]).all()
+    found = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
+    assert found.figures["failed"].all()
+    np.testing.assert_allclose(found.figures["cost"], 250 * worst_step_cost(KEEPING.task))
+    assert np.isnan(found.figures["heading_rmse_deg"]).all()
 
 
 def test_a_shield_is_counted(lq):
     from agents.policies.shield import Shielded
 
     reckless = Shielded.from_model(KEEPING.ship, steady(1.0))
-    found = fly_task(reckless, KEEPING, SEEDS[:3]).episodes
+    found = evaluate(reckless, KEEPING, SEEDS[:3]).figures
     assert not found["terminated"].any()
     assert (found["interventions"] >= 1.0).all()
     assert (found["shielded"] > 0.0).all()
-    never = fly_task(Shielded.from_model(KEEPING.ship, lq), KEEPING, SEEDS[:3]).episodes
-    np.testing.assert_array_equal(never["cost"], fly_task(lq, KEEPING, SEEDS[:3]).episodes["cost"])
-    assert fly_task(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3]).episodes["interventions"].sum() == 0.0
+    never = evaluate(Shielded.from_model(KEEPING.ship, lq), KEEPING, SEEDS[:3]).figures
+    np.testing.assert_array_equal(never["cost"], evaluate(lq, KEEPING, SEEDS[:3]).figures["cost"])
+    assert evaluate(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3]).figures["interventions"].sum() == 0.0

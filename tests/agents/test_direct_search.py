@@ -9,26 +9,24 @@ import numpy as np
 import pytest
 
 from agents import PID
-from agents.benchmarking import direct_search
-from agents.benchmarking.designs import design
 from agents.benchmarking.direct_search import (
-    CLASSICAL,
+    FIRST_SEED,
+    LAWS,
     REFUSED,
     Setting,
     is_sane,
-    load_tuned,
     search,
     search_spaces,
     tunable,
     tune,
-    tuned,
 )
-from agents.benchmarking.suite import BenchmarkTask, load_suite
-from agents.controllers.los_autopilot import LAWS
-from agents.rollouts.flying import episode_costs
+from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.rollouts.rollout import episode_costs
+from agents.suites.reference import load_tuned
+from agents.suites.suite import BenchmarkTask, load_suite
 from agents.training.bases import design_base
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 
@@ -75,7 +73,7 @@ def test_tuning_is_reproducible_never_worse_than_the_design_and_sane() -> None:
     assert first.cost < first.start_cost
     controller = design("pid", NOISY, first.settings)
     assert is_sane(controller)
-    seeds = direct_search.FIRST_SEED + np.arange(4)
+    seeds = FIRST_SEED + np.arange(4)
     assert episode_costs(controller, NOISY.engine(4), seeds).mean() == pytest.approx(first.cost, rel=1e-12)
     assert episode_costs(PID.from_model(CALM.ship), NOISY.engine(4), seeds).mean() == pytest.approx(
         first.start_cost
@@ -123,7 +121,7 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tuned.json"
-    monkeypatch.setattr(direct_search, "tuned_file", lambda suite: path)
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
     found = {"pid": {"settings": {"damping": 1.0}, "cost": 2.0}, "lq": {"settings": {}, "cost": 3.0}}
     write_json({"tasks": {"calm": found}}, path)
     assert tuned("best", CALM, "any").kind == "pid"
@@ -138,7 +136,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = tmp_path / "tuned.json"
-    monkeypatch.setattr(direct_search, "tuned_file", lambda suite: path)
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
     costs = {"mpc": 1.0, "lq-adaptive": 2.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)

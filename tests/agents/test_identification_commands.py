@@ -3,11 +3,13 @@
 import json
 from pathlib import Path
 
+import document_options
 import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.identifying import identification_settings, identify_ship, parsed_options
+from agents.cli.identify_options import parsed_options
+from agents.identifying import identification_settings, identify_ship
 from identification.estimators.methods import METHODS
 from shipgym import InputError, ShipFile, load_model
 from shipgym.trials.identify_table import OPTIONS
@@ -84,7 +86,15 @@ def test_options_of_identify_come_from_the_ship_file(ship, demo):
 def test_the_options_tested_and_the_rest_are_all_there_are():
     known = {line.split(" = ")[0] for lines in (GENERAL, *SETTINGS.values()) for line in lines}
     of_grey_box = {"reference_model", "regression", "free_constant", "constant"}
-    of_refinement = {"segment_lengths", "staggered", "segment_start", "pull", "rudder_offsets"}
+    of_refinement = {
+        "segment_lengths",
+        "staggered",
+        "segment_start",
+        "pull",
+        "rudder_offsets",
+        "anchor",
+        "anchor_weight",
+    }
     extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method"}
     assert known | of_grey_box | of_refinement | extra == OPTIONS.keys()
 
@@ -243,6 +253,11 @@ def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
     assert len(load_model(tmp_path / "out" / "model.json").coefficients) == told["terms"]["reduced"]
     assert (tmp_path / "out" / "report.html").exists()
     assert shipgym("reduce", path, "--out", tmp_path / "x", "--direction", "sideways").exit_code == 2
+
+
+def test_the_tables_of_options_are_those_of_the_dataclass():
+    page = document_options.PAGE.read_text(encoding="utf-8")
+    assert document_options.page(page) == page, "run python scripts/document_options.py"
 
 
 def test_every_option_and_method_is_documented():

@@ -7,7 +7,7 @@ from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.vec_env import VecNormalize
 
-from agents.benchmarking.suite import load_suite
+from agents.suites.suite import load_suite
 from agents.training.algorithms import sb3_arguments
 from agents.training.settings import ALGORITHMS, load_settings
 from shipgym import ShipVecEnv
@@ -71,7 +71,7 @@ def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one(algorit
         assert load_settings(algorithm, "path-following", task.name).base == "tuned"
     for asked in ({"given": {"base": "none"}}, {"action": "rudder-discrete"}, {"action": "rudder-shaft"}):
         settings = load_settings(algorithm, "path-following", "container-path", **asked)
-        assert (settings.base, settings.hold) == ("none", 1)
+        assert (settings.base, settings.action_repeat) == ("none", 1)
         assert settings == load_settings(algorithm, given={"base": "none"})
 
 

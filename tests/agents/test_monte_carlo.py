@@ -35,7 +35,7 @@ def assert_same(one, other):
     np.testing.assert_array_equal(one.manoeuvres.zigzag_headings, other.manoeuvres.zigzag_headings)
     for name, criterion in one.manoeuvres.criteria.items():
         np.testing.assert_array_equal(criterion.drawn.values, other.manoeuvres.criteria[name].drawn.values)
-    for a, b in zip(one.flights, other.flights, strict=True):
+    for a, b in zip(one.episodes, other.episodes, strict=True):
         for item in fields(a):
             np.testing.assert_array_equal(getattr(a, item.name), getattr(b, item.name))
 
@@ -56,7 +56,7 @@ def test_two_workers_give_the_same_and_what_they_did_is_resumed(found, ship, pil
 def test_jobs_change_nothing_in_what_is_sailed_and_flown(found, ship, pilots):
     drawn = ship.sample(DRAWS, SEED)
     together = fly(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
-    np.testing.assert_array_equal(found.flights[1].cost, together.cost)
+    np.testing.assert_array_equal(found.episodes[1].cost, together.cost)
     spread = manoeuvre_spread(ship, drawn)
     for name, criterion in spread.criteria.items():
         assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()

@@ -1,15 +1,21 @@
-"""The oracle: copies of ships share their future, and what is found is never dearer than the start."""
+"""The oracle: copies of ships share their future, and what is found never costs more than the start."""
+
+import argparse
 
 import numpy as np
+import oracle
 import pytest
+from oracle import OracleSettings, run_oracle
 
 from agents import LQ, PID
-from agents.oracle import OracleSettings, fly_oracle
+from agents.suites import reference
+from agents.suites.suite import BenchmarkTask
 from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
+from shipgym.files import read_json, write_json
 from shipgym.ships import load_model
 
 MARINER = load_model("mariner")
@@ -51,13 +57,13 @@ def test_lanes_of_another_task_or_that_are_not_there_are_refused() -> None:
 
 
 def test_it_prepares_a_turn_of_the_path_and_saves_more_than_a_quarter() -> None:
-    found = fly_oracle(MARINER, ONE_TURN, SEEDS, settings=QUICK)
+    found = run_oracle(MARINER, ONE_TURN, SEEDS, settings=QUICK)
     assert np.all(found.costs < 0.75 * found.start_costs)
 
 
 def test_its_costs_are_those_of_its_rudder_and_of_its_start() -> None:
     start = PID.from_model(MARINER, frequency=0.02)
-    found = fly_oracle(MARINER, ONE_TURN, SEEDS, start, QUICK)
+    found = run_oracle(MARINER, ONE_TURN, SEEDS, start, QUICK)
     ships = Engine(MARINER, len(SEEDS), ONE_TURN)
     ships.reset(SEEDS)
     steered = sum(ships.step(found.actions[:, [step]])[1] for step in range(ONE_TURN.episode_steps))
@@ -69,20 +75,20 @@ def test_its_costs_are_those_of_its_rudder_and_of_its_start() -> None:
     np.testing.assert_allclose(found.start_costs, costs, rtol=1e-12)
 
 
-def test_it_is_never_dearer_than_its_start_and_knows_the_state_behind_the_noise() -> None:
+def test_it_never_costs_more_than_its_start_and_knows_the_state_behind_the_noise() -> None:
     task = CourseKeepingTask(sea="rough", noise=5.0, course_change_deg=5.0, episode_steps=120)
-    found = fly_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), QUICK)
+    found = run_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), QUICK)
     assert np.all(found.costs < found.start_costs)
     coarse = OracleSettings(candidates=4, elites=2, iterations=1, passes=1, spread=3.0)
-    found = fly_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), coarse)
+    found = run_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), coarse)
     assert np.all(found.costs <= found.start_costs)
 
 
 def test_an_episode_is_the_same_again_and_in_any_company() -> None:
     task = CourseKeepingTask(course_change_deg=60.0, episode_steps=100, change_interval_steps=40)
     together, alone = (
-        fly_oracle(MARINER, task, SEEDS, settings=QUICK),
-        fly_oracle(MARINER, task, [1], settings=QUICK),
+        run_oracle(MARINER, task, SEEDS, settings=QUICK),
+        run_oracle(MARINER, task, [1], settings=QUICK),
     )
     assert np.array_equal(together.actions[1], alone.actions[0])
     assert together.costs[1] == alone.costs[0]
@@ -92,11 +98,49 @@ def test_it_does_not_know_a_course_change_before_it_is_ordered() -> None:
     short = CourseKeepingTask(course_changes_deg=[0.0, 40.0], change_interval_steps=60, episode_steps=120)
     none = CourseKeepingTask(course_changes_deg=[0.0], change_interval_steps=60, episode_steps=120)
     quick = OracleSettings(candidates=16, elites=4, iterations=2, passes=1)
-    turned, straight = (fly_oracle(MARINER, task, [0], settings=quick).actions[0] for task in (short, none))
+    turned, straight = (run_oracle(MARINER, task, [0], settings=quick).actions[0] for task in (short, none))
     assert np.array_equal(turned[:60], straight[:60])
     assert np.abs(turned[60:]).max() > 0.3
 
 
 def test_it_steers_by_the_rudder_alone() -> None:
     with pytest.raises(InputError, match="expected 'rudder'"):
-        fly_oracle(MARINER, CourseKeepingTask(action="rudder-discrete"), SEEDS)
+        run_oracle(MARINER, CourseKeepingTask(action="rudder-discrete"), SEEDS)
+
+
+CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 30})
+ASKED = argparse.Namespace(suite="any", oracle_episodes=100, again=False)
+
+
+def test_it_runs_again_only_where_the_new_best_costs_less_than_it(tmp_path, monkeypatch):
+    started = []
+
+    def file(suite, what):
+        return tmp_path / f"{suite}-{what}.json"
+
+    def run(task, start, cost, asked):
+        started.append((start.kind, cost))
+        return {"oracle": 0.9 * cost, "oracle_episodes": 100}
+
+    def refer(**costs):
+        found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
+        write_json({"tasks": {"calm": found}}, file("any", "tuned"))
+        oracle.refer(CALM, ASKED)
+        return read_json(file("any", "reference"), "reference file", "")["calm"]
+
+    monkeypatch.setattr(oracle, "run", run)
+    for place in (oracle, reference):
+        monkeypatch.setattr(place, "suite_file", file)
+    first = refer(pid=1.0, lq=2.0)
+    assert first["best_classical"] == {"name": "pid", "cost": first["pid"]}
+    assert refer(pid=1.0, lq=2.0) == first
+    assert [kind for kind, _ in started] == ["pid"]
+    second = refer(pid=1.0, lq=0.5)  # lq is now the best, and costs more than 0.9 times pid
+    assert second["best_classical"]["name"] == "lq"
+    assert second["best_classical"]["cost"] != first["pid"]
+    assert second["oracle"] == first["oracle"]
+    assert len(started) == 1
+    write_json({"calm": {**second, "oracle": 1.1 * first["pid"]}}, file("any", "reference"))
+    third = refer(pid=0.1, lq=0.5)
+    assert started[1:] == [("pid", first["pid"])]
+    assert third["oracle"] == first["oracle"]

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from agents import load_agent
-from agents.benchmarking.contestants import check_fits, pretrained
-from agents.benchmarking.suite import load_suite
+from agents.benchmarking.contestants import pretrained
 from agents.controllers.controller import model_hash
 from agents.policies.policy import LearnedPolicy
-from agents.rollouts.flying import episode_costs
+from agents.rollouts.rollout import check_fits, episode_costs
+from agents.suites.suite import load_suite
 from agents.training.plan import Given, make_plan
 
 SUITE = load_suite()
@@ -25,7 +25,7 @@ def agent_of(task):
 def test_each_task_has_an_agent_with_a_whole_record(task):
     path, agent = agent_of(task)
     assert isinstance(agent, LearnedPolicy)
-    check_fits(agent, task, task.name)
+    check_fits(agent, task.task, task.ship, task.name)
     assert agent.model_sha256 == model_hash(task.ship)
     assert path.stat().st_size + path.with_suffix(".safetensors").stat().st_size < 300_000
     record = agent.training

@@ -1,14 +1,23 @@
 import re
-import shutil
-import subprocess
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from jinja2 import UndefinedError
 
+from agents.cli.standard_trials import StandardTrials
+from agents.cli.trials_page import write_page
 from agents.verification.figures import band, translucent
-from shipgym.pages import Html, figure, fixed, html, number, percent, table
+from agents.verification.page import write_report
+from shipgym import Trial, load_model
+from shipgym.manoeuvres import IndexInterval, Manoeuvre, ZigzagIndices, zigzag, zigzag_indices
+from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
+from tests.agents.browser import COMMAND, Browser
+
+PARTS = '{% import "shipgym.pages/parts.html" as parts with context %}'
+HOSTILE = "</script><script>alert(1)</script>\"'&{{ 7 * 7 }}"
 
 
 class Page(HTMLParser):
@@ -87,27 +96,88 @@ def test_every_figure_has_a_caption_and_a_place(source):
         assert f'id="plot-{name}"' in source
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="chromium is not installed")
+@pytest.mark.skipif(COMMAND is None, reason="no chromium is installed")
 def test_a_browser_without_network_draws_every_figure(chain):
-    browser = ("chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage")
-    quiet = ("--disable-background-networking", "--disable-component-update", "--disable-sync")
-    offline = ("--host-resolver-rules=MAP * ~NOTFOUND", "--virtual-time-budget=8000", "--dump-dom")
-    drawn = subprocess.run(
-        [*browser, *quiet, *offline, f"file://{chain[0] / 'report.html'}"],
-        capture_output=True, text=True, check=True, timeout=120,
+    address = (chain[0] / "report.html").as_uri()
+    browser = Browser()
+    try:
+        browser.open(address)
+        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
+        assert (browser.complaints, browser.requests) == ([], [address])
+    finally:
+        browser.close()
+
+
+def shown(template, **data):
+    return environment().from_string(PARTS + template).render(contents=[], **data)
+
+
+def test_texts_are_escaped_wherever_they_stand():
+    template = """{% call parts.table([text], caption=text) %}
+    {{ parts.row(text, parts.badge(text)) }}{% endcall %}
+    {{ parts.header(text, text, text) }}{{ parts.card(text, text, text) }}{{ parts.note(text) }}
+    {% call parts.verdict(text, "good") %}{% endcall %}{% call parts.section("one", text) %}{% endcall %}"""
+    page = shown(template, text=HOSTILE)
+    assert "<script" not in page
+    assert page.count("&lt;/script&gt;&lt;script&gt;") == 13
+    assert "49" not in page
+
+
+def test_what_is_missing_is_a_dash():
+    assert "<td>\N{EN DASH}</td>" in shown("{{ parts.row(none) }}")
+
+
+def test_a_variable_that_is_missing_is_an_error():
+    with pytest.raises(UndefinedError, match="'absent' is undefined"):
+        shown("{{ parts.note(absent) }}")
+
+
+def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
+    """Escaped in the page's text, and unable to end the scripts that draw the figures."""
+    result = chain[1]
+    ship = replace(result.ship, particulars=replace(result.ship.particulars, name=HOSTILE))
+    trials = tuple(
+        Trial(one.t, one.channels, name=f"{HOSTILE}{k}", kind=one.kind, use=one.use)
+        for k, one in enumerate(result.trials)
+    )
+    names = {old.name: new.name for old, new in zip(result.trials, trials, strict=True)}
+    fit = result.identification
+    metrics = {"trials": {names[name]: found for name, found in fit.metrics["trials"].items()}}
+    predictions = {names[name]: prediction for name, prediction in fit.predictions.items()}
+    first, *others = result.verification.pilots
+    found = replace(result.verification, pilots=(replace(first, key=HOSTILE), *others))
+    hostile = replace(
+        result, ship=ship, trials=trials, verification=found,
+        identification=replace(fit, metrics=metrics, predictions=predictions, trials=trials),
     )  # fmt: skip
-    assert drawn.stdout.count('class="plot js-plotly-plot"') == 7
+    write_report(hostile, tmp_path / "report.html")
+    source = (tmp_path / "report.html").read_text()
+    assert Page(source).scripts == 8  # plotly.js and seven figures
+    assert "<script>alert" not in source
+    assert f"{HOSTILE}0" in " ".join(Page(source).text)
+    assert HOSTILE.upper() in " ".join(Page(source).text)
 
 
-def test_text_is_escaped_and_html_is_not():
-    assert html("<b>") == "&lt;b&gt;"
-    assert html(Html("<b>")) == "<b>"
-    assert "&lt;script&gt;" in table(["<script>"], [])
+def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
+    name = f"zigzag {HOSTILE}"
+    manoeuvre = Manoeuvre(zigzag, zigzag_indices, ZigzagIndices)
+    found = StandardTrials(
+        {"zigzags": {name: manoeuvre}},
+        {},
+        {name: {"period_s": IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))}},
+        {},
+        {name: HOSTILE},
+        0,
+    )
+    write_page(replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html")
+    source = (tmp_path / "trials.html").read_text()
+    assert Page(source).scripts == 1
+    assert " ".join(Page(source).text).count(HOSTILE) == 5  # window, title, head, and why it was refused
 
 
 def test_a_figure_cannot_end_the_script_it_stands_in():
-    drawn = graph_objects().Figure(layout={"title": {"text": "</script><script>alert(1)"}})
-    assert figure(drawn, "plot", "").count("</script>") == 1
+    drawn = graph_objects().Figure(layout={"title": {"text": HOSTILE}, "height": 300})
+    assert shown('{{ parts.figure("plot", drawn, "") }}', drawn=drawn).count("</script>") == 1
 
 
 @pytest.mark.parametrize(
@@ -119,7 +189,7 @@ def test_a_figure_cannot_end_the_script_it_stands_in():
         (0.0, "0"),
         (None, "\N{EN DASH}"),
         (np.inf, "\N{EN DASH}"),
-        (1.2345e-6, "1.23 · 10<sup>\N{MINUS SIGN}6</sup>"),
+        (1.2345e-6, "1.23 · 10⁻⁶"),
     ],
 )
 def test_numbers_have_three_significant_digits(value, shown):
@@ -132,7 +202,7 @@ def test_a_minus_is_a_minus():
 
 @pytest.mark.parametrize(
     ("share", "shown"),
-    [(0.0, "0 %"), (0.004, "&lt; 1 %"), (0.5, "50 %"), (0.995, "&gt; 99 %"), (1.0, "100 %")],
+    [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")],
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown
@@ -140,7 +210,7 @@ def test_a_probability_is_certain_only_if_it_is(share, shown):
 
 def test_a_band_goes_from_5_to_95_per_cent():
     t, values = np.arange(3.0), np.linspace(0.0, 1.0, 101)[:, None] * np.ones(3)
-    (drawn,) = band(t, values, "spread", "#1d70b8")
+    (drawn,) = band(t, values, "draws", "#1d70b8")
     assert np.asarray(drawn.y, dtype=float) == pytest.approx([0.95] * 3 + [0.05] * 3)
 
 

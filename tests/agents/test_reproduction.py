@@ -1,23 +1,33 @@
 import json
 
 import pytest
+import reproduce
+from papers import CASES, PAPERS, Row
+from papers.page import missed, page, papers_of
+from papers.requirements import REQUIREMENTS
 from typer.testing import CliRunner
 
-from agents.cli import app
-from agents.cli.reproduction import missed, page, papers_of
-from identification.papers import CASES, PAPERS, Row
-from identification.papers.requirements import REQUIREMENTS
+from agents.cli import app, reproduction
 
 
-def test_a_paper_that_is_not_known_gets_one_message():
+def test_a_paper_that_is_not_known_gets_one_message(capfd):
+    """Through the command `shipgym`, which runs the program of the checkout."""
     answer = CliRunner().invoke(app, ["reproduce", "cao2051"])
     assert answer.exit_code == 2
-    assert "Did you mean 'cao2015'" in answer.stderr
+    assert "Did you mean 'cao2015'" in capfd.readouterr().err
+
+
+def test_an_installed_package_says_where_the_tables_are_made(monkeypatch, tmp_path):
+    monkeypatch.setattr(reproduction, "SCRIPT", tmp_path / "reproduce.py")
+    answer = CliRunner().invoke(app, ["reproduce", "xu2020"])
+    assert answer.exit_code == 2
+    assert "checkout" in answer.stderr
+    assert "python scripts/reproduce.py xu2020" in answer.stderr
 
 
 def test_rows_for_programs_and_the_page_for_readers(tmp_path):
     path = tmp_path / "reproduction.md"
-    answer = CliRunner().invoke(app, ["reproduce", "cao2015", "--json", "--markdown", str(path)])
+    answer = CliRunner().invoke(reproduce.app, ["cao2015", "--json", "--markdown", str(path)])
     assert answer.exit_code == 0
     rows = json.loads(answer.stdout)["cao2015"]
     assert len(rows) == 104

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from identification import identify
-from identification.validation.warnings import concerns, why_unstable
+from identification.validation.warnings import model_warnings, why_unstable
 from shipgym import InputError, ShipFile, ShipModel, Trial
 
 DEMO = Path(__file__).parents[2] / "examples" / "mariner"
@@ -66,7 +66,7 @@ def test_a_method_that_leaves_nothing_out_marks_exactly_collinear_terms(
     fit = identify([tied], "linear-steering", method, particulars=mariner.particulars)
     marked = "yaw: exactly collinear in the data: c_v and c_r; only combinations are determined"
     assert marked in " ".join(fit.summary().split())
-    assert any(text.startswith(marked) for text in concerns(fit))
+    assert any(text.startswith(marked) for text in model_warnings(fit))
     assert np.all(np.isfinite(list(fit.coefficients.values())))
 
 

@@ -33,9 +33,9 @@ def coverage(lasting: int, memory: float, seeds: int = 60) -> float:
     hits = []
     for seed in range(seeds):
         samples = regression(np.random.default_rng(seed), lasting)
-        machines = fit_all(get_method("ls").machine, samples)
-        deviation = np.sqrt(np.diag(bootstrap_covariance(machines, samples, memory, draws=40)))
-        hits.append(np.abs(machines["u"].coef_ - [1.0, -2.0]) < 1.96 * deviation)
+        estimators = fit_all(get_method("ls").estimator, samples)
+        deviation = np.sqrt(np.diag(bootstrap_covariance(estimators, samples, memory, draws=40)))
+        hits.append(np.abs(estimators["u"].coef_ - [1.0, -2.0]) < 1.96 * deviation)
     return float(np.mean(hits))
 
 
@@ -50,9 +50,9 @@ def test_blocks_as_long_as_the_errors_last_cover_what_single_rows_do_not() -> No
 
 def test_bootstrap_agrees_with_the_formula_for_white_errors() -> None:
     samples = regression(np.random.default_rng(1), n=2000)
-    machines = fit_all(get_method("ls").machine, samples)
-    analytic = joint_covariance(machines, samples)
-    drawn = bootstrap_covariance(machines, samples, 0.0, draws=1000)
+    estimators = fit_all(get_method("ls").estimator, samples)
+    analytic = joint_covariance(estimators, samples)
+    drawn = bootstrap_covariance(estimators, samples, 0.0, draws=1000)
     np.testing.assert_allclose(np.diag(drawn), np.diag(analytic), rtol=0.2)
 
 

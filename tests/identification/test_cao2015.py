@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
-
-from identification.papers import get_paper
-from identification.papers.cao2015 import FORCES, as_printed, errors, printed_errors
+from papers import get_paper
+from papers.cao2015 import FORCES, as_printed, errors, printed_errors
 
 
 @pytest.fixture(scope="module")

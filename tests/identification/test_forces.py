@@ -66,7 +66,7 @@ def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
 
 
 @pytest.mark.parametrize("model_inertia", [True, False])
-def test_table_11_is_found_back_from_the_virtual_tank(model_inertia: bool) -> None:
+def test_table_11_is_recovered_from_the_virtual_tank(model_inertia: bool) -> None:
     """Added mass, and coefficients that stand in three equations, from all tests at once."""
     model = identify_forces(
         tank_tests(model_inertia=model_inertia), "pmm18", PARTICULARS, model_inertia=model_inertia

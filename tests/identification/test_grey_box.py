@@ -10,7 +10,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.estimators.rm_svm import NEARLY, RMSVM
+from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import correlations, select_reference, similarity_vector
@@ -123,8 +123,8 @@ def test_the_correction_passes_the_battery_of_scikit_learn() -> None:
 def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
     rng = np.random.default_rng(0)
     X = np.column_stack([rng.standard_normal((200, 2)) * [1.0, 1e-3], np.ones(200)])
-    machine = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(X, X @ [2.0, -500.0, 0.3])
-    assert machine.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
+    estimator = RMSVM(C=1e6, epsilon=0.0, constant=2, regression=regression).fit(X, X @ [2.0, -500.0, 0.3])
+    assert estimator.coef_ == pytest.approx([2.0, -500.0, 0.3], rel=1e-3)
     free = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(X[:, :2], X[:, :2] @ [2.0, -500.0])
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 
@@ -177,7 +177,7 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
     for weight in weights:
         learnt = fit(target, trials, **settings, C=weight, hold_out=["starboard-20"])
         errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
-    least = next(w for w, e in zip(weights, errors, strict=True) if e <= NEARLY * min(errors))
+    least = next(w for w, e in zip(weights, errors, strict=True) if e <= ERROR_TOLERANCE * min(errors))
     assert provenance["search"]["r"]["C"] == least
 
 

@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from papers.dense_dual import dense_dual_solution, dense_truncated_solution
 from scipy.linalg import solve
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
@@ -11,7 +12,6 @@ from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.dense_dual import dense_dual_solution, dense_truncated_solution
 from identification.regression.decomposition import decompose_triangle, triangle
 from shipgym import InputError
 
@@ -54,9 +54,9 @@ def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any) -> None:
 def test_primal_form_equals_the_printed_dual_system(C: float, fit_intercept: bool) -> None:
     X, y, _ = regression(n=120)
     coef, intercept = dense_dual_solution(X, y, C, fit_intercept)
-    machine = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
-    np.testing.assert_allclose(machine.coef_, coef, rtol=1e-6, atol=1e-9)
-    assert machine.intercept_ == pytest.approx(intercept, rel=1e-6, abs=1e-9)
+    estimator = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
+    np.testing.assert_allclose(estimator.coef_, coef, rtol=1e-6, atol=1e-9)
+    assert estimator.intercept_ == pytest.approx(intercept, rel=1e-6, abs=1e-9)
 
 
 def test_primal_form_keeps_thirteen_digits_where_the_dual_keeps_six() -> None:
@@ -84,24 +84,24 @@ def test_without_penalty_it_is_least_squares() -> None:
     X, y, _ = regression()
     bordered = np.column_stack([X, np.ones(len(X))])
     expected = np.linalg.lstsq(bordered, y, rcond=None)[0]
-    machine = LSSVM(C=np.inf).fit(X, y)
-    np.testing.assert_allclose([*machine.coef_, machine.intercept_], expected, rtol=1e-8)
+    estimator = LSSVM(C=np.inf).fit(X, y)
+    np.testing.assert_allclose([*estimator.coef_, estimator.intercept_], expected, rtol=1e-8)
 
 
 def test_standardised_fit_does_not_depend_on_units() -> None:
     X, y, _ = regression()
     units = np.geomspace(1e-4, 1e4, X.shape[1])
-    for machine in (LSSVM(C=0.3), TruncatedLSSVM(rank=4)):
-        before = machine.fit(X, y).coef_
-        np.testing.assert_allclose(machine.fit(X * units, y).coef_ * units, before, rtol=1e-6)
+    for estimator in (LSSVM(C=0.3), TruncatedLSSVM(rank=4)):
+        before = estimator.fit(X, y).coef_
+        np.testing.assert_allclose(estimator.fit(X * units, y).coef_ * units, before, rtol=1e-6)
 
 
 def test_data_without_noise_keep_every_direction() -> None:
     for seed in range(20):
         X, y, coefficients = regression(noise=0.0, seed=seed)
-        machine = TruncatedLSSVM().fit(X, y)
-        assert machine.rank_ == X.shape[1]
-        np.testing.assert_allclose(machine.coef_, coefficients, rtol=1e-6)
+        estimator = TruncatedLSSVM().fit(X, y)
+        assert estimator.rank_ == X.shape[1]
+        np.testing.assert_allclose(estimator.coef_, coefficients, rtol=1e-6)
 
 
 def test_l_curve_drops_the_direction_that_noise_owns() -> None:
@@ -109,10 +109,10 @@ def test_l_curve_drops_the_direction_that_noise_owns() -> None:
     X = rng.standard_normal((500, 4))
     X[:, 3] = X[:, 2] + 1e-5 * rng.standard_normal(500)
     y = X @ [1.0, -2.0, 0.5, 0.5] + 0.1 * rng.standard_normal(500)
-    machine = TruncatedLSSVM().fit(X, y)
-    assert machine.rank_ == 3
-    assert machine.collinear_groups_ == ((2, 3),)
-    np.testing.assert_allclose(machine.coef_, [1.0, -2.0, 0.5, 0.5], atol=0.02)
+    estimator = TruncatedLSSVM().fit(X, y)
+    assert estimator.rank_ == 3
+    assert estimator.collinear_groups_ == ((2, 3),)
+    np.testing.assert_allclose(estimator.coef_, [1.0, -2.0, 0.5, 0.5], atol=0.02)
     assert np.abs(LSSVM(C=np.inf).fit(X, y).coef_[2]) > 10.0
 
 
@@ -120,9 +120,9 @@ def test_exact_copy_of_a_feature_is_dropped_by_every_selection() -> None:
     X, y, _ = regression(m=3)
     copied = np.column_stack([X, X[:, 2]])
     for selection in ("l-curve", "gcv", "full"):
-        machine = TruncatedLSSVM(selection=selection).fit(copied, y)
-        assert machine.rank_ <= 3
-        assert machine.coef_[2] == pytest.approx(machine.coef_[3], rel=1e-6)
+        estimator = TruncatedLSSVM(selection=selection).fit(copied, y)
+        assert estimator.rank_ <= 3
+        assert estimator.coef_[2] == pytest.approx(estimator.coef_[3], rel=1e-6)
 
 
 def test_intervals_cover_the_truth_in_95_per_cent() -> None:
@@ -131,22 +131,22 @@ def test_intervals_cover_the_truth_in_95_per_cent() -> None:
     covered = []
     for _ in range(300):
         y = X @ coefficients + rng.standard_normal(200)
-        machine = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
-        error = np.sqrt(np.diag(machine.covariance_))
-        covered.append(np.abs(machine.coef_ - coefficients) < 1.96 * error)
+        estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
+        error = np.sqrt(np.diag(estimator.covariance_))
+        covered.append(np.abs(estimator.coef_ - coefficients) < 1.96 * error)
     assert 0.93 < np.mean(covered) < 0.97
 
 
 def test_polynomial_kernel_learns_a_quadratic() -> None:
     x = np.linspace(-1.0, 1.0, 40)[:, None]
-    machine = LSSVM(C=1e9, kernel="poly", degree=2, scale=False).fit(
+    estimator = LSSVM(C=1e9, kernel="poly", degree=2, scale=False).fit(
         x, 1.0 + 2.0 * x[:, 0] - 3.0 * x[:, 0] ** 2
     )
-    np.testing.assert_allclose(machine.predict([[0.3], [-0.7]]), [1.33, -1.87], atol=1e-5)
+    np.testing.assert_allclose(estimator.predict([[0.3], [-0.7]]), [1.33, -1.87], atol=1e-5)
 
 
 @pytest.mark.parametrize(
-    ("machine", "message"),
+    ("estimator", "message"),
     [
         (LSSVM(kernel="sigmoid"), "kernel: 'sigmoid'"),
         (LSSVM(C=0.0), "C: 0"),
@@ -173,10 +173,10 @@ def test_polynomial_kernel_learns_a_quadratic() -> None:
         (TruncatedLSSVM(rank=0), "rank: 0"),
     ],
 )
-def test_wrong_settings_are_named(machine: Any, message: str) -> None:
+def test_wrong_settings_are_named(estimator: Any, message: str) -> None:
     X, y, _ = regression()
     with pytest.raises(InputError, match=message):
-        machine.fit(X, y)
+        estimator.fit(X, y)
 
 
 @pytest.mark.parametrize("C", [1e-3, 1.0, 1e4])
@@ -184,27 +184,27 @@ def test_wrong_settings_are_named(machine: Any, message: str) -> None:
 def test_it_is_the_ridge_regression_of_scikit_learn(C: float, fit_intercept: bool) -> None:
     X, y, _ = regression()
     oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd").fit(X, y)
-    machine = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
-    np.testing.assert_allclose(machine.coef_, oracle.coef_, rtol=1e-8)
-    assert machine.intercept_ == pytest.approx(oracle.intercept_, rel=1e-8, abs=1e-12)
+    estimator = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
+    np.testing.assert_allclose(estimator.coef_, oracle.coef_, rtol=1e-8)
+    assert estimator.intercept_ == pytest.approx(oracle.intercept_, rel=1e-8, abs=1e-12)
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "poly"])
 def test_kernels_without_intercept_are_the_kernel_ridge_of_scikit_learn(kernel: str) -> None:
     X, y, _ = regression(n=80)
     oracle = KernelRidge(alpha=0.1, kernel=kernel, gamma=0.2, degree=2, coef0=1.0).fit(X, y)
-    machine = LSSVM(
+    estimator = LSSVM(
         C=10.0, kernel=kernel, gamma=0.2, degree=2, coef0=1.0, scale=False, fit_intercept=False
     ).fit(X, y)
-    np.testing.assert_allclose(machine.predict(X), oracle.predict(X), rtol=1e-8)
+    np.testing.assert_allclose(estimator.predict(X), oracle.predict(X), rtol=1e-8)
 
 
 def test_coefficients_are_read_out_of_a_polynomial_kernel() -> None:
     x = np.random.default_rng(0).uniform(-1.0, 2.0, (60, 2))
     y = 1.0 + 2.0 * x[:, 0] - 3.0 * x[:, 0] ** 2 + 0.5 * x[:, 0] * x[:, 1]
     for scale, fit_intercept in ((True, True), (False, False)):
-        machine = LSSVM(C=1e9, kernel="poly", degree=2, scale=scale, fit_intercept=fit_intercept).fit(x, y)
-        found = polynomial_coefficients(machine)
+        estimator = LSSVM(C=1e9, kernel="poly", degree=2, scale=scale, fit_intercept=fit_intercept).fit(x, y)
+        found = polynomial_coefficients(estimator)
         expected = {(0, 0): 1.0, (1, 0): 2.0, (0, 1): 0.0, (2, 0): -3.0, (1, 1): 0.5, (0, 2): 0.0}
         assert found == {powers: pytest.approx(c, abs=1e-5) for powers, c in expected.items()}
     with pytest.raises(InputError, match="poly"):
@@ -219,15 +219,15 @@ def with_outliers(seed: int = 0) -> tuple[Floats, Floats, Floats]:
     return X, y, coefficients
 
 
-@pytest.mark.parametrize("machine", [LSSVM, TruncatedLSSVM])
-def test_robust_fit_is_not_moved_by_outliers(machine: Any) -> None:
-    options = {"selection": "full"} if machine is TruncatedLSSVM else {"C": 1e9}
+@pytest.mark.parametrize("estimator", [LSSVM, TruncatedLSSVM])
+def test_robust_fit_is_not_moved_by_outliers(estimator: Any) -> None:
+    options = {"selection": "full"} if estimator is TruncatedLSSVM else {"C": 1e9}
     gains = []
     for seed in range(10):
         X, y, coefficients = with_outliers(seed)
         size = np.std(X, axis=0)
         plain, robust = (
-            np.linalg.norm((machine(robust=on, **options).fit(X, y).coef_ - coefficients) * size)
+            np.linalg.norm((estimator(robust=on, **options).fit(X, y).coef_ - coefficients) * size)
             for on in (False, True)
         )
         gains.append(plain / robust)
@@ -257,8 +257,10 @@ def test_intervals_of_the_robust_fit_cover_the_truth_in_95_per_cent_in_spite_of_
     covered = []
     for seed in range(150):
         X, y, coefficients = with_outliers(seed)
-        machine = TruncatedLSSVM(selection="full", robust=True).fit(X, y)
-        covered.append(np.abs(machine.coef_ - coefficients) < 1.96 * np.sqrt(np.diag(machine.covariance_)))
+        estimator = TruncatedLSSVM(selection="full", robust=True).fit(X, y)
+        covered.append(
+            np.abs(estimator.coef_ - coefficients) < 1.96 * np.sqrt(np.diag(estimator.covariance_))
+        )
     assert 0.93 < np.mean(covered) < 0.97
 
 
@@ -297,8 +299,10 @@ def test_collinear_terms_are_named() -> None:
 def test_support_vectors_shrug_off_outliers_too() -> None:
     X, y, coefficients = with_outliers()
     size = np.std(X, axis=0)
-    machine = LinearSupportVectorMachine(C=10.0).fit(X, y)
+    estimator = LinearSupportVectorMachine(C=10.0).fit(X, y)
     plain = np.linalg.norm((LSSVM(C=1e9).fit(X, y).coef_ - coefficients) * size)
-    assert np.linalg.norm((machine.coef_ - coefficients) * size) < 0.5 * plain
-    assert machine.weights_[np.argmax(np.abs(y - machine.predict(X)))] < 0.1 < np.median(machine.weights_)
-    assert np.all(np.linalg.eigvalsh(machine.covariance_) > 0.0)
+    assert np.linalg.norm((estimator.coef_ - coefficients) * size) < 0.5 * plain
+    assert (
+        estimator.weights_[np.argmax(np.abs(y - estimator.predict(X)))] < 0.1 < np.median(estimator.weights_)
+    )
+    assert np.all(np.linalg.eigvalsh(estimator.covariance_) > 0.0)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 
 import pytest
-
-from identification.papers import Row
-from identification.papers import mei2019 as mei
+from papers import Row
+from papers import mei2019 as mei
 
 MARIN = pytest.mark.skipif(not mei.measured(), reason="MARIN's zigzags are not at hand")
 

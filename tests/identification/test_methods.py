@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.linear_model import Ridge
+from sklearn.neighbors import KNeighborsRegressor
 
-from identification import ArtificialBeeColony, cross_validate, identify
+from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
 from identification.estimators.methods import METHODS
 from identification.search.free_running import free_running_error
 from shipgym import InputError, ShipModel, Trial
@@ -136,8 +138,9 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
     assert fit.diagnostics["r"].rank == 2
     (group,) = fit.diagnostics["r"].dropped
     assert len(group) == 2
-    assert f"yaw: not told apart by the data, their combination was left out: {', '.join(group)}" in (
-        " ".join(fit.summary().split())
+    assert (
+        f"yaw: the data cannot separate these terms, their combination was left out: {', '.join(group)}"
+        in (" ".join(fit.summary().split()))
     )
 
 
@@ -154,9 +157,10 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
         ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
         ({"method": "svr", "C": float("inf")}, "C: inf"),
         (
-            {"method": "ls", "rank": 3, "depth": 2},
-            "settings: rank, depth found, which method 'ls'",
+            {"method": "ls", "rank": 3, "epsilon": 0.1},
+            "settings: epsilon, rank found, which method 'ls'",
         ),
+        ({"depth": 2}, "depth: identify has no such option"),
     ],
 )
 def test_wrong_settings_are_named(
@@ -169,3 +173,33 @@ def test_wrong_settings_are_named(
 def test_methods_are_registered_by_their_names() -> None:
     assert all(name == method.name for name, method in METHODS.items())
     assert {"ls", "ridge", "ls-svm", "tls-svm", "svr", *SEARCHES} <= set(METHODS)
+
+
+def test_an_estimator_object_is_a_method(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    """Scikit-learn's ridge regression, whose constant the equations do not have, and our own estimator."""
+    ship = {"particulars": mariner.particulars, "steering": mariner.steering}
+    named = identify(noisy_trials, method="ridge", alpha=1e-9, **ship)
+    own = identify(noisy_trials, method=Ridge(alpha=1e-9, solver="svd"), **ship)
+    assert own.stable
+    for name, value in named.coefficients.items():
+        assert own.coefficients[name] == pytest.approx(value, rel=1e-3), name
+    for name, error in identify(noisy_trials, method="ls", **ship).standard_errors.items():
+        assert own.standard_errors[name] == pytest.approx(error, rel=1e-3), name
+    assert own.settings["method"]["kind"] == (own.model.provenance or {})["method"] == "Ridge"
+    ours = identify(noisy_trials, method=LSSVM(C=1e4), **ship)
+    assert ours.coefficients == identify(noisy_trials, method="ls-svm", C=1e4, **ship).coefficients
+
+
+@pytest.mark.parametrize(
+    ("method", "settings", "told"),
+    [
+        (KNeighborsRegressor(), {}, "sets no finite coefficient for each of the"),
+        (3, {}, "or an estimator with scikit-learn's interface"),
+        (Ridge(), {"C": 1.0}, "settings: C found, which method 'Ridge' does not know"),
+    ],
+)
+def test_an_object_that_is_no_linear_estimator_is_refused(
+    cao_zigzag: Trial, mariner: ShipModel, method: Any, settings: dict[str, Any], told: str
+) -> None:
+    with pytest.raises(InputError, match=told):
+        identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from real_ships import CASES, Data, get_case
+from real_ships.captive import FORCES, combined, held_out, least_squares, read, study
+from real_ships.esso_osaka import LEAST_SPEED, under_way
+from real_ships.hsva import RUNS, SHIP, TRIPLES
+from real_ships.marin import MEASURED, full_scale
+from real_ships.measures import turns, zigzag_errors
+from real_ships.section import Section, marks, number, put, table
 
-from identification.real_ships import CASES, Data, get_case
-from identification.real_ships.captive import FORCES, combined, held_out, least_squares, read, study
-from identification.real_ships.esso_osaka import LEAST_SPEED, under_way
-from identification.real_ships.hsva import RUNS, SHIP, TRIPLES
-from identification.real_ships.marin import MEASURED, full_scale
-from identification.real_ships.measures import turns, zigzag_errors
-from identification.real_ships.section import Section, marks, number, put, table
 from shipgym import InputError, ShipModel
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import load_model
@@ -37,7 +37,7 @@ def test_the_page_has_a_place_for_each_case_and_says_by_which_command() -> None:
     for case in CASES:
         first, last = marks(case)
         assert page.count(first) == page.count(last) == 1
-        assert f"`python scripts/real_ships.py {case}`" in page
+        assert f"`python scripts/predict_real_ships.py {case}`" in page
         assert callable(get_case(case))
 
 

@@ -9,7 +9,7 @@ import pytest
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import identify
-from identification.estimators.coefficient_history import follow
+from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
     RecursiveLeastSquares,
@@ -51,23 +51,23 @@ def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any) -> None:
 def test_without_forgetting_rls_is_ridge_regression() -> None:
     X, y = regression()
     C = 10.0
-    machine = RecursiveLeastSquares(C=C).fit(X, y)
-    scaled = X / machine.scale_
+    estimator = RecursiveLeastSquares(C=C).fit(X, y)
+    scaled = X / estimator.scale_
     moment = scaled.T @ scaled + np.eye(4) / C
     np.testing.assert_allclose(
-        machine.theta, np.linalg.solve(moment, scaled.T @ y) / machine.scale_, rtol=1e-9
+        estimator.theta, np.linalg.solve(moment, scaled.T @ y) / estimator.scale_, rtol=1e-9
     )
-    inverse = np.linalg.inv(moment) / np.outer(machine.scale_, machine.scale_)
-    np.testing.assert_allclose(machine.covariance, inverse, rtol=1e-8, atol=1e-12 * np.abs(inverse).max())
+    inverse = np.linalg.inv(moment) / np.outer(estimator.scale_, estimator.scale_)
+    np.testing.assert_allclose(estimator.covariance, inverse, rtol=1e-8, atol=1e-12 * np.abs(inverse).max())
 
 
 def test_with_forgetting_rls_is_exponentially_weighted_least_squares() -> None:
     X, y = regression()
-    machine = RecursiveLeastSquares(forgetting=0.97, C=1e9).fit(X, y)
+    estimator = RecursiveLeastSquares(forgetting=0.97, C=1e9).fit(X, y)
     root = np.sqrt(0.97 ** np.arange(399.0, -1.0, -1.0))
     weighted = np.linalg.lstsq(X * root[:, None], y * root, rcond=None)[0]
-    np.testing.assert_allclose(machine.coef_, weighted, rtol=1e-5)
-    np.testing.assert_allclose(machine.inverse_moment_, machine.covariance, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(estimator.coef_, weighted, rtol=1e-5)
+    np.testing.assert_allclose(estimator.inverse_moment_, estimator.covariance, rtol=1e-4, atol=1e-9)
 
 
 @pytest.mark.parametrize("forgetting", [1.0, 0.98])
@@ -75,22 +75,27 @@ def test_with_forgetting_rls_is_exponentially_weighted_least_squares() -> None:
 def test_tmils_is_mils_without_the_inverse(innovations: int, forgetting: float) -> None:
     X, y = regression()
     with_inverse, without = (
-        MultiInnovationLeastSquares(innovations, 0.0, inverse_free, forgetting).follow(X, y)
+        MultiInnovationLeastSquares(
+            forgetting, innovations=innovations, inverse_free=inverse_free
+        ).fit_history(X, y)
         for inverse_free in (False, True)
     )
     np.testing.assert_allclose(without[10:], with_inverse[10:], rtol=1e-6)
     if innovations == 1:
-        np.testing.assert_array_equal(without, RecursiveLeastSquares(forgetting).follow(X, y))
+        np.testing.assert_array_equal(without, RecursiveLeastSquares(forgetting).fit_history(X, y))
 
 
 def test_samples_one_by_one_are_samples_at_once() -> None:
     X, y = regression()
-    for machine in (MultiInnovationLeastSquares(4, 0.5), StochasticGradient(0.5, 0.98)):
-        at_once = type(machine)(**machine.get_params()).update(X[:50], y[:50]).update(X[50:], y[50:])
-        machine.update(X[:50], y[:50])
+    for estimator in (
+        MultiInnovationLeastSquares(innovations=4, omega=0.5),
+        StochasticGradient(0.98, omega=0.5),
+    ):
+        at_once = type(estimator)(**estimator.get_params()).update(X[:50], y[:50]).update(X[50:], y[50:])
+        estimator.update(X[:50], y[:50])
         for phi, target in zip(X[50:], y[50:], strict=True):
-            machine.update(phi, target)
-        np.testing.assert_allclose(machine.theta, at_once.theta, rtol=1e-12)
+            estimator.update(phi, target)
+        np.testing.assert_allclose(estimator.theta, at_once.theta, rtol=1e-12)
 
 
 def test_signals_side_by_side_are_signals_alone() -> None:
@@ -107,19 +112,19 @@ def test_signals_side_by_side_are_signals_alone() -> None:
 @pytest.mark.parametrize("omega", [0.0, 0.5])
 def test_the_stochastic_gradient_converges_with_forgetting(omega: float) -> None:
     X, y = regression(4000, noise=0.0)
-    machine = StochasticGradient(omega, forgetting=0.95)
-    course = machine.follow(X, y)
+    estimator = StochasticGradient(omega=omega, forgetting=0.95)
+    course = estimator.fit_history(X, y)
     errors = np.max(np.abs(course / TRUTH - 1.0), axis=1)
     assert errors[-1] < 1e-4
     assert errors[-1] < 1e-3 * errors[400]
-    assert machine.covariance is None
+    assert estimator.covariance is None
 
 
 def test_a_nonlinear_innovation_bounds_what_an_outlier_does() -> None:
     X, y = regression(600)
     y[500] += 50.0 * np.std(y)
     linear, bounded = (
-        np.abs(MultiInnovationLeastSquares(3, omega).fit(X, y).coef_ / TRUTH - 1.0).max()
+        np.abs(MultiInnovationLeastSquares(innovations=3, omega=omega).fit(X, y).coef_ / TRUTH - 1.0).max()
         for omega in (0.0, 1.0)
     )
     assert bounded < 0.2 * linear
@@ -128,20 +133,20 @@ def test_a_nonlinear_innovation_bounds_what_an_outlier_does() -> None:
 def test_the_start_is_ls_svr_and_the_end_is_least_squares() -> None:
     """Zhu 2018, 7.3: 200 samples at interval 3, then recursion over the rest."""
     X, y = regression(1000)
-    machine = RecursiveLeastSquares(start_samples=200, start_interval=3, start_C=1e9)
-    course = machine.follow(X, y)
+    estimator = RecursiveLeastSquares(start_samples=200, start_interval=3, start_C=1e9)
+    course = estimator.fit_history(X, y)
     early = np.linalg.lstsq(X[:600:3], y[:600:3], rcond=None)[0]
     np.testing.assert_allclose(course[599], early, rtol=1e-6)
     used = np.r_[0:600:3, 600:1000]
-    np.testing.assert_allclose(machine.coef_, np.linalg.lstsq(X[used], y[used], rcond=None)[0], rtol=1e-6)
-    assert machine.weights_.sum() == 600
+    np.testing.assert_allclose(estimator.coef_, np.linalg.lstsq(X[used], y[used], rcond=None)[0], rtol=1e-6)
+    assert estimator.weights_.sum() == 600
 
 
 def test_forgetting_tracks_a_coefficient_that_jumps() -> None:
     X, y = regression(800, noise=0.001)
     after = TRUTH * np.array([2.0, 1.0, 1.0, 1.0])
     y[400:] += X[400:] @ (after - TRUTH)
-    course = RecursiveLeastSquares(forgetting=0.95).follow(X, y)
+    course = RecursiveLeastSquares(forgetting=0.95).fit_history(X, y)
     np.testing.assert_allclose(course[399], TRUTH, rtol=0.01)
     np.testing.assert_allclose(course[-1], after, rtol=0.01)
     remembers_all = RecursiveLeastSquares().fit(X, y).coef_
@@ -150,13 +155,13 @@ def test_forgetting_tracks_a_coefficient_that_jumps() -> None:
 
 def test_nothing_winds_up_while_the_ship_sails_straight() -> None:
     X, y = regression(400)
-    machine = RecursiveLeastSquares(forgetting=0.9, C=100.0).fit(X, y)
-    before = machine.theta.copy()
-    machine.update(np.zeros((20_000, 4)), np.zeros(20_000))
-    assert machine.covariance is not None
-    assert np.all(np.diag(machine.covariance) * machine.scale_**2 <= 100.0 * (1 + 1e-9))
-    np.testing.assert_array_equal(machine.theta, before)
-    np.testing.assert_allclose(machine.update(X, y).theta, TRUTH, rtol=0.02)
+    estimator = RecursiveLeastSquares(forgetting=0.9, C=100.0).fit(X, y)
+    before = estimator.theta.copy()
+    estimator.update(np.zeros((20_000, 4)), np.zeros(20_000))
+    assert estimator.covariance is not None
+    assert np.all(np.diag(estimator.covariance) * estimator.scale_**2 <= 100.0 * (1 + 1e-9))
+    np.testing.assert_array_equal(estimator.theta, before)
+    np.testing.assert_allclose(estimator.update(X, y).theta, TRUTH, rtol=0.02)
 
 
 L, U0 = 190.0, 9.0
@@ -173,7 +178,9 @@ def hual_trooper(structure: str, coefficients: dict[str, float]) -> Trial:
 
 @pytest.mark.parametrize("method", ["rls", "mils", "tmils"])
 def test_k_and_t_of_hual_trooper_within_one_per_cent(method: str) -> None:
-    course = follow(hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, method)
+    course = coefficient_history(
+        hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, method
+    )
     found = course.last
     assert -1.0 / found["c_r"] == pytest.approx(T, rel=0.01)
     assert -found["c_d"] / found["c_r"] == pytest.approx(K, rel=0.01)
@@ -183,7 +190,7 @@ def test_k_and_t_of_hual_trooper_within_one_per_cent(method: str) -> None:
 @pytest.mark.parametrize("method", ["rls", "tmils"])
 def test_the_nonlinear_coefficients_of_hual_trooper_within_one_per_cent(method: str) -> None:
     truth = {"c_r": -ALPHA * K / T, "c_r3": -BETA * K / T, "c_d": K / T}
-    found = follow(hual_trooper("norrbin", truth), "norrbin", PARTICULARS, method).last
+    found = coefficient_history(hual_trooper("norrbin", truth), "norrbin", PARTICULARS, method).last
     for name, value in truth.items():
         assert found[name] == pytest.approx(value, rel=0.01), name
 
@@ -198,7 +205,7 @@ def test_identify_knows_the_recursive_methods(method: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("machine", "message"),
+    ("estimator", "message"),
     [
         (RecursiveLeastSquares(forgetting=1.5), "forgetting: 1.5 found"),
         (RecursiveLeastSquares(C=-1.0), "C: -1 found"),
@@ -208,17 +215,19 @@ def test_identify_knows_the_recursive_methods(method: str) -> None:
         (RecursiveLeastSquares(scale=[1.0, 2.0]), "scale: shape"),
     ],
 )
-def test_settings_out_of_range_are_named(machine: Any, message: str) -> None:
+def test_settings_out_of_range_are_named(estimator: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
-        machine.fit(*regression())
+        estimator.fit(*regression())
 
 
 def test_samples_that_do_not_fit_are_named() -> None:
     X, y = regression()
-    machine = RecursiveLeastSquares().update(X, y)
+    estimator = RecursiveLeastSquares().update(X, y)
     with pytest.raises(InputError, match="1 signals of 3 regressors found, expected 1 of 4"):
-        machine.update(X[0, :3], 1.0)
+        estimator.update(X[0, :3], 1.0)
     with pytest.raises(InputError, match="not finite"):
-        machine.update(X[0], np.nan)
+        estimator.update(X[0], np.nan)
     with pytest.raises(InputError, match="expected a recursive one"):
-        follow(hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, "ls")
+        coefficient_history(
+            hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, "ls"
+        )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, build_samples, identify
+from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
 from identification.simulation_error.refine import Refinement, refine
 from identification.simulation_error.segments import Shooter, compared_channels, cut
@@ -64,10 +65,10 @@ def test_jacobian_is_that_of_central_differences(
 
 def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zigzag: Trial) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
-    start = guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag])
-    for q, machine in start.machines.items():
-        start.machines[q] = machine
-        machine.coef_ = machine.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(machine.coef_))))
+    start = guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag]))
+    for q, estimator in start.estimators.items():
+        start.estimators[q] = estimator
+        estimator.coef_ = estimator.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(estimator.coef_))))
     refined = refine(start, samples, [cao_zigzag], Refinement(pull=0.0), 20.0)
     truth = np.array(list(mariner.coefficients.values()))
     found = np.array(list(refined.fit.model.coefficients.values()))
@@ -164,7 +165,9 @@ def test_an_anchor_holds_the_turn_of_the_reference_ship(
 
 def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag: Trial) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
-    start = replace(guarded_fit(get_method("tls-svm"), {}, samples, mariner, [cao_zigzag]), stable=False)
+    start = replace(
+        guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag])), stable=False
+    )
     kept = refine(start, samples, [cao_zigzag], Refinement(), 20.0)
     assert kept.fit is start
     assert kept.report["decision"] == "not refined: the start runs away"

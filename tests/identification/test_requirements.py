@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from papers import get_paper, requirements
+from papers.requirements import MEANINGS, REQUIREMENTS, duality_gap
 
-from identification.papers import get_paper, requirements
-from identification.papers.requirements import MEANINGS, REQUIREMENTS, duality_gap
 from shipgym.ships.structures import STRUCTURES
 
 ROOT = Path(__file__).parents[2]
@@ -60,9 +60,9 @@ def test_the_second_derivative_is_positive_in_every_direction(seed, weight, copi
     hessian = np.diag([1.0, 1.0, 1.0, 0.0]) + weight * ones.T @ ones
     assert np.linalg.eigvalsh(hessian)[0] > 0.0
     assert abs(duality_gap(X, y, weight)) < 1e-9
-    machine = requirements.LSSVM(C=weight, scale=False).fit(X, y)
-    solution = np.append(machine.coef_, machine.intercept_)
-    slope = np.append(machine.coef_, 0.0) - weight * ones.T @ (y - ones @ solution)
+    estimator = requirements.LSSVM(C=weight, scale=False).fit(X, y)
+    solution = np.append(estimator.coef_, estimator.intercept_)
+    slope = np.append(estimator.coef_, 0.0) - weight * ones.T @ (y - ones @ solution)
     assert np.max(np.abs(slope)) < 1e-9 * max(weight, 1.0) * np.linalg.norm(y)
 
 

@@ -92,7 +92,7 @@ def test_residuals_come_with_bounds_of_white_noise(truncated: IdentificationResu
 
 def test_the_rank_chosen_is_marked_on_the_l_curve(truncated: IdentificationResult) -> None:
     figure = truncated.plots()["l-curve"]
-    curve = truncated.machines["u"].l_curve_  # type: ignore[attr-defined]
+    curve = truncated.estimators["u"].l_curve_  # type: ignore[attr-defined]
     marked = next(trace for trace in figure.data if trace.name == "chosen")
     rank = truncated.diagnostics["u"].rank
     assert marked.x[0] == pytest.approx(curve.residual_norm[rank - 1], rel=1e-6)
@@ -103,7 +103,7 @@ def test_the_search_is_drawn_to_the_c_that_it_found(searched: IdentificationResu
     traces = searched.plots()["search"].data
     assert traces[0].y[-1] == pytest.approx(1.0)
     assert np.all(np.diff(traces[0].y) <= 0.0)
-    assert traces[1].y[-1] == pytest.approx(searched.machines["u"].C_, rel=1e-5)  # type: ignore[attr-defined]
+    assert traces[1].y[-1] == pytest.approx(searched.estimators["u"].C_, rel=1e-5)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize(("epsilon", "figures"), [(None, {"search"}), (0.1, set())])

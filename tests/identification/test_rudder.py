@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.regression.gear import estimated_gear
-from identification.regression.rudder import rebuild
+from identification.regression.rudder import estimated_gear, rebuild
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from papers import get_paper, song2020, song2020_container
+from papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded, regressors
 
-from identification.papers import get_paper, song2020, song2020_container
-from identification.papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded, regressors
 from shipgym.ships import container as own
 from shipgym.ships import load_model
 from shipgym.ships.structures import MMG_4DOF

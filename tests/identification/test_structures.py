@@ -76,7 +76,7 @@ def zigzags(ship: ShipModel, limit_deg: float = 35.0, use: str = "fit") -> list[
 
 
 @pytest.mark.parametrize("name", STEERED)
-def test_a_ship_of_each_structure_is_found_back(name: str) -> None:
+def test_a_ship_of_each_structure_is_recovered(name: str) -> None:
     ship = ship_of(name, own(name))
     fit = identify(zigzags(ship), name, particulars=PARTICULARS)
     assert fit.stable
@@ -93,7 +93,7 @@ def test_a_ship_of_each_structure_is_found_back(name: str) -> None:
         ("surge-perturbed", {"a_du": -0.01, "a_du3": -4e-4, "a_dn": 0.05}),
     ],
 )
-def test_surge_is_found_back_from_accelerations_and_a_crash_stop(
+def test_surge_is_recovered_from_accelerations_and_a_crash_stop(
     name: str, coefficients: dict[str, float]
 ) -> None:
     """Straight runs with the rudder amidships: no rudder has to move."""

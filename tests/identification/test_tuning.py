@@ -131,11 +131,11 @@ def test_held_out_error_is_that_of_fits_one_by_one(fit_intercept: bool, scale: b
         squares = []
         for k in range(5):
             away = blocks == k
-            machine = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(X[~away], y[~away])
-            squares.extend((y[away] - machine.predict(X[away])) ** 2)
+            estimator = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(X[~away], y[~away])
+            squares.extend((y[away] - estimator.predict(X[away])) ** 2)
             if not scale:
                 oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd")
-                np.testing.assert_allclose(machine.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7)
+                np.testing.assert_allclose(estimator.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7)
         assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
 
 
@@ -144,8 +144,8 @@ def test_training_error_falls_with_the_weight_so_that_its_optimum_is_the_upper_b
     error = training_error(X, y, True, True)(np.linspace(-2.0, 4.0, 40)[:, None])
     assert np.all(np.diff(error) < 0.0)
     for optimiser in ("abc", "pso", "grid", "de"):
-        machine = TunedLSSVM(optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)).fit(X, y)
-        assert pytest.approx(1e4, rel=0.1) == machine.C_
+        estimator = TunedLSSVM(optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)).fit(X, y)
+        assert pytest.approx(1e4, rel=0.1) == estimator.C_
 
 
 def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> None:

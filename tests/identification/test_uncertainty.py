@@ -48,9 +48,9 @@ def coverage(
     estimates, covariances, hits = [], [], []
     for _ in range(200):
         samples = draw(exact, truth, MIXING, rng, memory_rows)
-        machines = fit_all(ls.machine, samples)
-        covariance = coefficient_covariance(joint_covariance(machines, samples, memory_s), matrix)
-        estimate = np.linalg.solve(matrix, np.concatenate([m.coef_ for m in machines.values()]))
+        estimators = fit_all(ls.estimator, samples)
+        covariance = coefficient_covariance(joint_covariance(estimators, samples, memory_s), matrix)
+        estimate = np.linalg.solve(matrix, np.concatenate([m.coef_ for m in estimators.values()]))
         hits.append(np.abs(estimate - true_coefficients) < 1.96 * np.sqrt(np.diag(covariance)))
         estimates.append(estimate)
         covariances.append(covariance)

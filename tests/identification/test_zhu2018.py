@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
-
-from identification.papers.zhu2018 import (
+from papers.zhu2018 import (
     container_ship,
     recursive_start,
     response_models,
@@ -9,16 +8,17 @@ from identification.papers.zhu2018 import (
     small_vessel,
     steering_forms,
 )
-from identification.papers.zhu2018.fits import SEARCHES
+from papers.zhu2018.fits import SEARCHES
+
 from identification.validation.prediction import predict
 
 
 def test_training_error_drives_c_to_its_bound_which_is_what_the_thesis_prints():
     for method in ("PSO", "ABC"):
         for q, printed in container_ship.PRINTED_C[method].items():
-            machine = container_ship.as_printed(method)[q].machine
-            bound = machine.bounds[1]
-            assert pytest.approx(bound, rel=1e-3) == machine.C_
+            estimator = container_ship.as_printed(method)[q].estimator
+            bound = estimator.bounds[1]
+            assert pytest.approx(bound, rel=1e-3) == estimator.C_
             assert 0.3 < printed / bound < 1.0
 
 

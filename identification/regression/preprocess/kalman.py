@@ -55,10 +55,6 @@ def smooth_linear(
         Of the state at the first sample.
     only_likelihood : bool
         Whether to filter only; the states are then the filtered ones.
-
-    Returns
-    -------
-    Smoothed
     """
     n, size = len(measured), len(start)
     ahead, filtered = np.empty((2, n, size)), np.empty((2, n, size, size))
@@ -72,13 +68,13 @@ def smooth_linear(
             if not np.isfinite(y):
                 continue
             ph = p @ h
-            spread = float(h @ ph) + variance
+            innovation_variance = float(h @ ph) + variance
             error = y - float(h @ x)
-            gain = ph / spread
+            gain = ph / innovation_variance
             x = x + gain * error
             left = identity - np.outer(gain, h)
             p = left @ p @ left.T + variance * np.outer(gain, gain)
-            likelihood -= 0.5 * (np.log(spread) + error * error / spread)
+            likelihood -= 0.5 * (np.log(innovation_variance) + error * error / innovation_variance)
         ahead[1, k], filtered[1, k] = x, p
     states, spreads = ahead[1], filtered[1]
     if not only_likelihood:

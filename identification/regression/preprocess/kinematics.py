@@ -19,7 +19,7 @@ HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")
 LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
 DECADES = 4.0  # to either side of the first guess of the roughness
-LEAST_NOISE = 1e-4  # of the spread of a channel: resolution, and channels without noise
+LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels without noise
 CURRENT = 2.0  # m/s, standard deviation of an unknown current
 
 
@@ -87,7 +87,7 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     transitions = _integrators(h)
     observation = np.eye(3)[[HEADING.index(name) for name in names]]
     start = np.array([trial[name][0] if name in trial else 0.0 for name in HEADING] + [0.0])
-    spread = np.array([1.0, 1e-2, 1.0])
+    start_variances = np.array([1.0, 1e-2, 1.0])
     measured = np.column_stack([trial[name] for name in names])
     variances = _variances(trial, names)
 
@@ -95,7 +95,14 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
         process = roughness * _random_walk(h)
         steps = slice(rows.start, rows.stop - 1)
         return smooth_linear(
-            transitions[steps], process[steps], observation, variances, measured[rows], start, spread, quick
+            transitions[steps],
+            process[steps],
+            observation,
+            variances,
+            measured[rows],
+            start,
+            start_variances,
+            quick,
         )
 
     smoothed = _at_best_roughness(run, len(t), _first_guess(trial, "r" if "r" in trial else "psi"))
@@ -113,7 +120,7 @@ def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]
     observation = np.eye(size)[[PLANE.index(name) for name in names]]
     start = np.zeros(size)
     start[:4] = [trial[name][0] if name in trial else 0.0 for name in PLANE]
-    spread = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2] * 2)[:size]
+    start_variances = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2] * 2)[:size]
     measured = np.column_stack([trial[name] for name in names])
     variances = _variances(trial, names)
     walk = _random_walk(h)
@@ -126,7 +133,7 @@ def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]
         steps = slice(rows.start, rows.stop - 1)
         process = roughness * shape[steps]
         return smooth_linear(
-            transitions[steps], process, observation, variances, measured[rows], start, spread, quick
+            transitions[steps], process, observation, variances, measured[rows], start, start_variances, quick
         )
 
     states = _at_best_roughness(run, len(psi), _first_guess(trial, "u" if "u" in trial else "x")).states

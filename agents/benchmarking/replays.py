@@ -1,0 +1,146 @@
+"""Single episodes of a benchmark run once more, with all that happened in them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from agents.benchmarking.contestants import Contestant, contestants
+from agents.benchmarking.results import BenchmarkResult
+from agents.engines.jobs import run_jobs
+from agents.rollouts.episodes import recorded
+from agents.suites.suite import BenchmarkTask, load_suite
+from shipgym.envs.episode import Episode
+from shipgym.errors import InputError
+
+if TYPE_CHECKING:
+    from agents.verification.chain import Progress
+
+SAME_COST = 1e-9  # relative difference of the cost that is rounding
+
+
+class EpisodeId(NamedTuple):
+    """An episode of one contestant: in which task, of which training run, with which seed."""
+
+    contestant: str
+    task: str
+    run: int
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Rerun:
+    """Episodes that were run once more.
+
+    Attributes
+    ----------
+    episodes : dict of EpisodeId to Episode
+        Those that could be; one whose controller failed at once has no step and is not among them.
+    refused : dict of (contestant, task) to str
+        Why others could not.
+    different : tuple of EpisodeId
+        Whose cost is not the one in the results.
+    """
+
+    episodes: dict[EpisodeId, Episode] = field(default_factory=dict)
+    refused: dict[tuple[str, str], str] = field(default_factory=dict)
+    different: tuple[EpisodeId, ...] = ()
+
+
+def rerun(
+    result: BenchmarkResult,
+    episodes: Sequence[EpisodeId],
+    controllers: Any = None,
+    workers: int | None = 1,
+    progress: Progress | None = None,
+) -> Rerun:
+    """Run episodes of a benchmark again, from their seeds.
+
+    Parameters
+    ----------
+    result : BenchmarkResult
+        Whose contestants and tasks they are of.
+    episodes : sequence of EpisodeId
+    controllers : optional
+        As `benchmark` was given them. Contestants that were given as objects are known from here only.
+    workers : int or None
+        Processes; None for as many as there are cores. Objects steer in this process.
+    progress : callable, optional
+        Told what is done, how many of it, and the total.
+
+    Returns
+    -------
+    Rerun
+    """
+    given = {} if controllers is None else {one.name: one for one in contestants(controllers)}
+    wanted: dict[tuple[str, str], dict[int, list[int]]] = {}
+    for one in episodes:
+        wanted.setdefault((one.contestant, one.task), {}).setdefault(one.run, []).append(one.seed)
+    suite = result.summary["suite"]["name"]
+    jobs, found = [], {}
+    for (name, task), seeds in wanted.items():
+        source = result.summary["contestants"][name]["source"]
+        runs = [[run, *chosen] for run, chosen in seeds.items()]
+        if source is not None:
+            jobs.append({"suite": suite, "task": task, "contestant": name, "source": source, "runs": runs})
+        elif name in given:
+            found[name, task] = _recorded(given[name], load_suite(suite).task(task), suite, runs)
+        else:
+            found[name, task] = {"refused": f"'{name}' was given as an object, which results do not hold"}
+    told = None if progress is None else lambda done, total: progress("episodes run again", done, total)
+    done = run_jobs(rerun_job, jobs, workers=workers, progress=told)
+    found |= {(job["contestant"], job["task"]): one for job, one in zip(jobs, done, strict=True)}
+    return _gathered(result, found)
+
+
+def rerun_job(job: dict[str, Any]) -> dict[str, Any]:
+    """Run chosen episodes of one contestant and task, in any process; see `_recorded`."""
+    one = Contestant(job["contestant"], job["source"])
+    return _recorded(one, load_suite(job["suite"]).task(job["task"]), job["suite"], job["runs"])
+
+
+def _recorded(
+    one: Contestant, task: BenchmarkTask, suite: str, runs: Sequence[Sequence[int]]
+) -> dict[str, Any]:
+    """Why it cannot be, or of each training run, given with its seeds, costs and fields of the episodes."""
+    try:
+        policies = one.policies(task, suite)
+        found = [(run, seeds, recorded(policies[run], task, seeds)) for run, *seeds in runs]
+    except Exception as error:  # one that cannot be made again is no reason to have no page
+        said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
+        return {"refused": said}
+    return {
+        "refused": "",
+        "runs": [
+            {"run": run, "seeds": seeds, "costs": each.costs, "episodes": [_fields(e) for e in each.episodes]}
+            for run, seeds, each in found
+        ],
+    }
+
+
+def _fields(episode: Episode | None) -> dict[str, Any] | None:
+    return None if episode is None else {item.name: getattr(episode, item.name) for item in fields(episode)}
+
+
+def _gathered(result: BenchmarkResult, found: Mapping[tuple[str, str], Mapping[str, Any]]) -> Rerun:
+    episodes: dict[EpisodeId, Episode] = {}
+    different: list[EpisodeId] = []
+    for (name, task), one in found.items():
+        for run in one.get("runs", ()):
+            for seed, cost, content in zip(run["seeds"], run["costs"], run["episodes"], strict=True):
+                key = EpisodeId(name, task, run["run"], seed)
+                if content is not None:
+                    episodes[key] = Episode(**content)
+                if np.isfinite(cost) and not np.isclose(cost, cost_of(result, key), rtol=SAME_COST):
+                    different.append(key)
+    refused = {pair: one["refused"] for pair, one in found.items() if one["refused"]}
+    return Rerun(episodes, refused, tuple(different))
+
+
+def cost_of(result: BenchmarkResult, episode: EpisodeId) -> float:
+    """What an episode cost in the results."""
+    first = result.summary["seeds"]["first"]
+    return float(result.figures(episode.contestant, episode.task)[episode.run, episode.seed - first])

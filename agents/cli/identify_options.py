@@ -1,0 +1,107 @@
+"""The options of `identify` on the command line, made from `shipgym.trials.identify_table.Options`."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields
+from typing import Annotated, Any, get_type_hints
+
+import typer
+
+from shipgym.errors import InputError
+from shipgym.trials.identify_table import FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
+
+TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
+#: Options with a name of their own on the command line.
+COMMON = tuple(name for name, option in OPTIONS.items() if option.common)
+SET = "set_"
+SET_HELP = "Any option of the table [identify]; repeatable."
+
+
+def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `identify`, those given as the one mapping `options` that it takes."""
+
+    @functools.wraps(command)
+    def wrapped(**arguments: Any) -> None:
+        named = {name: arguments.pop(name) for name in COMMON}
+        command(options=given_options(named, arguments.pop(SET) or ()), **arguments)
+
+    hints = get_type_hints(command, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    for parameter in inspect.signature(command).parameters.values():
+        if parameter.name == "options":
+            parameters += _parameters()
+        else:
+            parameters.append(
+                parameter.replace(annotation=hints[parameter.name], kind=parameter.KEYWORD_ONLY)
+            )
+    wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    return wrapped
+
+
+def _parameters() -> list[inspect.Parameter]:
+    """A parameter for each common option, and one for all others."""
+    of_options = [
+        (name, TYPES.get(OPTIONS[name].kind, str), typer.Option(*_flags(name), help=_help(name)))
+        for name in COMMON
+    ]
+    of_others = (SET, list[str], typer.Option("--set", metavar="OPTION=VALUE", help=SET_HELP))
+    return [
+        inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option]
+        )
+        for name, kind, option in (*of_options, of_others)
+    ]
+
+
+def _flags(name: str) -> tuple[str, ...]:
+    flag = f"--{name.replace('_', '-')}"
+    return (f"{flag}/--no-{name}",) if OPTIONS[name].kind == FLAG else (flag,)
+
+
+def _help(name: str) -> str:
+    """The meaning of an option, its choices and its default."""
+    option = OPTIONS[name]
+    text = option.meaning[0].upper() + option.meaning[1:]
+    if option.choices:
+        *others, last = option.choices
+        text += f": {', '.join(others)} or {last}"
+    default = next(item.default for item in fields(Options) if item.name == name)
+    if isinstance(default, str):
+        text += f"; default: the ship file's, else {default}"
+    return f"{text}; may be repeated." if option.kind == TEXTS else f"{text}."
+
+
+def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, Any]:
+    """Options of the command line: those with a name of their own, which go first, and those of `--set`."""
+    given = {name: value for name, value in named.items() if value not in (None, [])}
+    return parsed_options(texts) | check_options(given, "options")
+
+
+def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
+    """Options written as on the command line, `name=value` with a value as in the ship file.
+
+    Raises
+    ------
+    InputError
+        For one that is not, or has no such name.
+    """
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = text.partition("=")
+        if not sign or not name.strip():
+            raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
+        found[name.strip()] = _value(value.strip())
+    return check_options(found, "--set")
+
+
+def _value(text: str) -> Any:
+    """A value of TOML; what is none is a text without quotes."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        return text

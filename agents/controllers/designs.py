@@ -1,0 +1,108 @@
+"""Classical controllers by name, designed for the ship, the control interval and the path of a task."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+from agents.controllers.controller import Controller, model_hash
+from agents.controllers.registry import BUILT_IN, controller_class
+from agents.suites.reference import load_tuned
+from agents.suites.suite import BenchmarkTask
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+
+CLASSICAL = BUILT_IN  # in an order in which those come first that others build on
+#: Of these, no bases for policies unless asked for by name, being slow: MPC, which needs an extra too, solves
+#: for one ship after another, and adaptive LQ estimates while the policy learns; an action takes them 64 and
+#: 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
+NO_BASES = ("mpc", "lq-adaptive")
+INNER = "lq_"  # before settings of the LQ that a guidance law leads
+
+
+def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = None) -> Controller:
+    """A classical controller for a task.
+
+    Parameters
+    ----------
+    kind : str
+        As registered (`agents.controllers.registry`).
+    task : BenchmarkTask
+        Its ship and control interval; of a guidance law also its path's lookahead and corridor.
+    settings : mapping of str, optional
+        Keywords of `from_model`; of a guidance law also those of the LQ that it leads, after `lq_`.
+
+    Raises
+    ------
+    InputError
+        If there is no such design for the ship, or guidance has no path to follow.
+    """
+    made: Any = controller_class(kind)
+    given = settings or {}
+    if not made.has_autopilot:
+        written = json.dumps(dict(given), sort_keys=True)
+        return _designed(made, _Ship(task.ship), task.task.interval(task.ship), written)
+    if not isinstance(task.task, PathFollowingTask):
+        raise no_path(kind, task)
+    inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
+    own = {key: value for key, value in given.items() if not key.startswith(INNER)}
+    guide: Controller = made.from_model(task.ship, autopilot=design("lq", task, inner), task=task.task, **own)
+    return guide
+
+
+def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
+    """A classical controller with the settings found for a task of a suite.
+
+    Parameters
+    ----------
+    kind : str
+        Of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`.
+    task : BenchmarkTask
+    suite : str
+        Its name.
+
+    Raises
+    ------
+    InputError
+        If there are no such settings.
+    """
+    found = load_tuned(suite).get(task.name, {})
+    without = {"best": (), "base": NO_BASES}.get(kind)
+    if without is not None:
+        costs = {name: float(one["cost"]) for name, one in found.items() if name not in without}
+        kind = min(costs, key=costs.__getitem__, default=kind)
+    if kind not in found:
+        raise InputError(
+            f"there are no tuned settings of '{kind}' for task '{task.name}' of suite '{suite}', only of: "
+            f"{', '.join(found) or 'none'}"
+        )
+    return design(kind, task, found[kind]["settings"])
+
+
+def no_path(kind: str, task: BenchmarkTask) -> InputError:
+    """What is said where guidance has nothing to follow."""
+    where = task.name or task.environment
+    return InputError(f"controller: '{kind}' found, but '{where}' has no path to be led along")
+
+
+@lru_cache(maxsize=256)
+def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
+    made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
+    return made
+
+
+@dataclass(frozen=True)
+class _Ship:
+    """A ship that equals another of the same numbers."""
+
+    model: ShipModel
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Ship) and hash(self) == hash(other)
+
+    def __hash__(self) -> int:
+        return hash(model_hash(self.model))

@@ -1,0 +1,105 @@
+"""Observations and memories as controllers take them: one row a ship, a single ship without that axis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+def checked_observation(
+    observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
+) -> NDArray[Any]:
+    """Observations as an array of shape (n_ships, n_observations) or (n_observations,), no fewer than names.
+
+    Raises
+    ------
+    InputError
+        If there are fewer entries or another number of dimensions.
+    """
+    given, n = np.asarray(observation, dtype=dtype), len(names)
+    if given.ndim not in (1, 2) or given.shape[-1] < n:
+        raise InputError(
+            f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: '{names[-1]}' is "
+            f"the last that is needed"
+        )
+    return given
+
+
+def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
+    """Where episodes begin, an array of the shape of the ships; None is nowhere.
+
+    Raises
+    ------
+    InputError
+        If there is neither one for all ships nor one for each.
+    """
+    flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
+    n = int(np.prod(shape))
+    if flags.size not in (1, n):
+        raise InputError(f"episode_start: {flags.size} found, expected one for each of {n} ships")
+    return np.full(shape, flags.reshape(shape if flags.size == n else ()))
+
+
+def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
+    """Return the memory of ships, which must have a shape.
+
+    Raises
+    ------
+    InputError
+        If it is that of another number of ships, or of another controller.
+    """
+    if np.shape(memory) != shape:
+        raise InputError(
+            f"state: shape {np.shape(memory)} found, expected {shape}: what the last predict of as many "
+            f"ships returned, or None where episodes begin"
+        )
+    return np.asarray(memory)
+
+
+def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[Floats, Flags]:
+    """Memory of each ship, a copy with zeros where an episode begins, and where it does.
+
+    Parameters
+    ----------
+    memory : array of shape (*shape, size) or None
+        What the last `predict` returned; None where all episodes begin.
+    starts : bool, array-like of bool or None
+        Where an episode begins and the memory is that of the one before.
+    shape : tuple of int
+        (n_ships,), or () for a single ship.
+    size : int
+        Numbers remembered of a ship.
+
+    Raises
+    ------
+    InputError
+        As `checked_memory` and `checked_starts`.
+    """
+    if memory is None:
+        return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
+    kept = checked_memory(memory, (*shape, size))
+    begins = checked_starts(starts, shape)
+    return np.where(begins[..., None], 0.0, kept), begins
+
+
+def heading_error(seen: dict[str, Floats]) -> Floats:
+    """Heading error of each ship, rad, in (-pi, pi]."""
+    error: Floats = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+    return error
+
+
+def deviations(seen: dict[str, Floats], rudder: Any, sway: Any) -> Floats:
+    """Deviations from straight running, shape (n, 5), in the order of `linear_loop.SIGNALS`."""
+    signals = (
+        seen["sway"] - sway, seen["yaw_rate"], heading_error(seen), seen["rudder"] - rudder,
+        seen["heading_error_integral"],
+    )  # fmt: skip
+    return np.stack(signals, axis=-1)

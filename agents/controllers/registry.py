@@ -1,0 +1,94 @@
+"""Controllers by the names that `--controllers`, files and the setting `base` know them by."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TypeVar
+
+from agents.controllers.controller import Controller
+from shipgym.checks import check_choice
+from shipgym.errors import InputError
+
+_HOMES = {
+    "pid": "agents.controllers.pid:PID",
+    "pid-filtered": "agents.controllers.filtered_pid:FilteredPID",
+    "lq": "agents.controllers.lq:LQ",
+    "lq-scheduled": "agents.controllers.scheduled_lq:ScheduledLQ",
+    "lqg": "agents.controllers.lqg:LQG",
+    "mpc": "agents.controllers.mpc:MPC",
+    "lq-adaptive": "agents.controllers.adaptive_lq:AdaptiveLQ",
+    "los": "agents.controllers.los_autopilot:LineOfSight",
+    "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
+    "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
+}
+#: Controllers of this package, imported when they are first used.
+BUILT_IN = tuple(_HOMES)
+C = TypeVar("C", bound=Controller)
+
+#: Controllers that users registered.
+_REGISTERED: dict[str, type[Controller]] = {}
+
+
+def register_controller(controller: type[C]) -> type[C]:
+    """Let `--controllers`, files, the benchmark and learning know a controller by its `kind`.
+
+    Parameters
+    ----------
+    controller : type
+        A subclass of `Controller` with a `kind` and `from_model(model, *, dt=None, ...)`. To be found by
+        workers it is to be at the top level of a module that they can import.
+
+    Returns
+    -------
+    type
+        The same, so that this may decorate the class.
+
+    Raises
+    ------
+    InputError
+        If it is not such a class, or there is another controller of that kind.
+    """
+    where = "register_controller"
+    if not (isinstance(controller, type) and issubclass(controller, Controller)):
+        raise InputError(f"{where}: {controller!r} found, expected a subclass of agents.Controller")
+    kind, name = controller.kind, controller.__name__
+    if not kind or set(kind) & set(",=+:/{}*. "):
+        raise InputError(f"{where}: {name}.kind is '{kind}', expected a name such as 'my-lq'")
+    if not callable(getattr(controller, "from_model", None)):
+        raise InputError(f"{where}: {name} has no class method 'from_model(model, *, dt=None, ...)'")
+    other = _HOMES.get(kind) or (_home(_REGISTERED[kind]) if kind in _REGISTERED else None)
+    if other not in (None, _home(controller)):
+        raise InputError(f"{where}: kind '{kind}' is that of {other} already, expected another one")
+    if kind not in _HOMES:
+        _REGISTERED[kind] = controller
+    return controller
+
+
+def _home(controller: type[Controller]) -> str:
+    return f"{controller.__module__}:{controller.__qualname__}"
+
+
+def controller_kinds() -> tuple[str, ...]:
+    """Kinds of all controllers, those of users last."""
+    return (*BUILT_IN, *_REGISTERED)
+
+
+def registered_modules() -> tuple[str, ...]:
+    """Modules of the controllers that users registered, for other processes to import."""
+    return tuple({controller.__module__: None for controller in _REGISTERED.values()})
+
+
+def controller_class(kind: str, where: str = "controller") -> type[Controller]:
+    """The class of a kind of controller.
+
+    Raises
+    ------
+    InputError
+        If there is none, with the nearest known one.
+    """
+    check_choice(kind, controller_kinds(), where)
+    if kind in _REGISTERED:
+        return _REGISTERED[kind]
+    module, _, name = _HOMES[kind].partition(":")
+    found: type[Controller] = getattr(import_module(module), name)
+    return found

@@ -1,0 +1,114 @@
+"""The two files of a policy, NAME.json and NAME.safetensors: written whole, and the weights read back.
+
+The weights are written first, and the JSON holds their SHA-256, so that files that do not belong together are
+refused. No pickle, no torch.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import InputError
+from shipgym.files import write_bytes, write_json
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel
+
+Tensors = dict[str, NDArray[Any]]
+
+REMEDY = "take another copy of both files"
+
+
+def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:
+    """Write NAME.json and, first, NAME.safetensors.
+
+    Parameters
+    ----------
+    content : mapping
+        What stands in the JSON.
+    tensors : dict of str to array
+        The weights; none where a policy has none.
+    path : Path
+        NAME.json.
+
+    Raises
+    ------
+    InputError
+        If the name does not end in .json, the folder cannot be written, or JSON cannot hold the content.
+    """
+    if path.suffix != ".json":
+        raise InputError(f"{path}: a policy's file ends in .json, with the weights beside it in .safetensors")
+    try:
+        json.dumps(content, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{path}: training and env_options: {error}; expected what JSON can hold") from None
+    weights = None
+    if tensors:
+        from safetensors.numpy import save as as_bytes
+
+        written: bytes = as_bytes(tensors)
+        write_bytes(written, weights_path(path))
+        weights = {"sha256": hashlib.sha256(written).hexdigest()}
+    write_json({**content, "weights": weights}, path)
+
+
+def weights_path(path: Path) -> Path:
+    """Where the weights of NAME.json are."""
+    return path.with_suffix(".safetensors")
+
+
+def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
+    """The weights at `path`, whose hash stands in `json_path`.
+
+    Raises
+    ------
+    InputError
+        If they are missing, broken, or those of another policy.
+    """
+    try:
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: there is no such file, expected the weights of {json_path}; the two belong side by side"
+        ) from None
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    found = hashlib.sha256(content).hexdigest()
+    if found != sha256:
+        raise InputError(
+            f"{path}: SHA-256 {found[:12]}... found in {len(content)} bytes, expected {sha256[:12]}..., "
+            f"which is the field weights.sha256 of {json_path}: cut short, or of another policy; {REMEDY}"
+        )
+    from safetensors.numpy import load
+
+    try:
+        tensors: Tensors = load(content)
+    except Exception as error:  # safetensors' own errors and those of the types it does not know
+        raise InputError(f"{path}: not a safetensors file ({error}); {REMEDY}") from None
+    return tensors
+
+
+def as_json(value: Any) -> Any:
+    """An option of an environment as JSON has it; models by their names."""
+    if isinstance(value, ShipModel):
+        return value.name
+    if isinstance(value, Weather):
+        return value.to_dict()
+    if is_dataclass(value) and not isinstance(value, type):
+        return as_json(asdict(value))
+    if isinstance(value, Mapping):
+        return {str(name): as_json(one) for name, one in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return as_json(value.tolist())
+    if isinstance(value, list | tuple):
+        return [as_json(one) for one in value]
+    if isinstance(value, float) and not np.isfinite(value):
+        return None if np.isnan(value) else str(value)
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,258 @@
+"""Episodes of course keeping and step responses of one controller on many ships at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.controller import Policy
+from agents.rollouts.metrics import costs, mean, steering
+from agents.rollouts.rollout import Rollout, check_fits, rollout
+from shipgym.checks import check_number
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, CourseKeepingTask, observation_scales
+from shipgym.envs.task import INTEGRAL_ZONE
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+
+Floats = NDArray[np.float64]
+
+RECORDED = ("psi", "delta", "set_point", *CourseKeepingTask.info_names)
+AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory
+STEP_LENGTHS = 16.0  # duration of a step response, in times to travel one ship length
+LARGEST_STEP_DEG = 60.0  # so that an overshoot is not yet loss of control
+
+
+@dataclass(frozen=True, eq=False)
+class Episodes:
+    """What episodes of course keeping cost, each array of the shape of the seeds.
+
+    Attributes
+    ----------
+    cost : array
+        Steering cost of the episode: minus the sum of its rewards.
+    heading_cost, rudder_cost, rudder_rate_cost, end_cost : array
+        Its parts; the last is the cost of losing control.
+    heading_rmse_deg : array
+        Root mean square of the heading error, degrees.
+    rudder_travel_deg_min : array
+        Way of the rudder per minute, degrees per minute.
+    extrapolating : array
+        Share of the time outside the model's operating envelope.
+    terminated : bool array
+        Whether control was lost or the model ran away. Nothing is dropped: the cost of these holds the
+        rest of the episode at the largest error, the other figures the time up to then.
+    duration_s : array
+        Time sailed, s.
+    seeds : int array
+        Of the episodes.
+    """
+
+    cost: Floats
+    heading_cost: Floats
+    rudder_cost: Floats
+    rudder_rate_cost: Floats
+    end_cost: Floats
+    heading_rmse_deg: Floats
+    rudder_travel_deg_min: Floats
+    extrapolating: Floats
+    terminated: NDArray[np.bool_]
+    duration_s: Floats
+    seeds: NDArray[np.int64]
+
+
+class StepResponses(NamedTuple):
+    """Responses to a step of the set-point; a ship that is lost stays where it was lost.
+
+    Attributes
+    ----------
+    t : array of shape (n_samples,)
+        Time from the step, s.
+    heading : array of shape (n_models, n_samples)
+        Change of heading, rad, positive to starboard.
+    rudder : array of shape (n_models, n_samples)
+        Rudder angle, rad, positive to starboard.
+    """
+
+    t: Floats
+    heading: Floats
+    rudder: Floats
+
+
+def sail(
+    controller: Policy,
+    models: ShipModel | Sequence[ShipModel],
+    task: CourseKeepingTask | None = None,
+    seeds: ArrayLike = 0,
+    *,
+    allow_unstable: bool = False,
+) -> Episodes:
+    """Sail episodes of course keeping with one controller, many at once.
+
+    Parameters
+    ----------
+    controller : Policy
+        Anything with `predict`; it is given the observations of all ships together.
+    models : ShipModel or sequence of ShipModel
+        One ship for all episodes, or several of one structure.
+    task : CourseKeepingTask, optional
+        What is asked; by default the environment's own task.
+    seeds : array-like of int
+        Seeds of the episodes. With several models: one for all, or of shape (n_models,), one each, or
+        (n_models, n_episodes). With one model any shape.
+    allow_unstable : bool
+        Whether models that were found unstable when they were identified may be sailed, with a warning.
+
+    Returns
+    -------
+    Episodes
+        The same for the same arguments, whatever else is sailed with them.
+
+    Raises
+    ------
+    InputError
+        If the controller was designed for other observations, answers with something that is not a
+        command for each ship, seeds and models do not fit, or a model is unstable.
+    """
+    fleet = _fleet(models)
+    numbers = _seeds(seeds, len(fleet))
+    lanes = [model for model in fleet for _ in range(numbers[0].size)] if len(fleet) > 1 else fleet
+    check_fits(controller, task or CourseKeepingTask(), lanes[0], f"model '{lanes[0].name}'")
+    found = []
+    for first in range(0, numbers.size, AT_ONCE):
+        some = numbers.reshape(-1)[first : first + AT_ONCE]
+        ships = lanes[first : first + AT_ONCE] if len(fleet) > 1 else fleet
+        engine = CourseKeepingEngine(ships, some.size, task, allow_unstable=allow_unstable)
+        found.append(_figures(rollout(controller, engine, some, record=RECORDED)))
+    joined = {
+        name: np.concatenate([part[name] for part in found]).reshape(numbers.shape) for name in found[0]
+    }
+    return Episodes(**joined, seeds=numbers)
+
+
+def _seeds(seeds: ArrayLike, n_models: int) -> NDArray[np.int64]:
+    """Seeds of the episodes, with several models one row for each."""
+    numbers = np.asarray(seeds)
+    if numbers.dtype.kind not in "iu" or numbers.size == 0:
+        raise InputError(f"seeds: {seeds!r} found, expected integers")
+    if n_models > 1 and numbers.ndim == 0:
+        numbers = np.full(n_models, int(numbers))
+    if n_models > 1 and numbers.shape[0] != n_models:
+        raise InputError(
+            f"seeds: shape {numbers.shape} found, expected ({n_models},) or ({n_models}, n_episodes): "
+            f"one row for each model"
+        )
+    return numbers
+
+
+def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
+    """Figures of `Episodes`, each of shape (n,)."""
+    cost, steered = costs(run), steering(run)
+    return {
+        "cost": cost["cost"],
+        **{f"{part}_cost": cost[f"cost_{part}"] for part in ("heading", "rudder", "rudder_rate", "end")},
+        **{name: steered[name] for name in ("heading_rmse_deg", "rudder_travel_deg_min")},
+        "extrapolating": mean(run, run.infos["extrapolating"]),
+        "terminated": run.terminated,
+        "duration_s": run.steps * run.dt,
+    }
+
+
+def step_response(
+    controller: Policy,
+    models: ShipModel | Sequence[ShipModel],
+    step_deg: float = 20.0,
+    duration: float | None = None,
+    task: CourseKeepingTask | None = None,
+    *,
+    allow_unstable: bool = False,
+) -> StepResponses:
+    """Turn ships from straight ahead to a new course, all at once.
+
+    Parameters
+    ----------
+    controller : Policy
+        Anything with `predict`.
+    models : ShipModel or sequence of ShipModel
+        Of one structure.
+    step_deg : float
+        Change of course, degrees, positive to starboard.
+    duration : float, optional
+        In s; by default the time to travel 16 ship lengths.
+    task : CourseKeepingTask, optional
+        Its control interval and bounds are used.
+    allow_unstable : bool
+        As in `sail`.
+
+    Returns
+    -------
+    StepResponses
+
+    Raises
+    ------
+    InputError
+        As `sail`; or if the step or the duration is out of its range.
+    """
+    fleet = _fleet(models)
+    check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
+    check_fits(controller, task or CourseKeepingTask(), fleet[0], f"model '{fleet[0].name}'")
+    length_time = fleet[0].particulars["length"] / fleet[0].particulars["speed"]
+    if duration is None:
+        duration = STEP_LENGTHS * length_time
+    check_number(duration, "duration", above=0.0)
+    asked = task or CourseKeepingTask()
+    steps = int(np.ceil(duration / asked.interval(fleet[0])))
+    straight = replace(asked, course_change_deg=0.0, episode_steps=steps)
+    engine = CourseKeepingEngine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
+    course = _ShiftedCourse(engine, np.radians(step_deg))
+    seeds = np.zeros(len(fleet), dtype=np.int64)
+    states = rollout(controller, engine, seeds, record=RECORDED, show=course.shown).states
+    left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
+    heading, rudder = (
+        np.pad(values, left, mode="edge").T
+        for values in (states["psi"] - states["set_point"], states["delta"])
+    )
+    t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
+    return StepResponses(t, heading, rudder)
+
+
+class _ShiftedCourse:
+    """Shows ships that keep their course in the engine another course, the same step away for all."""
+
+    def __init__(self, engine: CourseKeepingEngine, step: float) -> None:
+        self.engine = engine
+        self.step = step
+        self.reach = observation_scales(engine.model)[-1]
+        self.integral: Floats | None = None
+
+    def shown(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Observations with the heading error of the other course, and its integral by the task's rule."""
+        state = self.engine.physical_state()
+        error = self.step - (state["psi"] - state["set_point"])
+        if self.integral is None:
+            self.integral = np.zeros_like(error)
+        else:
+            gathered = np.where(np.abs(error) <= INTEGRAL_ZONE, error * self.engine.dt, 0.0)
+            self.integral = np.clip(self.integral + gathered, -self.reach, self.reach)
+        observations = observations.copy()
+        for name, values in (
+            ("heading_error_sin", np.sin(error)),
+            ("heading_error_cos", np.cos(error)),
+            ("heading_error_integral", self.integral / self.reach),
+        ):
+            observations[:, OBSERVATION_NAMES.index(name)] = values
+        return observations
+
+
+def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
+    fleet = [models] if isinstance(models, ShipModel) else list(models)
+    if not fleet:
+        raise InputError("models: none found, expected at least one")
+    return fleet
+
+
+fly, Flights = sail, Episodes  # their first names, kept for those who use them

@@ -1,0 +1,272 @@
+"""The one loop in which a policy steers ships through episodes of a task, side by side."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from agents.controllers.controller import Policy
+from agents.policies.shield import ShieldState, interventions
+from shipgym.envs.engine import Engine
+from shipgym.envs.task import Task
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Rollout:
+    """What became of some episodes of a task.
+
+    Attributes
+    ----------
+    task : Task
+        What was asked.
+    model : ShipModel
+        The ship, the first of several.
+    dt : float
+        Control interval, s.
+    seeds : int array of shape (n,)
+    costs : array of shape (n,)
+        Minus the sum of the rewards, up to where the policy failed.
+    sailing : bool array of shape (n_steps, n)
+        Whether the episode was going on in the interval; what is recorded of the others means nothing.
+    terminated, truncated, failed : bool array of shape (n,)
+        How the episode ended; the last: because the policy gave no command.
+    failure : str
+        How the policy failed first; empty if it did not.
+    seconds_per_action : float
+        Process time of `predict` over the number of commands it gave, in a batch.
+    actions, rewards, shielded : array of shape (n_steps, n, n_commands), and twice (n_steps, n)
+        Of each interval, the last whether a safety shield steered; without steps if nothing was recorded.
+    states, infos : dict of str to array of shape (n_steps + 1, n)
+        Physical states and entries of `info` that were recorded, from the beginning on.
+    """
+
+    task: Task
+    model: ShipModel
+    dt: float
+    seeds: NDArray[np.int64]
+    costs: Floats
+    sailing: Flags
+    terminated: Flags
+    truncated: Flags
+    failed: Flags
+    failure: str
+    seconds_per_action: float
+    actions: NDArray[np.float32]
+    rewards: Floats
+    shielded: Flags
+    states: dict[str, Floats]
+    infos: dict[str, Floats]
+
+    @property
+    def steps(self) -> Floats:
+        """Intervals of each episode, shape (n,)."""
+        steps: Floats = self.sailing.sum(axis=0, dtype=np.float64)
+        return steps
+
+
+def rollout(
+    policy: Policy,
+    engine: Engine,
+    seeds: ArrayLike,
+    *,
+    record: bool | Collection[str] = False,
+    tolerant: bool = False,
+    show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
+) -> Rollout:
+    """Steer the ships of an engine through one episode each.
+
+    Parameters
+    ----------
+    policy : Policy
+        Anything with `predict`; it is given the observations of all ships together.
+    engine : Engine
+        With a lane for each seed.
+    seeds : array-like of int, shape (n,)
+        Of the episodes.
+    record : bool or collection of str
+        Names of physical states and of entries of `info` to record; True for all.
+    tolerant : bool
+        Whether a policy that raises an error, or gives NaN or no command for each ship, ends the episodes
+        that it fails in and the others go on; otherwise that is an error.
+    show : callable, optional
+        What the policy is shown in place of the observations; asked before each command.
+
+    Returns
+    -------
+    Rollout
+        The same for the same arguments; only the time differs.
+
+    Raises
+    ------
+    InputError
+        If the policy gives no finite command for each ship, unless `tolerant`.
+    """
+    log = _Log(engine, record, tolerant)
+    seen, memory, starts = engine.reset(seeds), None, log.sailing
+    log.look()
+    while True:
+        actions, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
+        command = log.checked(actions, type(policy).__name__)
+        if not log.sailing.any():
+            break
+        seen, rewards, terminated, truncated = engine.step(command)
+        log.note(command, rewards, memory, terminated, truncated)
+        if not log.sailing.any():
+            break
+        starts = np.zeros(engine.num_envs, dtype=np.bool_)
+    return log.rollout(np.asarray(seeds))
+
+
+def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> Floats:
+    """Cost of each episode, minus the sum of its rewards, shape (n,); see `rollout`."""
+    return rollout(policy, engine, seeds).costs
+
+
+def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
+    """Refuse a policy made for other observations than a task shows of a ship.
+
+    Parameters
+    ----------
+    policy : Policy
+        Without a method `check_fits` it steers by anything.
+    task : Task
+    ship : ShipModel
+    where : str
+        Start of the message.
+
+    Raises
+    ------
+    InputError
+        Naming the first difference.
+    """
+    check = getattr(policy, "check_fits", None)
+    if check is not None:
+        shown = task.observed(ship)
+        check([one.name for one in shown], [one.scale for one in shown], where)
+
+
+class _Log:
+    """What has become of the episodes so far."""
+
+    def __init__(self, engine: Engine, record: bool | Collection[str], tolerant: bool) -> None:
+        self.engine, self.record, self.tolerant = engine, record, tolerant
+        self.names = [name for name in engine.task.info_names if self._keeps(name)]
+        self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
+        self.terminated = self.truncated = self.failed = ~self.sailing
+        self.costs = np.zeros(engine.num_envs)
+        self.failure, self.error, self.seconds, self.asked = "", "", 0.0, 0
+        self.sailed: list[Flags] = []
+        self.actions: list[NDArray[np.float32]] = []
+        self.rewards: list[Floats] = []
+        self.shielded: list[Flags] = []
+        self.states: list[dict[str, Floats]] = []
+        self.infos: list[list[Floats]] = []
+
+    def _keeps(self, name: str) -> bool:
+        return self.record if isinstance(self.record, bool) else name in self.record
+
+    def look(self) -> None:
+        """Record where the ships are."""
+        if self.record:
+            state = self.engine.physical_state()
+            self.states.append({name: values for name, values in state.items() if self._keeps(name)})
+            self.infos.append([self.engine.info(name).copy() for name in self.names])
+
+    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[Any, Any]:
+        """A policy's answer; what goes wrong is its own failure."""
+        began = time.process_time()
+        self.error = ""
+        try:
+            actions, memory = policy.predict(shown, memory, starts, True)
+        except Exception as error:  # whatever a user's policy raises
+            if not self.tolerant:
+                raise
+            actions, self.error = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
+        self.seconds += time.process_time() - began
+        self.asked += int(self.sailing.sum())
+        return actions, memory
+
+    def checked(self, actions: Any, who: str) -> NDArray[np.float32]:
+        """The commands, 0 for ships that do not sail any more; episodes without a command have failed."""
+        command, bad, why = self._commands(actions)
+        if bad.any():
+            if not self.tolerant:
+                raise InputError(f"{who}.predict: {why}")
+            self.failure = self.failure or self.error or why
+            self.failed, self.sailing = self.failed | bad, self.sailing & ~bad
+        command[~self.sailing] = 0.0
+        return command
+
+    def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
+        """Commands, of which ships that sail there is none, and why."""
+        expected, at = (self.engine.num_envs, len(self.engine.command)), f"found at step {len(self.sailed)}"
+        nothing = np.zeros(expected, dtype=np.float32)
+        try:
+            with np.errstate(over="ignore"):
+                found = np.array(actions, dtype=np.float32)
+        except (TypeError, ValueError):
+            return nothing, self.sailing, f"actions of type {type(actions).__name__} {at}, expected numbers"
+        if found.shape != expected:
+            seen = self.engine.observations.shape
+            said = (
+                f"actions of shape {found.shape} {at}, expected {expected} for observations of shape {seen}"
+            )
+            return nothing, self.sailing, said
+        wrong = self.sailing[:, None] & ~np.isfinite(found)
+        bad: Flags = np.any(wrong, axis=1)
+        if not bad.any():
+            return found, bad, ""
+        said = (
+            f"action {found[wrong][0]} {at} for ship {np.argmax(bad)}: no finite number for {bad.sum()} of "
+            f"{self.sailing.sum()} ships, expected numbers in [-1, 1], the command over its limit; look for "
+            f"a division by zero in the controller"
+        )
+        return found, bad, said
+
+    def note(
+        self, command: NDArray[np.float32], rewards: Floats, memory: Any, terminated: Flags, truncated: Flags
+    ) -> None:
+        """Note what came of an interval."""
+        self.sailed.append(self.sailing)
+        self.costs -= np.where(self.sailing, rewards, 0.0)
+        self.terminated = self.terminated | self.sailing & terminated
+        self.truncated = self.truncated | self.sailing & truncated
+        if self.record:
+            shield = isinstance(memory, ShieldState)
+            self.actions.append(command)
+            self.rewards.append(rewards)
+            self.shielded.append(interventions(memory).steering if shield else np.zeros_like(terminated))
+        self.look()
+        self.sailing = self.sailing & ~(terminated | truncated)
+
+    def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
+        """All that was noted."""
+        engine, n = self.engine, self.engine.num_envs
+        return Rollout(
+            task=engine.task,
+            model=engine.model,
+            dt=engine.dt,
+            seeds=seeds,
+            costs=self.costs,
+            sailing=np.array(self.sailed, dtype=np.bool_).reshape(-1, n),
+            terminated=self.terminated,
+            truncated=self.truncated,
+            failed=self.failed,
+            failure=self.failure,
+            seconds_per_action=self.seconds / max(self.asked, 1),
+            actions=np.array(self.actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
+            rewards=np.array(self.rewards).reshape(-1, n),
+            shielded=np.array(self.shielded, dtype=np.bool_).reshape(-1, n),
+            states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
+            infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
+        )

@@ -1,0 +1,230 @@
+"""Suites: named tasks with their ship, their sea and the seeds of their episodes, fixed once and for all.
+
+A suite is a TOML file of `agents/suites`:
+
+    name = "shipgym-v1"
+
+    [tasks.mariner-calm]
+    environment = "course-keeping"          # or "path-following"
+    model = "mariner"                       # name of a shipped model
+    why = "sanity: ..."                     # what the task is there for
+    sea = "rough"                           # optional: a sea state, or a table `[tasks.NAME.sea]` as weather
+                                            # has it: current, wind, waves
+    [tasks.mariner-calm.options]            # optional: any other keywords of the environment
+    course_change_deg = 30.0
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_choice, check_keys, check_table, check_text, did_you_mean, quoted
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.envs.engine import Engine
+from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.ship_env import read_options
+from shipgym.envs.task import Task
+from shipgym.envs.variety import Variety
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel
+
+#: Environments by their names in suites and on the command line: id, and class of task.
+ENVIRONMENTS: Mapping[str, tuple[str, type[Task]]] = {
+    "course-keeping": ("shipgym/CourseKeeping-v0", CourseKeepingTask),
+    "path-following": ("shipgym/PathFollowing-v0", PathFollowingTask),
+}
+#: Seeds of the episodes that are scored; training and tuning use smaller ones.
+FIRST_SEED = 1_000_000
+N_EPISODES = 100
+DEFAULT_SUITE = "shipgym-v1"
+FIELDS = ("environment", "model", "why", "sea", "options")
+
+
+@dataclass(frozen=True)
+class BenchmarkTask:
+    """One task of a suite.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its suite.
+    environment : {"course-keeping", "path-following"}
+        Which environment.
+    model : str
+        Shipped model that is steered.
+    why : str
+        What the task is there for.
+    options : dict
+        Keywords of the environment, `sea` among them.
+    """
+
+    name: str
+    environment: str
+    model: str
+    why: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_choice(self.environment, ENVIRONMENTS, f"task '{self.name}': environment")
+        _ = self.parts
+
+    @property
+    def env_id(self) -> str:
+        """Id for `gymnasium.make`; its keywords are `model` and `options`."""
+        return ENVIRONMENTS[self.environment][0]
+
+    @cached_property
+    def parts(self) -> tuple[ShipModel, Task, Variety]:
+        """Ship, task and variety of the environment."""
+        return read_options(ENVIRONMENTS[self.environment][1], self.model, self.options)
+
+    @property
+    def ship(self) -> ShipModel:
+        """The ship that is steered."""
+        return self.parts[0]
+
+    @property
+    def task(self) -> Task:
+        """What is asked of the autopilot."""
+        return self.parts[1]
+
+    @property
+    def seeds(self) -> NDArray[np.int64]:
+        """Of the episodes that are scored, shape (100,)."""
+        return FIRST_SEED + np.arange(N_EPISODES)
+
+    def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
+        """Many ships at once under this task, by default with its own ship.
+
+        Parameters
+        ----------
+        num_envs : int
+            Number of ships.
+        model : ShipModel, optional
+            Another ship for the same task.
+        threads : int
+            Of the kernels.
+        """
+        ship, task, variety = self.parts
+        return Engine(ship if model is None else model, num_envs, task, variety, threads=threads)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """Tasks on which controllers are compared.
+
+    Attributes
+    ----------
+    name : str
+        With its version: a task never changes under the same name.
+    tasks : tuple of BenchmarkTask
+        In the order of the file.
+    """
+
+    name: str
+    tasks: tuple[BenchmarkTask, ...]
+
+    def task(self, name: str) -> BenchmarkTask:
+        """The task by its name.
+
+        Raises
+        ------
+        InputError
+            For an unknown name, with the nearest known one.
+        """
+        for task in self.tasks:
+            if task.name == name:
+                return task
+        known = [task.name for task in self.tasks]
+        raise InputError(
+            f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
+            f"{did_you_mean(name, known)}"
+        )
+
+
+def list_suites() -> list[str]:
+    """Names of the shipped suites."""
+    return sorted(
+        entry.name.removesuffix(".toml")
+        for entry in files("agents").joinpath("suites").iterdir()
+        if entry.name.endswith(".toml")
+    )
+
+
+@lru_cache(maxsize=4)
+def load_suite(name: str = DEFAULT_SUITE) -> Suite:
+    """Read a shipped suite.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, or naming the field at fault.
+    """
+    return parse_suite(_suite_text(name), f"suite '{name}'")
+
+
+def suite_hash(name: str = DEFAULT_SUITE) -> str:
+    """SHA-256 of the file of a shipped suite.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    return hashlib.sha256(_suite_text(name).encode()).hexdigest()
+
+
+def suite_file(name: str, what: str) -> Path:
+    """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
+    return Path(str(files("agents").joinpath("suites", f"{name}-{what}.json")))
+
+
+def _suite_text(name: str) -> str:
+    check_choice(name, list_suites(), "suite")
+    return files("agents").joinpath("suites", f"{name}.toml").read_text(encoding="utf-8")
+
+
+def parse_suite(text: str, where: str) -> Suite:
+    """A suite from its TOML text (format in the module's docstring).
+
+    Raises
+    ------
+    InputError
+        Naming the field at fault.
+    """
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{where}: not TOML: {error}") from None
+    check_keys(content, ("name", "tasks"), where)
+    tasks = check_table(content.get("tasks"), f"{where}: tasks")
+    return Suite(
+        check_text(content.get("name"), f"{where}: name"),
+        tuple(_task(name, table, f"{where}: tasks.{name}") for name, table in tasks.items()),
+    )
+
+
+def _task(name: str, value: Any, where: str) -> BenchmarkTask:
+    table = check_table(value, where)
+    check_keys(table, FIELDS, where)
+    for needed in ("environment", "model"):
+        check_text(table.get(needed), f"{where}.{needed}")
+    options = dict(check_table(table.get("options", {}), f"{where}.options"))
+    if "sea" in table:
+        sea = table["sea"]
+        options["sea"] = sea if isinstance(sea, str) else Weather.from_dict(sea, f"{where}.sea")
+    try:
+        return BenchmarkTask(name, table["environment"], table["model"], table.get("why", ""), options)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None

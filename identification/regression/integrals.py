@@ -1,0 +1,146 @@
+"""Integrals of the terms of a model over each step: Euler, trapezoid rule, Gauss on broken splines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline, make_interp_spline
+
+from identification.regression.rudder import Rudder
+
+Floats = NDArray[np.float64]
+Channels = Mapping[str, Floats]
+#: The terms of an equation, an array of shape (n_samples, n_terms), from the channels at some times.
+Terms = Callable[[str, Channels], Floats]
+Integrals = tuple[dict[str, Floats], dict[str, Floats]]
+
+DEGREE = 3
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
+
+
+def step_integrals(
+    t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, euler: bool
+) -> Integrals:
+    """Integrals over each step by the value at its start or by the trapezoid rule, and their first moments.
+
+    Arguments and result as of `spline_integrals`.
+    """
+    integrals, moments = {}, {}
+    for q in equations:
+        values = terms(q, channels)
+        mean = values[:-1] if euler else 0.5 * (values[:-1] + values[1:])
+        integrals[q] = mean * np.diff(t)[:, None]
+        moments[q] = 0.5 * integrals[q] * np.diff(t)[:, None]
+    return integrals, moments
+
+
+def spline_integrals(
+    t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, rudder: Rudder
+) -> Integrals:
+    """Integrals over each step by Gauss quadrature on splines through the samples.
+
+    Parameters
+    ----------
+    t : array of shape (n_samples,)
+        s.
+    channels : mapping of str to array of shape (n_samples,)
+        By name.
+    equations : iterable of str
+        Whose terms are integrated.
+    terms : callable
+        The terms of an equation from the channels.
+    rudder : Rudder
+        Where the splines are broken.
+
+    Returns
+    -------
+    integrals, moments : dict of str to array of shape (n_samples - 1, n_terms)
+        By equation; moments about the end of the step.
+    """
+    edges = np.union1d(t, rudder.corners)
+    middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
+    times = middle[:, None] + half[:, None] * NODES
+    at_nodes: dict[str, Floats] = {}
+    for name, values in channels.items():
+        at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
+    step = np.searchsorted(t, middle, side="right") - 1
+    starts = np.flatnonzero(np.diff(step, prepend=-1))
+    weights = half[:, None] * WEIGHTS
+    to_end = t[step + 1][:, None] - times
+    integrals, moments = {}, {}
+    for q in equations:
+        values = terms(q, at_nodes).reshape(*times.shape, -1)
+        integrals[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights), starts, axis=0)
+        moments[q] = np.add.reduceat(np.einsum("ijk,ij->ik", values, weights * to_end), starts, axis=0)
+    return integrals, moments
+
+
+def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:
+    """A channel between its samples; a shaft speed, which may jump, is taken straight."""
+    if name == "delta":
+        return rudder
+    if name == "n":
+        return lambda times: np.interp(times, t, values)
+    return broken_spline(t, values, rudder)
+
+
+def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
+    """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
+
+    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the
+    acceleration of the rudder jumps, the third does.
+
+    Parameters
+    ----------
+    t, values : array of shape (n_samples,)
+        s and the unit of the channel.
+    rudder : Rudder
+        With the corners.
+    """
+    if len(t) <= DEGREE:
+        return make_interp_spline(t, values, k=1)
+    interior = list(range(2, len(t) - 2))  # not-a-knot ends
+    broken: list[float] = []
+    for corner, smoothness in zip(rudder.corners, rudder.smoothness, strict=True):
+        multiplicity = DEGREE - 1 - int(smoothness)
+        nearest = sorted(interior, key=lambda i: abs(t[i] - corner))[:multiplicity]
+        after = int(np.searchsorted(t, corner))
+        if any(abs(i - after) > 2 for i in nearest) or len(nearest) < multiplicity:
+            continue  # too close to another corner or to an end
+        kept = [i for i in interior if i not in nearest]
+        if _solvable(t, _knots(t, kept, [*broken, *[corner] * multiplicity])):
+            interior, broken = kept, [*broken, *[corner] * multiplicity]
+    return make_interp_spline(t, values, k=DEGREE, t=_knots(t, interior, broken))
+
+
+def _knots(t: Floats, interior: Sequence[int], broken: Sequence[float]) -> Floats:
+    inner = np.sort(np.concatenate([t[list(interior)], np.asarray(broken, dtype=float)]))
+    return np.concatenate([np.repeat(t[0], DEGREE + 1), inner, np.repeat(t[-1], DEGREE + 1)])
+
+
+def _solvable(t: Floats, knots: Floats) -> bool:
+    """Whether every basis function has a sample of its own (Schoenberg & Whitney 1953)."""
+    inner = slice(1, len(t) - 1)
+    return bool(np.all((knots[: len(t)][inner] < t[inner]) & (t[inner] < knots[DEGREE + 1 :][inner])))
+
+
+def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
+    """Integral over each step of the integral since the first sample.
+
+    Parameters
+    ----------
+    t : array of shape (n_samples,)
+        s.
+    integrals : array of shape (n_samples - 1, n_terms)
+        Of the terms over each step.
+    moments : array of shape (n_samples - 1, n_terms)
+        Integrals over each step of term times the time left to its end.
+
+    Returns
+    -------
+    array of shape (n_samples - 1, n_terms)
+    """
+    before = np.cumsum(integrals, axis=0) - integrals
+    return before * np.diff(t)[:, None] + moments

@@ -1,0 +1,168 @@
+"""What the templates of reports show of a fit: rows of tables, and figures of its trials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any
+
+import numpy as np
+
+from identification.fit import Fit
+from identification.report.predictions import overview_figure, prediction_figure
+from identification.validation.warnings import EQUATIONS, model_warnings
+from shipgym.ships import ShipModel
+from shipgym.ships.particulars import ADDED_MASSES
+from shipgym.trials.trial import Trial
+
+KNOT = 1852.0 / 3600.0
+PRIME = 1e-5
+SIGNIFICANT_T = 2.0  # a coefficient with a smaller |t| is not significantly different from zero
+FORCES = {"X": "Surge force X", "Y": "Sway force Y", "N": "Yaw moment N", "K": "Roll moment K"}
+INDICES = {
+    "overshoot_1_deg": ("1st overshoot", "deg"),
+    "overshoot_2_deg": ("2nd overshoot", "deg"),
+    "advance_lengths": ("advance", "L"),
+    "transfer_lengths": ("transfer", "L"),
+    "tactical_diameter_lengths": ("tactical diameter", "L"),
+}
+PARTICULARS = {
+    "length": ("length between perpendiculars", "m", 1.0),
+    "beam": ("beam", "m", 1.0),
+    "draught": ("draught", "m", 1.0),
+    "block_coefficient": ("block coefficient", "", 1.0),
+    "mass": ("mass", "t", 1e-3),
+    "xg": ("centre of gravity forward of midship", "m", 1.0),
+    "yaw_gyradius": ("yaw gyradius", "m", 1.0),
+    "speed": ("service speed", "m/s", 1.0),
+    "water_density": ("water density", "kg/m³", 1.0),
+}
+
+
+def fit_view(fit: Fit) -> dict[str, Any]:
+    """What the macros in `sections.html` show of a fit but for its figures."""
+    short = short_names(fit.trials)
+    return {
+        "model": fit.model,
+        "provenance": fit.model.provenance or {},
+        "warnings": model_warnings(fit),
+        "equations": {EQUATIONS.get(name, name): found for name, found in fit.diagnostics.items()},
+        "trials": [_trial(trial, short[trial.name]) for trial in fit.trials],
+        "uses": [trial.use for trial in fit.trials],
+        "errors": {short[name]: _errors(found) for name, found in fit.metrics["trials"].items()},
+        "heading": _heading(fit),
+        "reference": _reference(fit, short),
+        "particulars": _particulars(fit.model),
+        "added_masses": [
+            (name, name in fit.model.particulars.estimated, fit.model.particulars[name] / PRIME)
+            for name in ADDED_MASSES
+            if fit.model.particulars[name] is not None
+        ],
+        "derivatives": _derivatives(fit.model),
+        "coefficients": _coefficients(fit),
+    }
+
+
+def trial_figures(fit: Fit) -> dict[str, Any]:
+    """Figures of the trials: those fitted in one, and each of those that had no part in the fit."""
+    short = short_names(fit.trials)
+    return {
+        "overview": overview_figure([t for t in fit.trials if t.use == "fit"], fit.predictions),
+        "predictions": [
+            (short[t.name], "x" in t, prediction_figure(t, fit.predictions.get(t.name)))
+            for t in fit.trials
+            if t.use == "validate"
+        ],
+    }
+
+
+def short_names(trials: Sequence[Trial]) -> dict[str, str]:
+    """Names of trials without their folders, unless two would be the same."""
+    short = {trial.name: PurePath(trial.name).name for trial in trials}
+    return short if len(set(short.values())) == len(short) else {name: name for name in short}
+
+
+def _trial(trial: Trial, name: str) -> dict[str, Any]:
+    """A row of the table of trials: seconds, degrees and knots."""
+    speeds = np.hypot(trial["u"], trial["v"]) / KNOT if "u" in trial and "v" in trial else None
+    return {
+        "name": name,
+        "kind": None if trial.kind is None else trial.kind.replace("-", " "),
+        "use": trial.use,
+        "derived": ", ".join(sorted(trial.derived)) or "none",
+        "samples": len(trial),
+        "duration": trial.duration,
+        "interval": float(np.median(np.diff(trial.t))),
+        "rudder": float(np.degrees(np.abs(trial["delta"]).max())) if "delta" in trial else None,
+        "speeds": None if speeds is None else (speeds.min(), speeds.max()),
+    }
+
+
+def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
+    """A row of the table of errors, with the manoeuvre's indices by name and unit."""
+    indices = [
+        (text, metrics[name]["measured"], metrics[name]["predicted"], unit)
+        for name, (text, unit) in INDICES.items()
+        if metrics.get(name) is not None
+    ]
+    return {**metrics, "indices": indices}
+
+
+def _heading(fit: Fit) -> dict[str, Any] | None:
+    """Heading error on the trials that were not fitted, else on those that were, degrees."""
+    trials = fit.metrics["trials"]
+    unseen = {name: metrics for name, metrics in trials.items() if metrics["use"] == "validate"}
+    errors = {
+        name: float(np.degrees(metrics["rmse"]["psi"]))
+        for name, metrics in (unseen or trials).items()
+        if metrics["rmse"]["psi"] is not None
+    }
+    if not errors:
+        return None
+    worst = max(errors, key=lambda name: errors[name])
+    return {
+        "unseen": bool(unseen),
+        "median": float(np.median(list(errors.values()))),
+        "largest": errors[worst],
+        "trial": PurePath(worst).name,
+    }
+
+
+def _reference(fit: Fit, short: dict[str, str]) -> dict[str, Any] | None:
+    """Heading errors of a grey box and of its bare reference ship, rad; None for other structures."""
+    reference = fit.metrics.get("reference")
+    if reference is None:
+        return None
+    errors = {
+        short[name]: (metrics["rmse"]["psi"], reference["trials"][name]["rmse"]["psi"])
+        for name, metrics in fit.metrics["trials"].items()
+    }
+    return {"name": reference["name"], "errors": errors}
+
+
+def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
+    """Name, whether estimated, value and unit of the particulars that are known."""
+    return [
+        (text, name in model.particulars.estimated, f"{factor * float(model.particulars[name]):.5g}", unit)
+        for name, (text, unit, factor) in PARTICULARS.items()
+        if model.particulars[name] is not None
+    ]
+
+
+def _derivatives(model: ShipModel) -> bool:
+    """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
+    return (model.table.normalisation, model.table.quantity) == ("prime", "force")
+
+
+def _coefficients(fit: Fit) -> dict[str, list[dict[str, Any]]]:
+    """Rows of coefficients by the title of their table: one for each force, or one for all."""
+    tables: dict[str, list[dict[str, Any]]] = {}
+    forces = FORCES if _derivatives(fit.model) else {}
+    for name, value in fit.coefficients.items():
+        force, error = name.partition("_")[0], fit.standard_errors[name]
+        t = value / error if error > 0.0 else None
+        significant = bool(value) if t is None else abs(t) >= SIGNIFICANT_T
+        scale = PRIME if forces else 1.0
+        row = {"name": name, "value": value / scale, "error": error / scale, "t": t}
+        tables.setdefault(forces.get(force, "coefficient"), []).append(row | {"significant": significant})
+    return tables

@@ -1,0 +1,140 @@
+"""The papers' tables beside ours: for the terminal, for programs, and as a page of the documentation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from itertools import groupby
+
+from rich.table import Table
+
+from agents.cli.terminal import plain_table
+from papers import CASES, Requirement, Row, get_paper
+from shipgym.checks import check_choice
+
+ALL = "all"
+HEADINGS = ("case", "quantity", "printed", "as the paper", "at best", "aim", "met")
+INTRODUCTION = """# The papers' tables, run again
+
+Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed* is the paper's number,
+*as the paper* ours by its method on the same case, *at best* ours by the best method that there is here, on
+the same data. A cell is empty where the paper shows only a picture or does not publish what it used; the
+note, whose number stands in the last column, then says what stands in for it.
+"""
+
+
+def papers_of(name: str) -> tuple[str, ...]:
+    """Short names of the papers asked for: one, or all, with the requirements after them.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
+
+
+def reproduce(names: Iterable[str], tell: Callable[[str], None] | None = None) -> dict[str, list[Row]]:
+    """Run the cases of papers again.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Short names of papers.
+    tell : callable, optional
+        Told of each row when it is done: paper, case and quantity.
+
+    Returns
+    -------
+    dict of str to list of Row
+    """
+    results: dict[str, list[Row]] = {}
+    for name in names:
+        results[name] = []
+        for row in get_paper(name).rows():
+            results[name].append(row)
+            if tell is not None:
+                tell(f"{name}: {row.case}, {row.quantity}")
+    return results
+
+
+def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
+    """The rows whose aim is not met, as paper, case and quantity."""
+    return [
+        f"{name}: {row.case}, {row.quantity}"
+        for name, rows in results.items()
+        for row in rows
+        if row.met is False
+    ]
+
+
+def terminal_table(name: str, rows: Sequence[Row]) -> Table:
+    """The rows of one paper for the terminal."""
+    table = plain_table(get_paper(name).citation)
+    for heading in HEADINGS:
+        table.add_column(heading, justify="right" if heading in HEADINGS[2:5] else "left")
+    for _, case in groupby(rows, lambda row: row.case):
+        for k, row in enumerate(case):
+            cells = _cells(row)
+            table.add_row(*(cells if k == 0 else ("", *cells[1:])))
+    return table
+
+
+def page(results: Mapping[str, Sequence[Row]]) -> str:
+    """The page of the documentation, Markdown."""
+    return "\n".join([INTRODUCTION, *(_section(name, rows) for name, rows in results.items())])
+
+
+def _section(name: str, rows: Sequence[Row]) -> str:
+    paper = get_paper(name)
+    kept = [row for row in rows if row.met is not None]
+    aims = f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}."
+    lines = [
+        f"## {name}",
+        "",
+        f"{paper.citation}. {paper.what}",
+        "",
+        *_requirements(paper.requirements),
+        f"{aims} `python scripts/reproduce.py {name}`",
+        "",
+        *_table(rows),
+    ]
+    return "\n".join([*lines, ""])
+
+
+def _table(rows: Sequence[Row]) -> list[str]:
+    """The rows, and below them each note once."""
+    lines = [
+        "| " + " | ".join((*HEADINGS, "note")) + " |",
+        "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
+    ]
+    notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
+    for row in rows:
+        number = str(notes[row.note]) if row.note else ""
+        lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
+    return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
+
+
+def _requirements(requirements: Sequence[Requirement]) -> list[str]:
+    """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
+    if not requirements:
+        return []
+    lines = ["| | requirement | why it holds | tests | tables |", "| --- | --- | --- | --- | --- |"]
+    for one in requirements:
+        tests = "<br>".join(f"`{test}`" for test in one.tests)
+        cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))
+        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
+    return [*lines, ""]
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    met = {True: "yes", False: "no", None: ""}[row.met]
+    numbers = (_number(value) for value in (row.printed, row.as_paper, row.best))
+    return (row.case, row.quantity, *numbers, row.aim, met)
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.4g}"
+
+
+def _escaped(text: str) -> str:
+    return text.replace("|", "\\|")

@@ -1,0 +1,269 @@
+"""Sections 7.4.5 and 7.4.6: Nomoto's forms and ten reduced steering models of the container ship.
+
+All learn from the 10/10 zigzag and predict the 20/20. The reduced forms are fits of the change of v and r
+over a step, since some of them have no linear term that could carry the state on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from identification.estimators.lssvm import LSSVM
+from identification.validation.prediction import predict
+from papers.row import Row
+from papers.zhu2018.container_ship import (
+    INTERVAL,
+    SURGE_IN_TURNS,
+    best_errors,
+    best_steering,
+    ship,
+    zigzag_trial,
+)
+from papers.zhu2018.fits import (
+    PREFIX,
+    Difference,
+    mean_square,
+    search,
+    spline_fit,
+    steer,
+    steering_fit,
+    term_columns,
+)
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
+AIM = {"v": 0.02, "r": 0.005}  # of the chosen pair
+TOOLBOX_LIMIT = 10.0  # deg, of the rudder in the MSS toolbox's container ship
+TABLES = {"v": "7.4.9", "r": "7.4.10"}
+EQUATIONS = {"v": "sway", "r": "yaw"}
+UNITS = {"v": "m2/s2", "r": "deg2/s2"}
+CHOSEN = 6  # row of the tables that the thesis chooses
+#: Upper bounds of the search for C; not printed, and not those of Table 7.4.4: with 20 for yaw the
+#: coefficients come out a hundredth of those printed, with this they come nearest to them.
+MOST_C = {"v": 1e10, "r": 2e3}
+#: Mean squared errors of Tables 7.4.9 and 7.4.10; rows 1 and 4 are not numbers.
+PRINTED_MSE = {
+    "v": {2: 0.0604, 3: 0.0495, 5: 0.0472, 6: 0.0472, 7: 0.0411, 8: 0.0413, 9: 0.0462, 10: 0.0730},
+    "r": {2: 0.0688, 3: 0.0646, 5: 0.0169, 6: 0.0162, 7: 0.0684, 8: 0.1346, 9: 0.0407, 10: 0.0447},
+}
+#: Coefficients of the tables by row, in the order of their columns v, r, |v|v, rv, |v|r, |r|r, delta.
+PRINTED = {
+    "v": """
+        1 |v|v 0.0264 |r|v -10.102 |v|r -0.8184 |r|r -704.84 delta -0.0769
+        2 v -0.0419 r -3.3219 |v|v -0.0280 |r|r -105.78 delta -0.0542
+        3 v -0.0400 r -3.5520 |v|v -0.0338 |v|r -1.2368 delta -0.0568
+        4 |v|v 0.0264 |r|v -10.101 |v|r -0.8215 |r|r -704.62 delta -0.0770
+        5 v -0.0481 r -3.7079 |r|v -0.7618 delta -0.0637
+        6 v -0.0476 r -3.7649 |v|r 0.9208 delta -0.0637
+        7 v -0.0532 r -3.6720 delta -0.0606
+        8 v -0.0025 |v|v -0.0183 delta -0.1153
+        9 r -3.6746 |v|v -0.0184 delta -0.0610
+        10 v -0.0094 |r|v -0.6068 delta -0.1179""",
+    "r": """
+        1 |v|v -0.0300 |r|v -0.0026 |v|r 0.0015 |r|r 0.0004 delta 0.0300
+        2 v -0.0007 r -0.0799 |v|v 0.0007 |r|r 2.4079 delta 0.0026
+        3 v -0.0007 r -0.0738 |v|v 0.0008 |v|r 0.0198 delta 0.0027
+        4 |v|v -0.0016 |r|v 0.1267 |v|r -0.1546 |r|r 17.1446 delta 0.0023
+        5 v -0.0006 r -0.0706 |r|v 0.0280 delta 0.0029
+        6 v -0.0005 r -0.0691 |v|r -0.0285 delta 0.0029
+        7 v -0.0004 r -0.0720 delta 0.0028
+        8 r -0.0436 |r|r 0.6847 delta 0.0023
+        9 v -0.0004 |v|v -0.4861 delta 0.0028
+        10 r -0.0335 |r|v 0.0069 delta 0.0022""",
+}
+ORDER = ("v", "|v|v", "|r|v", "r", "|v|r", "|r|r", "delta")  # of equation 7.1
+INCONSISTENT = "not a number in the thesis; without a linear damping term"
+
+
+@dataclass(frozen=True)
+class NomotoFit:
+    """Nomoto's form T rdot + r + n3 r^3 = K delta, and the error of its predicted 20/20, deg2/s2."""
+
+    K: float
+    T: float
+    n3: float
+    error: float
+
+
+def structure_of(row: int) -> str:
+    """Name of the structure of a row of the tables."""
+    return f"zhu-{row}"
+
+
+def printed_coefficients(equation: str) -> Iterator[tuple[int, dict[str, float]]]:
+    """Rows of a table: its number and its coefficients by term."""
+    for line in PRINTED[equation].strip().splitlines():
+        number, *words = line.split()
+        yield int(number), dict(zip(words[::2], map(float, words[1::2]), strict=True))
+
+
+@cache
+def as_printed(row: int, rudder_limit_deg: float = 35.0) -> dict[str, Difference]:
+    """Sway and yaw of a row by LS-SVR, its C by ABC on the training error."""
+    trial = zigzag_trial(10, rudder_limit_deg)
+    return {
+        q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), structure_of(row), change=True) for q in PREFIX
+    }
+
+
+@cache
+def at_best(row: int, angle_deg: float = 10.0) -> ShipModel:
+    """The terms of a row with the instantaneous speed, by least squares on spline samples of a zigzag."""
+    columns: dict[str, Sequence[int]] = {q: term_columns(structure_of(row), q) for q in PREFIX}
+    return spline_fit(zigzag_trial(angle_deg), ship(), {"u": SURGE_IN_TURNS, **columns})
+
+
+def stepped_errors(row: int, rudder_limit_deg: float = 35.0) -> dict[str, float]:
+    """Mean squared errors of the 20/20 zigzag by the difference equations of a row."""
+    turns = zigzag_trial(20, rudder_limit_deg)
+    fits = as_printed(row, rudder_limit_deg)
+    steered = steer(fits["v"], fits["r"], turns)
+    return {q: mean_square(steered, turns, q) for q in PREFIX}
+
+
+def sailed_errors(model: ShipModel, trial: Trial) -> dict[str, float]:
+    """Mean squared errors of a trial as a model sails it."""
+    sailed = predict(model, trial)
+    return {q: mean_square(sailed, trial, q) for q in PREFIX}
+
+
+@cache
+def nomoto(cubic: bool, estimator: str) -> NomotoFit:
+    """Nomoto's first-order form from the changes of the yaw rate.
+
+    Parameters
+    ----------
+    cubic : bool
+        Whether it has n3.
+    estimator : {"ABC", "least squares"}
+    """
+    trial, turns = zigzag_trial(10), zigzag_trial(20)
+    r = trial["r"]
+    terms = np.column_stack([r, r**3, trial["delta"]] if cubic else [r, trial["delta"]])[:-1]
+    fit = search("ABC", "r", MOST_C["r"]) if estimator == "ABC" else LSSVM(C=np.inf)
+    fit.fit(terms, np.diff(r))
+    damping, *bend, gain = fit.coef_.tolist()
+    cube = bend[0] if cubic else 0.0
+    path = np.empty(len(turns))
+    now = float(turns["r"][0])
+    for k, delta in enumerate(turns["delta"].tolist()):
+        path[k] = now
+        now += damping * now + cube * now**3 + gain * delta + fit.intercept_
+    return NomotoFit(
+        -gain / damping, -INTERVAL / damping, cube / damping, mean_square({"r": path}, turns, "r")
+    )
+
+
+def nomoto_rows() -> Iterator[Row]:
+    """Table 7.4.8."""
+    least = best_errors()["r"]
+    printed = {"linear": (0.031, 30.2487, 0.0548), "nonlinear": (0.031, 30.2487, 0.0548)}
+    for name, (gain, lag, error) in printed.items():
+        ours, best = (nomoto(name == "nonlinear", estimator) for estimator in ("ABC", "least squares"))
+        yield Row("Table 7.4.8", f"{name} Nomoto: K, 1/s", gain, ours.K, best.K)
+        yield Row("Table 7.4.8", f"{name} Nomoto: T, s", lag, ours.T, best.T)
+        if name == "nonlinear":
+            yield Row(
+                "Table 7.4.8",
+                "nonlinear Nomoto: n3 / 1e-11, s2",
+                7.0853,
+                ours.n3 / 1e-11,
+                best.n3 / 1e-11,
+                note="printed as no effect at all: on its own scale r^3 is held at zero by the penalty",
+            )
+        yield Row(
+            "Table 7.4.8",
+            f"{name} Nomoto: mean squared error of the 20/20, deg2/s2",
+            error,
+            ours.error,
+            least,
+            f"below {error:g}",
+            least < error,
+            "at best: the four terms of Table 7.4.10 with the instantaneous speed; the best Nomoto form from "
+            f"the 10/10 reaches {best.error:.3g}: it knows neither sway nor the loss of speed",
+        )
+
+
+def coefficient_rows() -> Iterator[Row]:
+    """Tables 7.4.9 and 7.4.10: coefficients of the accelerations."""
+    for q in PREFIX:
+        for row, values in printed_coefficients(q):
+            gains = as_printed(row)[q].gains
+            for k, (term, value) in enumerate(values.items()):
+                yield Row(
+                    f"Table {TABLES[q]}",
+                    f"row {row}: {PREFIX[q]} of {term}",
+                    value,
+                    gains[ORDER.index(term)] / INTERVAL,
+                    None,
+                    note="the bounds of C are not printed" if k == 0 else "",
+                )
+
+
+def error_rows() -> Iterator[Row]:
+    """Tables 7.4.9 and 7.4.10: mean squared errors of the predicted 20/20 zigzag."""
+    turns = zigzag_trial(20)
+    ours = {row: stepped_errors(row) for row in range(1, 11)}
+    best = {row: sailed_errors(at_best(row), turns) for row in range(1, 11)}
+    for q in PREFIX:
+        for row in range(1, 11):
+            printed, value = PRINTED_MSE[q].get(row), best[row][q]
+            met = None if printed is None else value < printed
+            note = INCONSISTENT if printed is None else "at best: its terms with the instantaneous speed"
+            if met is False:
+                reached = sailed_errors(at_best(row, 20.0), turns)[q]
+                note += (
+                    f"; the limit is what a 10/10 teaches these terms: the 20/20 itself gives {reached:.3g}"
+                )
+            yield Row(
+                f"Table {TABLES[q]}",
+                f"row {row}: mean squared error of the 20/20, {EQUATIONS[q]}, {UNITS[q]}",
+                printed,
+                ours[row][q],
+                value,
+                "" if printed is None else f"below {printed:g}",
+                met,
+                note,
+            )
+
+
+def chosen_rows() -> Iterator[Row]:
+    """Section 7.4.6: the pair that the thesis chooses, and ours."""
+    ours, best = stepped_errors(CHOSEN), best_errors()
+    for q in PREFIX:
+        yield Row(
+            "Section 7.4.6",
+            f"chosen model: mean squared error of the 20/20, {EQUATIONS[q]}, {UNITS[q]}",
+            PRINTED_MSE[q][CHOSEN],
+            ours[q],
+            best[q],
+            f"below {AIM[q]:g}",
+            best[q] < AIM[q],
+            "at best: U v, U r, v^2 r/U, U^2 delta, with surge. The terms as printed keep the speed at 8 "
+            "m/s, while the 20/20 falls to 6 m/s, which no zigzag of 10/10 can teach them",
+        )
+    turns, model = zigzag_trial(20, TOOLBOX_LIMIT), best_steering(TOOLBOX_LIMIT)
+    ours, best = stepped_errors(CHOSEN, TOOLBOX_LIMIT), sailed_errors(model, turns)
+    for q in PREFIX:
+        yield Row(
+            "Section 7.4.6",
+            f"the same with the toolbox's rudder limit of 10 deg, {EQUATIONS[q]}, {UNITS[q]}",
+            PRINTED_MSE[q][CHOSEN],
+            ours[q],
+            best[q],
+            f"below {AIM[q]:g}",
+            best[q] < AIM[q],
+            "the thesis does not say which limit it used; its 20/20 may have been steered with 10 deg",
+        )
+
+
+def rows() -> Iterator[Row]:
+    """All rows of the sections."""
+    yield from nomoto_rows()
+    yield from coefficient_rows()
+    yield from error_rows()
+    yield from chosen_rows()

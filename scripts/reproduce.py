@@ -1,0 +1,53 @@
+"""Run the papers' tables again: `python scripts/reproduce.py all`, or one paper, or `requirements`.
+
+Two minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an aim is missed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from papers.page import ALL, missed, page, papers_of, reproduce, terminal_table
+
+from agents.cli.command import FAILED, Json, answered, fail
+from agents.cli.terminal import err, print_json
+from agents.cli.terminal import out as console
+from shipgym.files import write_text
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+@app.command()
+@answered
+def main(
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="A paper's short name, or requirements.")
+    ] = ALL,
+    markdown: Annotated[
+        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met."""
+    names = papers_of(paper)
+    with err.status("starting") as status:
+        results = reproduce(names, tell=status.update)
+    if markdown is not None:
+        write_text(page(results), markdown)
+    if as_json:
+        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
+    else:
+        for name, rows in results.items():
+            console.print(terminal_table(name, rows))
+            console.print()
+        if markdown is not None:
+            console.print(f"written: {markdown}", soft_wrap=True)
+    late = missed(results)
+    if late:
+        fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)
+
+
+if __name__ == "__main__":
+    app()

@@ -1,0 +1,91 @@
+"""Pages from Jinja2 templates, which escape every text that they show."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any
+
+from jinja2 import Environment, FunctionLoader, StrictUndefined
+from markupsafe import Markup
+
+import shipgym
+from shipgym.errors import InputError
+from shipgym.pages.numbers import NONE, degrees, fixed, number, percent
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+
+def render(template: str, **data: Any) -> str:
+    """A page, as text; the same data gives the same text.
+
+    Parameters
+    ----------
+    template : str
+        The package it lies in and its file, such as "identification.report/report.html".
+    **data : Any
+        Its variables. One that is missing is an error.
+
+    Raises
+    ------
+    InputError
+        If the page has figures and plotly is not installed.
+    """
+    return environment().get_template(template).render(contents=[], **data)
+
+
+@cache
+def environment() -> Environment:
+    """What all templates share: escaping, the ways to write a number, and plotly.js."""
+    made = Environment(
+        autoescape=True,
+        undefined=StrictUndefined,
+        loader=FunctionLoader(_source),
+        finalize=lambda value: NONE if value is None else value,
+        extensions=["jinja2.ext.do"],
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "degrees": degrees, "fixed": fixed, "number": number, "percent": percent, "plotted": plotted,
+        "sentence": sentence,
+    }  # fmt: skip
+    made.globals |= {"plotly_script": plotly_script, "dash": NONE, "version": shipgym.__version__}
+    made.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
+    return made
+
+
+def _source(name: str) -> tuple[str, str, None]:
+    """The text of a template, and what tracebacks call it."""
+    package, _, file = name.partition("/")
+    return files(package).joinpath(file).read_text(encoding="utf-8"), name, None
+
+
+def plotly_script() -> Markup:
+    """The source of plotly.js, to stand once in a page.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed.
+    """
+    try:
+        from plotly.offline import get_plotlyjs
+    except ModuleNotFoundError as error:
+        raise InputError(
+            "plotly is not installed, the report needs it: pip install 'shipgym[report]'"
+        ) from error
+    return Markup(str(get_plotlyjs()).replace("</script", "<\\/script"))
+
+
+def plotted(plot: Figure) -> dict[str, Any]:
+    """Data and layout of a figure, ready for JSON."""
+    fields: dict[str, Any] = json.loads(plot.to_json())
+    return fields
+
+
+def sentence(text: str) -> str:
+    """A text with a capital at its beginning and a full stop at its end."""
+    return f"{text[:1].upper()}{text[1:]}."

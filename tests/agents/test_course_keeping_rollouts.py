@@ -1,0 +1,204 @@
+"""Rollouts over many ships: complete, repeatable, and clear about controllers that do not answer."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents import LQ, PID, sail, step_response
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+from shipgym.errors import InputError
+from shipgym.ships import load_model
+from shipgym.ships.mariner import mariner
+
+MARINER = load_model("mariner")
+PILOT = PID.from_model(MARINER)
+TURNED = replace(
+    MARINER,
+    coefficients={n: -value if n in ("N_d", "Y_d") else value for n, value in MARINER.coefficients.items()},
+)
+SHORT = CourseKeepingTask(episode_steps=150)
+
+
+class Helmsman:
+    """A user's controller: what `answer` makes of the number of ships."""
+
+    def __init__(self, answer):
+        self.answer = answer
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        return self.answer(len(observation)), state
+
+
+AMIDSHIPS = Helmsman(lambda n: np.zeros((n, 1)))
+
+
+def fleet(n, seed=0):
+    """Ships whose yaw coefficients scatter by 5 per cent."""
+    rng = np.random.default_rng(seed)
+    return [
+        replace(
+            MARINER,
+            coefficients={
+                name: value * (1.0 + 0.05 * rng.standard_normal()) if name.startswith("N_") else value
+                for name, value in MARINER.coefficients.items()
+            },
+        )
+        for _ in range(n)
+    ]
+
+
+def test_an_episode_depends_on_its_ship_and_seed_alone():
+    ships, seeds = fleet(70), np.arange(70) + 5
+    together = sail(PILOT, ships, SHORT, seeds)
+    again = sail(PILOT, ships, SHORT, seeds)
+    np.testing.assert_array_equal(together.cost, again.cost)
+    for i in (0, 33, 69):
+        alone = sail(PILOT, ships[i], SHORT, seeds=[seeds[i]])
+        assert alone.cost[0] == together.cost[i]
+        assert alone.rudder_travel_deg_min[0] == together.rudder_travel_deg_min[i]
+
+
+def test_seeds_give_the_results_their_shape():
+    ships = fleet(3)
+    grid = sail(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
+    assert grid.cost.shape == grid.terminated.shape == grid.heading_rmse_deg.shape == (3, 4)
+    assert grid.cost[2, 1] == sail(PILOT, ships[2], SHORT, seeds=9).cost
+    assert sail(PILOT, ships, SHORT, seeds=7).cost.tolist() == [
+        float(sail(PILOT, ship, SHORT, seeds=7).cost) for ship in ships
+    ]
+
+
+def test_costs_add_up_and_are_those_of_the_environment():
+    import gymnasium as gym
+
+    episodes = sail(PILOT, MARINER, SHORT, seeds=np.arange(5))
+    parts = episodes.heading_cost + episodes.rudder_cost + episodes.rudder_rate_cost + episodes.end_cost
+    np.testing.assert_allclose(episodes.cost, parts)
+    assert np.all(episodes.duration_s == 150.0)
+    env = gym.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
+    observation, _ = env.reset(seed=0)
+    cost, errors, over = 0.0, [], False
+    while not over:
+        observation, reward, terminated, truncated, info = env.step(PILOT.predict(observation)[0])
+        cost -= reward
+        errors.append(info["heading_error"])
+        over = terminated or truncated
+    episode = sail(PILOT, MARINER, SHORT, seeds=0)
+    assert episode.cost == pytest.approx(cost, rel=1e-6)
+    assert episode.heading_rmse_deg == pytest.approx(
+        np.degrees(np.sqrt(np.mean(np.square(errors)))), rel=1e-6
+    )
+
+
+def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
+    episodes = sail(PILOT, [MARINER, TURNED, MARINER], SHORT, seeds=[1, 1, 1])
+    assert episodes.terminated.tolist() == [False, True, False]
+    assert episodes.cost[0] == episodes.cost[2] < 0.05 * episodes.cost[1]
+    remaining = 150.0 - episodes.duration_s[1]
+    assert 0.0 < remaining < 150.0
+    assert episodes.end_cost.tolist() == pytest.approx([0.0, 9.0 * remaining, 0.0])
+
+
+def test_a_ship_without_a_helmsman_costs_its_heading_error():
+    task = CourseKeepingTask(episode_steps=100, course_change_deg=0.0)
+    episodes = sail(AMIDSHIPS, MARINER, task, seeds=[0])
+    assert episodes.rudder_travel_deg_min[0] == 0.0
+    assert episodes.cost[0] == episodes.heading_cost[0] > 0.0
+    assert episodes.extrapolating[0] == 0.0
+
+
+def test_step_responses_of_many_ships_are_those_of_each():
+    ships = fleet(5)
+    together = step_response(PILOT, ships, 15.0)
+    assert together.t[-1] == pytest.approx(16.0 * 160.93 / 7.7175, abs=1.0)
+    assert together.heading.shape == together.rudder.shape == (5, len(together.t))
+    assert np.all(together.heading[:, 0] == 0.0)
+    np.testing.assert_array_equal(step_response(PILOT, ships[3], 15.0).heading[0], together.heading[3])
+    assert np.degrees(together.heading[:, -1]) == pytest.approx(np.full(5, 15.0), abs=0.5)
+    assert np.ptp(together.heading, axis=0).max() > np.radians(0.1)
+
+
+def test_a_step_response_is_the_environments_own_turn():
+    """Without noise the ship cannot tell a set-point of the task from the one shown to it here."""
+    from shipgym.envs.course_keeping import CourseKeepingEngine
+
+    engine = CourseKeepingEngine(MARINER, 1)
+    observations = engine.reset([3])
+    first = engine.physical_state()
+    step_deg = float(np.degrees(first["set_point"][0] - first["psi"][0]))
+    for pilot in (PILOT, LQ.from_model(MARINER)):
+        observations = engine.reset([3])
+        turned = [0.0]
+        for _ in range(90):
+            observations, *_ = engine.step(pilot.predict(observations)[0])
+            turned.append(float(engine.physical_state()["psi"][0] - first["psi"][0]))
+        shown = step_response(pilot, MARINER, step_deg, duration=90.0)
+        np.testing.assert_allclose(shown.heading[0], turned, atol=2e-6)
+
+
+def test_a_lost_ship_stays_where_it_was_lost():
+    step = step_response(PILOT, [MARINER, TURNED], 20.0)
+    assert np.degrees(np.abs(step.heading[1]).max()) > 70.0
+    assert np.all(np.diff(step.heading[1, -50:]) == 0.0)
+    assert np.all(np.isfinite(step.heading))
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (lambda n: np.full((n, 1), np.nan), "Helmsman.predict: action nan found at step 0 for ship 0"),
+        (lambda n: np.zeros(n), r"actions of shape \(2,\) found at step 0, expected \(2, 1\)"),
+        (lambda n: [["port"]] * n, "found at step 0, expected numbers"),
+        (lambda n: None, "found at step 0, expected"),
+    ],
+)
+def test_a_controller_that_gives_no_command_is_named(answer, message):
+    with pytest.raises(InputError, match=message):
+        sail(Helmsman(answer), MARINER, SHORT, seeds=[0, 1])
+    with pytest.raises(InputError, match=message):
+        step_response(Helmsman(answer), [MARINER, MARINER])
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: sail(PILOT, mariner(4.0)), "model 'mariner': the scale of 'yaw_rate'"),
+        (lambda: sail(PILOT, []), "models: none found"),
+        (lambda: sail(PILOT, fleet(3), seeds=[1, 2]), r"seeds: shape \(2,\) found, expected \(3,\)"),
+        (lambda: sail(PILOT, MARINER, seeds=[0.5]), r"seeds: \[0.5\] found, expected integers"),
+        (lambda: sail(PILOT, MARINER, seeds=[]), r"seeds: \[\] found, expected integers"),
+        (lambda: step_response(PILOT, MARINER, 120.0), "step_deg: 120 found"),
+        (lambda: step_response(PILOT, MARINER, duration=0.0), "duration: 0 found"),
+    ],
+)
+def test_arguments_that_do_not_fit_are_refused(call, message):
+    with pytest.raises(InputError, match=message):
+        call()
+
+
+def test_a_model_found_unstable_is_steered_only_where_asked():
+    marked = replace(MARINER, provenance={"stable": False})
+    for call in (sail, step_response):
+        with pytest.raises(InputError, match="found unstable when it was identified"):
+            call(PILOT, marked, task=SHORT)
+        with pytest.warns(UserWarning, match="found unstable when it was identified"):
+            asked = call(PILOT, marked, task=SHORT, allow_unstable=True)
+        plain = call(PILOT, MARINER, task=SHORT)
+        np.testing.assert_array_equal(
+            *(found.cost if call is sail else found.heading for found in (asked, plain))
+        )
+
+
+def test_the_first_names_still_work():
+    import agents
+
+    assert (agents.fly, agents.Flights) == (agents.sail, agents.Episodes)
+
+
+def test_more_ships_than_are_steered_at_once_are_steered_in_groups(monkeypatch):
+    seeds = np.arange(5)
+    whole = sail(PILOT, MARINER, SHORT, seeds)
+    monkeypatch.setattr("agents.rollouts.course_keeping.AT_ONCE", 2)
+    for ships in (MARINER, [MARINER] * 5):
+        np.testing.assert_array_equal(whole.cost, sail(PILOT, ships, SHORT, seeds).cost)

@@ -1,0 +1,106 @@
+"""A controller of one's own is one file and its registration: files, benchmark, workers and bases know it."""
+
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import LQ, benchmark, check_controller, load_agent, register_controller
+from agents.cli import app
+from agents.controllers import registry
+from agents.controllers.controller import Controller
+from agents.suites.suite import load_suite
+from agents.training.bases import design_base
+from shipgym import load_model
+from shipgym.errors import InputError
+
+MINE = """
+from dataclasses import dataclass
+from agents import Controller, register_controller
+from agents.controllers.linear_loop import sample_ship
+from shipgym.envs.task import control_interval
+
+
+@register_controller
+@dataclass(frozen=True, eq=False)
+class PD(Controller):
+    kind = "my-pd"
+    feedback = {"proportional": ("heading_error", 1.0), "derivative": ("yaw_rate", -1.0)}
+
+    @classmethod
+    def from_model(cls, model, *, dt=None, proportional=1.0):
+        ship = sample_ship(model, dt or control_interval(model))
+        gains = {"proportional": proportional, "derivative": 10.0 * proportional}
+        return cls.designed(model, ship, gains=gains, design={})
+"""
+
+
+@pytest.fixture
+def mine(tmp_path, monkeypatch):
+    """A file in a temporary folder that registers a controller."""
+    (tmp_path / "my_controllers.py").write_text(MINE)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "_REGISTERED", {})
+    path = list(sys.path)
+    yield "my_controllers"
+    sys.modules.pop("my_controllers", None)
+    sys.path[:] = path
+
+
+def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    import my_controllers
+
+    ship = load_model("mariner")
+    controller = my_controllers.PD.from_model(ship)
+    check_controller(controller, ship)
+    controller.save(tmp_path / "pd.json")
+    again = load_agent(tmp_path / "pd.json", ship)
+    assert type(again) is my_controllers.PD
+    assert again.gains == controller.gains
+    task = load_suite("shipgym-v1").task("mariner-calm")
+    assert isinstance(design_base("my-pd", task), my_controllers.PD)
+    results = [
+        benchmark("my-pd,lq,file=pd.json", tasks=["mariner-calm"], episodes=2, workers=workers)
+        for workers in (1, 2)
+    ]
+    for result in results:
+        costs = result.figures("my-pd", "mariner-calm")
+        np.testing.assert_array_equal(costs, results[0].figures("my-pd", "mariner-calm"))
+        assert (costs > result.figures("lq", "mariner-calm")).all()
+
+
+def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
+    asked = ["benchmark", "--controllers", "my_controllers:PD", "--tasks", "mariner-calm", "--episodes", "2"]
+    done = CliRunner().invoke(app, [*asked, "--workers", "2", "--no-page", "--out", str(tmp_path / "out")])
+    assert done.exit_code == 0, done.output
+    assert "PD" in done.output
+    assert registry.controller_kinds()[-1] == "my-pd"
+
+
+def test_what_is_no_controller_is_refused():
+    class Nameless(Controller):
+        pass
+
+    class Clashing(LQ):
+        pass
+
+    for wrong, message in (
+        (3, "expected a subclass of agents.Controller"),
+        (Nameless, "Nameless.kind is ''"),
+        (Clashing, "kind 'lq' is that of agents.controllers.lq:LQ already"),
+    ):
+        with pytest.raises(InputError, match=re.escape(message)):
+            register_controller(wrong)
+
+
+@pytest.mark.parametrize("kind", registry.BUILT_IN)
+def test_our_own_keep_their_kind_and_are_documented(kind):
+    controller = registry.controller_class(kind)
+    assert controller.kind == kind
+    assert register_controller(controller) is controller
+    page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text()
+    assert f"`{controller.__name__}`" in page
