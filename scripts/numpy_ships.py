@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 import shipgym
 from shipgym.engine import motion
 from shipgym.engine.motion import Motion, Push, Ship
-from shipgym.engine.specialise import Part, named_globals
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import named_globals
 
 Floats = NDArray[np.float64]
 Batch = tuple[Floats, ...]
@@ -87,8 +88,8 @@ def numpy_step(
     """
     sail = on_arrays(motion.sail, model.vessel.parts())
     numbers = model.ship_numbers(depth)
-    ship = Ship(*numbers[: len(Ship._fields)].tolist())
-    coefficients = model.vessel.coefficients(*numbers[len(ship) :].tolist())
+    ship = Ship(*numbers[: len(Ship._fields)])
+    coefficients = model.vessel.coefficients(*numbers[len(ship) :])
     calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def step(state: Batch, rudder: Floats, shaft: Floats, h: float) -> Batch:

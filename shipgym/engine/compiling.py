@@ -9,6 +9,7 @@ and may only be read is used as it is.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
 from contextlib import AbstractContextManager, nullcontext
@@ -90,21 +91,20 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
 
 
 def explanation(error: Exception, what: str) -> str:
-    """Numba's reason in one sentence, with the function and the line it is about."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    places = [line for line in lines if line.startswith(("File ", '"'))]
-    where = places[-1].removeprefix("File ").rstrip(":") if places else ""
-    reasons = [
-        line
-        for line in lines
-        if not line.startswith(("File", "During:", "def ", "^", "<source", "Failed in", "- ", "There are"))
-    ]
-    reason = reasons[0] if reasons else "no reason given"
-    return (
-        f"{what}: cannot be compiled at {where}: {reason}"
-        if where
-        else f"{what}: cannot be compiled: {reason}"
-    )
+    """Numba's reason in one sentence, with the function and the line of the innermost call."""
+    text = str(error)
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
+    if reason.endswith("signature:"):
+        reason = reason[: -len(" found for signature:")] + next(
+            (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
+        )
+    place = re.search(r"at (\S+) \((\d+)\)", text)
+    function = re.search(r"^def (\w+)\(|<function (\w+)_[0-9a-f]{24} at", text, re.MULTILINE)
+    where = f" in {function[1] or function[2]}" if function else ""
+    if place and (function is None or function[1]):
+        where += f" ({place[1]}, line {place[2]})"
+    return f"{what}: cannot be compiled{where}: {reason}"
 
 
 def _announce(what: str) -> None:

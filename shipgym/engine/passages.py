@@ -1,8 +1,8 @@
 """What the passages of one ship share: a state in a row of `out`, a step, and the sea meanwhile.
 
 States are vectors in the order of the ship's `state_names`; behind them, in the open sea, stands what is
-recorded of it (`SEA_CHANNELS`). `sea` is the vector of the sea's state and `words` that of its random numbers, one word
-long; both are changed. `parameters` tell of the sea, `numbers` of the ship.
+recorded of it (`SEA_CHANNELS`). `sea` is the vector of the sea's state and `words` that of its random
+numbers, one word long; both are changed. `parameters` tell of the sea, `numbers` of the ship.
 """
 
 from __future__ import annotations

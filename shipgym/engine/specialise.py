@@ -63,7 +63,7 @@ class Specialisation:
             namespace[name] = value
         copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
         copy.__qualname__ = f"{function.__name__}_{self.tag}"  # symbols of all that is compiled differ
-        copy.__module__ = function.__module__
+        copy.__module__ = __name__  # the cache imports it, and could not import a user's file
         return copy
 
 

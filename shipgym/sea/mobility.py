@@ -50,7 +50,8 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     An identified model divides by the inertia of its particulars, given or estimated, a reference ship by
     that of its own equations. A structure without an equation of surge keeps its speed, one without sway or
     yaw does not drift or turn: their rows and columns are 0. So is roll where the model has none; a
-    structure with an equation of roll has that inertia which the roll period and the metacentric height tell.
+    structure with an equation of roll, or a ship of the user's that rolls, has that inertia which the roll
+    period and the metacentric height tell.
 
     Parameters
     ----------
@@ -77,6 +78,9 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     elif isinstance(model.dynamics, Structure):
         axes = [_AXES.index(equation) for equation in model.dynamics.equations if equation in _AXES]
         mass[3, 3] = roll_inertia(model) if 3 in axes else 0.0
+    elif "phi" in model.state_names:
+        axes = [0, 1, 2, 3]
+        mass[3, 3] = roll_inertia(model)
     matrix = np.zeros((4, 4))
     matrix[np.ix_(axes, axes)] = np.linalg.inv(mass[np.ix_(axes, axes)])
     return matrix

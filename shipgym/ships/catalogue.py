@@ -8,13 +8,14 @@ from pathlib import Path
 from typing import Literal
 
 from shipgym.checks import check_choice
+from shipgym.errors import InputError
 from shipgym.ships import container as container_file
 from shipgym.ships import kvlcc2 as kvlcc2_file
 from shipgym.ships import tanker as tanker_file
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.equations import ShipEquations, read_ship_equations
 from shipgym.ships.mariner import mariner
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, register_ship_equations
+from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, list_structures
 
 LIBRARY = Path(__file__).parent / "library"
 
@@ -90,6 +91,37 @@ def list_models() -> list[str]:
     """Names of the known models: reference ships, identified ones, then ships that were registered."""
     registered = [name for name in EQUATIONS if name not in SHIPPED_EQUATIONS]
     return [*REFERENCE_SHIPS, *sorted(path.stem for path in LIBRARY.glob("*.json")), *registered]
+
+
+def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
+    """Make a ship with equations of her own known by her name, so that `load_model` finds her.
+
+    Parameters
+    ----------
+    ship : ShipEquations, str or Path
+        The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
+        from a file, or from one that cannot be imported, stays in this process.
+
+    Returns
+    -------
+    ShipEquations
+
+    Raises
+    ------
+    InputError
+        For a file that does not define a ship, or a name that another ship or structure has.
+    """
+    found = ship if isinstance(ship, ShipEquations) else read_ship_equations(ship)
+    name = found.name
+    registered = EQUATIONS.get(name)
+    again = registered is not None and registered.path == found.path and name not in SHIPPED_EQUATIONS
+    if not again and name in (*list_models(), *list_structures()):
+        raise InputError(
+            f"register_ship_equations: name {name!r} found, which is another ship's or structure's; expected "
+            "a new name"
+        )
+    EQUATIONS[name] = found
+    return found
 
 
 def load_model(name: str | Path) -> ShipModel:

@@ -98,7 +98,10 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         model.ship_numbers()
     except InputError as error:
         return ModelCheck(model.name, (str(error),), (), float("nan"))
-    problems = list(_wrong_accelerations(model))
+    try:
+        problems = list(_wrong_accelerations(model))
+    except InputError as error:  # equations that cannot be compiled
+        return ModelCheck(model.name, (str(error),), (), float("nan"))
     remarks: list[str] = []
     asymmetry = float("nan")
     if not problems:

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import math
 import sys
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
@@ -21,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_number, check_text
+from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.vessel import Vessel
@@ -29,6 +32,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
 Floats = NDArray[np.float64]
+RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
 
@@ -103,6 +107,30 @@ class ShipEquations:
         if self.shaft_acceleration is not None or self.service_shaft_speed:
             check_number(self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0)
         self.particulars.require("speed")
+        self._try(where)
+
+    def _try(self, where: str) -> None:
+        """Work out the accelerations of one state as plain Python, whose messages are the clearest."""
+        L, U = self.particulars["length"], self.particulars["speed"]
+        n, limit, rate = self.service_shaft_speed, self.steering.limit, self.steering.rate
+        ship = Ship(L, U, limit, rate, 0.0, n, math.inf, U)
+        motion = Motion(0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n)
+        coefficients = self.coefficients_record()
+        try:
+            found = self.accelerations(motion, coefficients, ship)
+            shaft = self.shaft_acceleration and self.shaft_acceleration(n, 0.9 * n, coefficients, ship)
+        except Exception as error:
+            at = traceback.extract_tb(error.__traceback__)[-1]
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{where}: {at.name} ({at.filename}, line {at.lineno}): {reason}") from error
+        if not isinstance(found, tuple) or len(found) != len(RATES):
+            raise InputError(
+                f"{where}: accelerations returns {found!r}, expected five numbers: udot, vdot, rdot, pdot, "
+                "qdot, 0 for those that the ship does not have"
+            )
+        for name, value in zip((*RATES, "shaft_acceleration"), (*found, shaft or 0.0), strict=True):
+            if not isinstance(value, (int, float)):
+                raise InputError(f"{where}: {name} is {value!r}, expected a number")
 
     def __reduce__(self) -> Any:
         """Another process finds a ship of this package by her name, another by her file."""

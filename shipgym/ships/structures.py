@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
 from shipgym.ships import container, kvlcc2, tanker
-from shipgym.ships.equations import ShipEquations, read_ship_equations
+from shipgym.ships.equations import ShipEquations
 from shipgym.ships.pmm import PMM18, PMM38
 from shipgym.ships.term_table import EQUATION_NAMES, FORCE_OF_EQUATION, Structure
 from shipgym.ships.terms import SYMBOLS, Term, prime_terms, read_terms
 
 __all__ = [
     "ABKOWITZ", "EQUATIONS", "EQUATION_NAMES", "FORCE_OF_EQUATION", "SHIPPED_EQUATIONS", "STRUCTURES",
-    "SYMBOLS", "Structure", "Term", "get_dynamics", "get_structure", "list_structures", "prime_terms", "read_terms",
-    "register_ship_equations", "register_structure",
+    "SYMBOLS", "Structure", "Term", "get_dynamics", "get_structure", "list_structures", "prime_terms",
+    "read_terms", "register_structure",
 ]  # fmt: skip
 
 ZHU = "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship dynamics"
@@ -174,36 +173,6 @@ def get_dynamics(name: str) -> Structure | ShipEquations:
         If there is none of that name.
     """
     return EQUATIONS[name] if name in EQUATIONS else get_structure(name)
-
-
-def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
-    """Make a ship with equations of her own known by her name, so that `load_model` finds her.
-
-    Parameters
-    ----------
-    ship : ShipEquations, str or Path
-        The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
-        from a file, or from one that cannot be imported, stays in this process.
-
-    Returns
-    -------
-    ShipEquations
-
-    Raises
-    ------
-    InputError
-        For a file that does not define a ship, or a name that another ship or structure has.
-    """
-    found = ship if isinstance(ship, ShipEquations) else read_ship_equations(ship)
-    name = found.name
-    taken = name in SHIPPED_EQUATIONS or name in STRUCTURES or name == WITH_REFERENCE
-    if taken or (name in EQUATIONS and EQUATIONS[name].path != found.path):
-        raise InputError(
-            f"register_ship_equations: name {name!r} found, which is another ship's or structure's; expected "
-            "a new name"
-        )
-    EQUATIONS[name] = found
-    return found
 
 
 def register_structure(

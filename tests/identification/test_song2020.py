@@ -112,7 +112,7 @@ def test_thrust_rudder_and_known_forces_are_the_container_ship_s():
                 + own.PUBLISHED.X_ff * f * f
             )
         else:
-            hull = basis @ [getattr(own, f"{letter}_{label}") for label in labels]
+            hull = basis @ [getattr(own.PUBLISHED, f"{letter}_{label}") for label in labels]
         pushed = np.dot(columns[equation][-len(numbers[equation]) :], numbers[equation])
         forces.append(hull + pushed + known[equation])
     scale = speed**2 / L / np.array([1.0, 1.0, L, L])

@@ -8,17 +8,17 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from shipgym.kernels import random
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 
 import shipgym
 from shipgym import InputError, manoeuvres
-from shipgym.envs.engine import Engine
+from shipgym.engine import random
 from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.simulate import open_loop, simulate
-from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer
 
@@ -103,11 +103,9 @@ def test_waves_push_by_the_mean_drift_force_times_one_plus_its_variation(mariner
     waves = Waves(3.0, 9.0, 60.0)
     passage, pushes = Passage(body, Conditions(weather=Weather(waves=waves)), 1e-3), []
     for word in range(300):
-        passage.words[0] = word
-        states = passage.states(body.kernel_states(at_rest[None])[0], 2)
-        passage.kernel("trajectories").simulate(
-            states, np.zeros((2, 2)), 1e-3, passage.sky, passage.words, passage.ship
-        )
+        passage.sea[1][0] = word
+        states = passage.states(at_rest, 2)
+        passage.loop("simulate")(states, np.zeros((2, 2)), 1e-3, *passage.sea, passage.numbers)
         pushes.append(states[1, 4])
     drift = wave_drift(waves, mariner.particulars)
     at = np.argmin(np.abs(drift.chi - np.radians(60.0)))
@@ -275,7 +273,7 @@ def test_voyages_in_weather_go_on_from_leg_to_leg():
 
 
 def engine(model, lanes, sea="rough", **task):
-    return Engine(model, lanes, course_keeping_task(sea, **task))
+    return CourseKeepingEngine(model, lanes, CourseKeepingTask(sea, **task))
 
 
 def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
@@ -350,9 +348,9 @@ def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
 
 FLY = """
 import numpy as np, shipgym
-from shipgym.envs.engine import Engine
-from shipgym.tasks.task import course_keeping_task
-engine = Engine(shipgym.load_model("mariner"), 2, course_keeping_task("rough"))
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
+engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2, CourseKeepingTask("rough"))
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
@@ -379,6 +377,6 @@ def test_wrong_weather(mariner):
     with pytest.raises(InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"):
         ahead(mariner, "rugh", 2)
     with pytest.raises(InputError, match="sea: 7 found"):
-        course_keeping_task(7)
+        CourseKeepingTask(7)
     with pytest.raises(InputError, match="seed: -1 found"):
         ahead(mariner, "rough", 2, seed=-1)

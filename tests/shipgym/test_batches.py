@@ -2,23 +2,27 @@
 
 import math
 
-import numba
 import numpy as np
 import pytest
-from shipgym.kernels import layout
-from shipgym.kernels.trigonometry import arctan, arctan2, exponential
 
 import shipgym
+from shipgym.engine.compiling import compiled
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.mathematics import arctan, arctan2, exponential
+from shipgym.engine.records import LANES
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2")
 
 
-@numba.njit(error_model="numpy", fastmath={"contract"})
-def over(x, y):
-    """Our functions as kernels compile them."""
-    out = np.empty((3, x.size))
+def loop(x, y, out):
     for i in range(x.size):
         out[0, i], out[1, i], out[2, i] = exponential(x[i]), arctan(x[i]), arctan2(y[i], x[i])
+
+
+def over(x, y):
+    """Our functions as loops compile them."""
+    out = np.empty((3, x.size))
+    compiled(loop, "void(float64[::1], float64[::1], float64[:, ::1])", {}, "mathematics")(x, y, out)
     return out
 
 
@@ -51,22 +55,24 @@ def test_the_arc_tangent_knows_the_axes(x, y):
     assert math.copysign(1.0, found) == math.copysign(1.0, math.atan2(y, x))
 
 
+@pytest.mark.parametrize("shared", [True, False], ids=["one ship", "a ship a lane"])
 @pytest.mark.parametrize("name", SHIPS)
-def test_a_ship_in_a_batch_sails_as_it_does_alone(name):
+def test_a_ship_in_a_batch_sails_as_it_does_alone(name, shared):
     """Every lane with a rudder of its own, against one simulation for three of them."""
     model = shipgym.load_model(name)
+    n_state = len(model.state_names)
     h, steps, tiles = 0.02 * model.particulars["length"] / model.particulars["speed"], 60, 2
-    rudders = np.radians(np.linspace(-30.0, 30.0, tiles * layout.LANES))
-    states = np.repeat(np.tile(model.kernel_states(model.service_state[None]), (tiles, 1)), layout.LANES, 1)
-    commands = np.empty((tiles, 2, layout.LANES))
+    rudders = np.radians(np.linspace(-30.0, 30.0, tiles * LANES))
+    states = np.repeat(np.tile(model.service_state, (tiles, 1)), LANES, 1)
+    commands = np.empty((tiles, 2, LANES))
     commands[:, 0], commands[:, 1] = rudders.reshape(tiles, -1), model.service_shaft_speed
-    kernel = model.kernel("fleet").advance_batch
-    kernel(states, commands.reshape(tiles, -1), h, steps, model.ship_tile()[None])
-    lanes = states.reshape(tiles, layout.N_STATE, layout.LANES).transpose(0, 2, 1).reshape(-1, layout.N_STATE)
+    advance = ship_loop(model.vessel, "alike" if shared else "fleet")
+    ships = np.repeat(model.ship_numbers(), 1 if shared else LANES)
+    advance(states, commands.reshape(tiles, -1), h, steps, ships[None])
+    lanes = states.reshape(tiles, n_state, LANES).transpose(0, 2, 1).reshape(-1, n_state)
     for lane in (0, 40, 127):
         held = np.tile(model.service_command, (steps, 1))
         held[:, 0] = rudders[lane]
         alone = model.simulate(held, h)
-        own = model.own_states(lanes[lane : lane + 1])[0]
-        for channel, value in zip(model.state_names, own, strict=True):
+        for channel, value in zip(model.state_names, lanes[lane], strict=True):
             assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), channel
