@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.decomposition import decompose
 from identification.estimators.estimator import FitTask
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
-from identification.regression.decomposition import decompose
 from identification.search import get_optimiser
 from identification.validation.prediction import predict
 from shipgym.ships import ShipModel
