@@ -1,4 +1,4 @@
-"""What trials tell about each coefficient, and which manoeuvre to run next.
+"""What trials say about each coefficient, and which manoeuvre to run next.
 
 The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up over trials. Its
 inverse is the least covariance of the coefficients; candidates are simulated on the current model and ranked
@@ -39,7 +39,7 @@ JITTER = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
-    """What one trial tells.
+    """What one trial says about the coefficients.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ def advise(
     model : ShipModel
         As identified from the trials so far; with a table of terms.
     trials : sequence of Trial
-        Those trials; their residuals tell the noise.
+        Those trials; their residuals give the noise.
     candidates : mapping of str to callable, optional
         Simulate a manoeuvre with a model; by default `standard_candidates`. One with which the model runs
         away is left out.

@@ -20,7 +20,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 COMPARED = ("u", "v", "r")
-RAN_AWAY = 1e3  # counts as an error of so many times the motion
+RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:

@@ -56,7 +56,7 @@ class Prior:
     roots : dict of str to array of shape (n_rows, n_terms)
         Root of S per sample and second of window: S is strength^2 n_samples duration^2 root' root.
     known : dict of str to array of bool of shape (n_terms,)
-        Which coefficients the prior tells; the others are free.
+        Which coefficients the prior determines; the others are free.
     """
 
     name: str
@@ -159,7 +159,7 @@ def with_prior(
     Raises
     ------
     InputError
-        For a grey box, which has a reference ship, and for a prior that tells nothing of the structure.
+        For a grey box, which has a reference ship, and for a prior without coefficients for the structure.
     """
     if isinstance(blank.table, GreyBox):
         raise InputError(
@@ -263,7 +263,7 @@ def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, streng
 def _held(
     estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]
 ) -> Estimator:
-    """The prior's own coefficients; those it does not tell are fitted."""
+    """The prior's own coefficients; those it leaves open are fitted."""
     free = np.flatnonzero(~known)
     estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
     coefficients, moment, covariance = centre.copy(), np.zeros((len(known),) * 2), np.zeros((len(known),) * 2)
