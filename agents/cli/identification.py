@@ -138,7 +138,7 @@ def advise_command(
     options: dict[str, Any],
     as_json: Json = False,
 ) -> None:
-    """Tell what the trials tell of each coefficient, and which manoeuvres to run next.
+    """Show how much the trials say about each coefficient, and which manoeuvres to run next.
 
     Condition number, variance inflation and Fisher information of each trial; then zigzags, turning circles
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from io import StringIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from rich.table import Table
 
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
+from identification.text import as_text
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships import ShipModel, Structure
@@ -83,10 +84,6 @@ class Reduction:
         return self.path[self.chosen].coefficients
 
     def __str__(self) -> str:
-        from rich.console import Console
-        from rich.table import Table
-
-        console = Console(file=StringIO(), width=100, color_system=None)
         table = Table("terms", "changed", "worst relative error", "R2", "held-out R2", "")
         for k, step in enumerate(self.path):
             worst = max(step.relative_errors, key=lambda name: step.relative_errors[name])
@@ -94,10 +91,7 @@ class Reduction:
                 str(len(step.terms)), step.changed, f"{step.relative_errors[worst]:.3g} ({worst})",
                 f"{step.r_squared:.6f}", f"{step.held_out:.6f}", "chosen" if k == self.chosen else "",
             )  # fmt: skip
-        console.print(table)
-        file = console.file
-        assert isinstance(file, StringIO)
-        return file.getvalue()
+        return as_text(table)
 
 
 def backward_elimination(

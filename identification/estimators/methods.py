@@ -14,6 +14,7 @@ from sklearn.base import clone
 from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.free_running import fit_free_running
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -23,7 +24,6 @@ from identification.estimators.recursive import (
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples
-from identification.search.free_running import fit_free_running
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
 

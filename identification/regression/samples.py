@@ -39,7 +39,7 @@ SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
 LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
 SHORTEST_GAP = 0.15  # unless it is shorter than this part of the time to sail one ship length
-NEIGHBOURS = 11  # steps that tell which is usual
+NEIGHBOURS = 11  # steps whose median is the usual one
 FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 

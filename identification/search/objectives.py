@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.regression.decomposition import Decomposition, decompose_triangle, stacked, triangle
+from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]

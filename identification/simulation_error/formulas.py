@@ -100,7 +100,7 @@ def formula_coefficients(
     Raises
     ------
     InputError
-        For a structure that the formulas tell nothing of, and for particulars that do not suffice.
+        For a structure that the formulas do not cover, and for particulars that do not suffice.
     """
     ship = particulars.completed()
     found = {q: [_linear_symbol(term) for term in terms] for q, terms in structure.equations.items()}

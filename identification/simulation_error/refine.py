@@ -41,8 +41,8 @@ Floats = NDArray[np.float64]
 STARTS = ("free", "measured")
 ROUNDS = 3  # of fits, between which scales of the residuals and starts of the segments are renewed
 OFFSET = np.radians(1.0)  # standard deviation of a rudder's offset, as far as is known beforehand
-STRONGER = 10.0  # times as strong is the prior while the refined model runs away,
-ATTEMPTS = 4  # so often at most
+STRONGER = 10.0  # factor on the pull from attempt to attempt, while the refined model runs away
+ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Refinement:
     Attributes
     ----------
     segment_lengths : float
-        Length of a segment: the time to sail so many ship lengths at service speed.
+        Length of a segment: the time to sail that many ship lengths at service speed.
     staggered : bool
         Whether a second set of segments begins half a segment later.
     segment_start : {"free", "measured"}
@@ -63,7 +63,7 @@ class Refinement:
         acceleration (root mean squares over the trials).
     rudder_offsets : bool
         Whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
-        the mean of them: its own terms tell the neutral helm.
+        the mean of them: its own terms give the neutral helm.
     extra_trials : sequence of Trial
         Further trials that the refinement alone sees, such as turns of a reference ship.
     extra_weight : float
@@ -142,7 +142,7 @@ def refine(start: GuardedFit, task: FitTask, settings: Refinement, memory: float
     start : GuardedFit
         The fit to start from.
     task : FitTask
-        Its regression, which tells how large the terms are in the trials, and the trials.
+        Its regression, which shows how large the terms are in the trials, and the trials.
     settings : Refinement
     memory : float
         Time over which residuals are taken to be correlated, s.

@@ -1,4 +1,4 @@
-"""What the data can tell and what the fit left over: excitation, collinearity, residuals."""
+"""What the data can determine and what the fit left over: excitation, collinearity, residuals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
-RUDDER_NOISE = 6.0  # neither does one that moves less than so many times its noise,
+RUDDER_NOISE = 6.0  # neither does one that moves less than this many times its noise,
 MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers

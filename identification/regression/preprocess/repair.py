@@ -1,4 +1,4 @@
-"""Outliers and dropouts of a record: found, filled from their neighbours, and told."""
+"""Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
 
 from __future__ import annotations
 
