@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
@@ -75,9 +76,9 @@ class Tuned:
     evaluations: int
 
 
-#: What is searched of LQ's relatives beside its weights. Not MPC's horizon: from an eighth to twice the
+#: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from an eighth to twice the
 #: design's it changes no cost by more than 2e-5, and a plan's time grows with its square.
-OF_ITS_OWN: dict[str, tuple[Setting, ...]] = {
+FURTHER_SETTINGS: dict[str, tuple[Setting, ...]] = {
     "lqg": (Setting("noise", 1.0, 0.01, 100.0), Setting("disturbance_deg", 2.0, 0.01, 100.0)),
     "lq-adaptive": (Setting("forgetting_lengths", 20.0, 0.1, 100.0), Setting("noise", 1.0, 0.01, 100.0)),
 }
@@ -110,8 +111,6 @@ def search(
     InputError
         If every start is refused.
     """
-    from scipy.optimize import minimize
-
     check_whole(evaluations, "evaluations", at_least=len(spaces))
     starts = [cost({one.name: one.start for one in space}) for space in spaces]
     number = int(np.argmin(starts))
@@ -223,7 +222,7 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             integral,
             Setting("rudder_weight", RUDDER_WEIGHT, 0.01, 100.0),
             Setting("rate_weight_s2", plain["rate_weight_s2"], 0.01, 100.0),
-            *OF_ITS_OWN.get(kind, ()),
+            *FURTHER_SETTINGS.get(kind, ()),
         ]
     waves = task.task.weather.waves
     if kind not in ("pid-filtered", "lqg") or waves is None:
