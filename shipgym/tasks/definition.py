@@ -159,7 +159,7 @@ def _small_record(kind: Record, value: Any, name: str, bounds: Setting) -> Any:
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(names):
         raise InputError(f"{name}: {value!r} found, expected {words}")
     return kind(
-        *[_number(one, f"{name}: the {word}", bounds) for one, word in zip(value, names, strict=True)]
+        *[_number(one, f"{name}: the {word}", bounds) for one, word in zip(value, names, strict=True)]  # type: ignore[arg-type]
     )
 
 
