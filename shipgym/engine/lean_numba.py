@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from llvmlite.binding.newpassmanagers import create_new_function_pass_manager
 from numba.core import codegen
 
 
@@ -36,20 +37,25 @@ def lean(tag: str, loop: str) -> Iterator[None]:
         )
     }
 
+    passes = create_new_function_pass_manager()  # without these, branches keep loops from being vectorised
+    passes.add_sroa_pass()
+    passes.add_simplify_cfg_pass()
+
     def is_inner(name: str) -> bool:
         return name.endswith(tag) and name != loop
 
     def optimise_functions(self: Any, module: Any) -> None:
-        if self.name.endswith(tag):
-            module.data_layout = self._codegen._data_layout
-        else:
+        if not self.name.endswith(tag):
             kept["_optimize_functions"](self, module)
+            return
+        module.data_layout = self._codegen._data_layout
+        builder = self._codegen._pass_builder()
+        for function in module.functions:
+            if not function.is_declaration:
+                passes.run(function, builder)
 
     def optimise_module(self: Any) -> None:
-        if self.name == loop:  # without the passes that look for reference counts: there are none
-            passes, builder = self._codegen._module_pass_manager()
-            passes.run(self._final_module, builder)
-        elif not is_inner(self.name):
+        if not is_inner(self.name):
             kept["_optimize_final_module"](self)
 
     def emit(self: Any) -> None:

@@ -299,8 +299,8 @@ def _entry(context: Any, builder: Any, kind: Any, array: Any, row: int, lanes: i
     from numba.core import types
 
     word = context.get_value_type(types.intp)
-    index = word(row) if lanes == 1 else builder.add(lane, word(row * lanes))
-    return builder.gep(context.make_array(kind)(context, builder, array).data, [index])
+    index = word(row) if lanes == 1 else builder.add(lane, word(row * lanes), flags=("nsw",))
+    return builder.gep(context.make_array(kind)(context, builder, array).data, [index], inbounds=True)
 
 
 def _rest(context: Any, builder: Any, kind: Any, array: Any, first: int) -> Any:
