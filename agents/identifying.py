@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from identification import IdentificationResult, identify
@@ -16,7 +17,7 @@ from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
 RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
-MODELS = ("reference_model", "prior")  # options that may name a model's file
+MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
 
 
 def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[str, Any]:
@@ -82,10 +83,8 @@ def identify_trials(
     ship: ShipFile, trials: Sequence[Trial], arguments: Mapping[str, Any]
 ) -> IdentificationResult:
     """`identify_ship` for trials that are read already, both from `trials_of`."""
-    try:
+    with _named(ship):
         return identify(trials, particulars=ship.particulars, steering=ship.steering, **arguments)
-    except InputError as error:
-        raise InputError(f"{ship.path}: {error}") from None
 
 
 def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | None) -> Comparison:
@@ -107,12 +106,10 @@ def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | Non
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
-    try:
+    with _named(ship):
         return compare_methods(
             trials, names or None, particulars=ship.particulars, steering=ship.steering, **arguments
         )
-    except InputError as error:
-        raise InputError(f"{ship.path}: {error}") from None
 
 
 def reduce_ship(
@@ -120,9 +117,16 @@ def reduce_ship(
 ) -> ReducedIdentification:
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
-    try:
+    with _named(ship):
         return identify_reduced(
             trials, direction, tolerance, particulars=ship.particulars, steering=ship.steering, **arguments
         )
+
+
+@contextmanager
+def _named(ship: ShipFile) -> Iterator[None]:
+    """Errors name the ship file."""
+    try:
+        yield
     except InputError as error:
         raise InputError(f"{ship.path}: {error}") from None

@@ -13,14 +13,9 @@ from shipgym.errors import InputError
 
 
 def check_folder(folder: Path, names: Collection[str]) -> None:
-    """Refuse a folder that cannot be (re)placed: it holds files that are not results of ours.
+    """Refuse a folder that results cannot be written to, or that holds anything but the files `names`.
 
-    Parameters
-    ----------
-    folder : Path
-        Where the results shall go; it need not exist.
-    names : collection of str
-        Names of the files that the results consist of; a folder with only these is replaced.
+    A folder with only these is replaced as a whole; it need not exist.
 
     Raises
     ------
@@ -49,17 +44,12 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 
 
 def check_page(path: Path) -> None:
-    """Refuse a file for a page that cannot be written.
-
-    Parameters
-    ----------
-    path : Path
-        Where the page shall go.
+    """Refuse a file for a page: one that does not end in .html, a folder, or one that cannot be written.
 
     Raises
     ------
     InputError
-        If the ending is not .html, it is a folder, or its folder cannot be written.
+        Naming the file.
     """
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")

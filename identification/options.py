@@ -1,4 +1,4 @@
-"""The options of `identify`, and how a model's provenance and settings.json tell of them."""
+"""The options of `identify`, as a model's provenance and settings.json record them."""
 
 from __future__ import annotations
 

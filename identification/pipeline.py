@@ -94,7 +94,7 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
         return fit, None
-    refined = refine(fit, task.samples, task.trials, refinement, _memory(task.blank.particulars))
+    refined = refine(fit, task, refinement, _memory(task.blank.particulars))
     return refined.fit, refined
 
 

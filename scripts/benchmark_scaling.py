@@ -51,7 +51,8 @@ def head(title: str) -> None:
 def monte_carlo_table() -> None:
     """Manoeuvres, course stability, and PID and LQ in one episode each, over models drawn."""
     from agents import LQ, PID
-    from agents.verification.monte_carlo import Engine, monte_carlo
+    from agents.engines.jobs import JobEngine
+    from agents.verification.monte_carlo import monte_carlo
     from shipgym import load_model
 
     ship = load_model("mariner-tls-svm")
@@ -60,7 +61,7 @@ def monte_carlo_table() -> None:
     head("Monte Carlo over the posterior")
     for draws in (100, 400, 1600):
         for workers in WORKERS:
-            where = Engine(workers=workers)
+            where = JobEngine(workers=workers)
             row(f"{draws} draws", workers, lambda d=draws, w=where: monte_carlo(pilots, ship, d, where=w))
 
 
@@ -99,15 +100,15 @@ def benchmark_table() -> None:
 
     tasks = [task.name for task in load_suite().tasks[:4]]
 
-    def fly(episodes: int, workers: int) -> None:
+    def run(episodes: int, workers: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
             benchmark("pid,lq", "shipgym-v1", tasks, f"{folder}/results", workers, episodes=episodes)
 
-    fly(1, 1)  # compiles
+    run(1, 1)  # compiles
     head("shipgym benchmark --controllers pid,lq, four tasks")
     for episodes in (10, 100):
         for workers in WORKERS:
-            row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: fly(e, w))
+            row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: run(e, w))
 
 
 def tasks_table() -> None:

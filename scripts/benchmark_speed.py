@@ -133,13 +133,13 @@ def single_environment(n_steps: int = 1000) -> Row:
     env.reset(seed=0)
     action = np.zeros(1, dtype=np.float32)
 
-    def fly() -> None:
+    def run() -> None:
         for _ in range(n_steps):
             _, _, terminated, truncated, _ = env.step(action)
             if terminated or truncated:
                 env.reset()
 
-    compiled = n_steps / best_time(fly, SHORT_REPEATS)
+    compiled = n_steps / best_time(run, SHORT_REPEATS)
     (plain,) = run_python(STEPS_IN_PYTHON, MODEL, NUMBA_DISABLE_JIT="1")
     return Row(
         "single environment, gymnasium.make",

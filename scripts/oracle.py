@@ -46,15 +46,14 @@ from agents.rollouts.rollout import episode_costs, rollout
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from shipgym.checks import check_number, check_whole
-from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.envs.engine import Engine
-from shipgym.envs.task import INTEGRAL_ZONE, Task
-from shipgym.envs.variety import Variety
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
-from shipgym.kernels.course_keeping import NEXT_CHANGE
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import Task, observation_scales
 
 Floats = NDArray[np.float64]
 Rudder = NDArray[np.float32]
@@ -64,7 +63,7 @@ LEAST_SCALE = (
     0.1  # candidates differ by this part of the deviation to all of it: coarse and fine ones at once
 )
 LEARNING = 0.8  # share of the elites in the new mean and deviation
-LEAST_SPREAD = 0.002  # parts of the rudder limit
+LEAST_DEVIATION = 0.002  # parts of the rudder limit
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ class OracleSettings:
         Sailed before planning again.
     passes : int
         Times that the whole episode is gone through, each beginning with the best plan so far.
-    spread : float
+    deviation : float
         Standard deviation of a knot at first, parts of the rudder limit; half of it in each further pass.
     group : int
         Episodes planned side by side; the results do not depend on it.
@@ -103,14 +102,14 @@ class OracleSettings:
     knot_steps: int = 10
     replan_steps: int = 20
     passes: int = 2
-    spread: float = 0.3
+    deviation: float = 0.3
     group: int = 32
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            if item.name != "spread":
+            if item.name != "deviation":
                 check_whole(getattr(self, item.name), item.name, at_least=1)
-        check_number(self.spread, "spread", above=0.0)
+        check_number(self.deviation, "deviation", above=0.0)
         check_number(self.elites, "elites", at_most=self.candidates // 2, hint="half of the candidates")
         check_number(self.plan_steps, "plan_steps", at_least=self.knot_steps, at_most=self.horizon_steps)
         check_number(self.replan_steps, "replan_steps", at_most=self.plan_steps)
@@ -141,7 +140,7 @@ def run_oracle(
     seeds: ArrayLike,
     start: Policy | None = None,
     settings: OracleSettings | None = None,
-    variety: Variety | None = None,
+    variety: Randomisation | None = None,
 ) -> OracleRun:
     """Steer episodes as well as sampling on the true ship can.
 
@@ -157,7 +156,7 @@ def run_oracle(
         What each plan begins with; by default `LQ.from_model(model)`.
     settings : OracleSettings, optional
         How hard is searched.
-    variety : Variety, optional
+    variety : Randomisation, optional
         What differs from episode to episode beside the task's own.
 
     Returns
@@ -233,7 +232,7 @@ class _Ships:
         self.engine.copy_lanes(source.engine, lanes)
         self.integral, self.over = source.integral[lanes], source.over[lanes]
         if keep_course:
-            self.engine.write(NEXT_CHANGE, np.inf)
+            self.engine.write("next_change", np.inf)
 
 
 class _Search:
@@ -241,13 +240,13 @@ class _Search:
 
     def __init__(
         self, engine: Engine, seeds: NDArray[Any], feedback: Controller, settings: OracleSettings,
-        variety: Variety | None,
+        variety: Randomisation | None,
     ) -> None:  # fmt: skip
         self.task, self.seeds, self.settings, self.variety = engine.task, seeds, settings, variety
         self.n = len(seeds)
         self.ships = _Ships(engine, feedback)
         self._sizes: dict[int, _Ships] = {}
-        self._changes_course = isinstance(engine.task, CourseKeepingTask)
+        self._changes_course = not engine.task.follows_path
         self._ordered = np.zeros(
             (self.n, engine.task.episode_steps), dtype=np.bool_
         )  # a new course at this step
@@ -339,10 +338,10 @@ class _Search:
         shape = self._shape(step)
         random = np.random.default_rng((number, step))
         mean = np.zeros((len(which), len(shape)))
-        spread = np.full_like(mean, asked.spread * 0.5**number)
+        deviation = np.full_like(mean, asked.deviation * 0.5**number)
         least, change = np.full(len(which), np.inf), np.zeros_like(mean)
         for _ in range(asked.iterations):
-            knots = mean[:, None] + spread[:, None] * _drawn(random, asked.candidates, len(shape))
+            knots = mean[:, None] + deviation[:, None] * _drawn(random, asked.candidates, len(shape))
             knots[:, 0] = change
             costs = self._tried(added[which], which, knots, shape, step)
             order = np.argsort(costs, axis=1, kind="stable")
@@ -352,7 +351,7 @@ class _Search:
             change[better] = knots[episodes, best][better]
             elites = np.take_along_axis(knots, order[:, : asked.elites, None], axis=1)
             mean += LEARNING * (elites.mean(axis=1) - mean)
-            spread += LEARNING * (np.maximum(elites.std(axis=1), LEAST_SPREAD) - spread)
+            deviation += LEARNING * (np.maximum(elites.std(axis=1), LEAST_DEVIATION) - deviation)
         added[which, step : step + shape.shape[1]] += (change[:, None] @ shape)[:, 0]
 
     def _shape(self, step: int) -> Floats:
@@ -393,7 +392,7 @@ def _feedback(start: Policy | None, model: ShipModel, task: Task) -> Controller:
 
 
 def _drawn(random: np.random.Generator, candidates: int, n_knots: int) -> Floats:
-    """Changes of unit spread, coarse and fine, each with its mirror image, shape (candidates, n_knots)."""
+    """Changes of unit deviation, coarse and fine, each with its mirror image, shape (candidates, n_knots)."""
     half = -(-candidates // 2)
     drawn = random.standard_normal((half, n_knots))
     drawn *= np.geomspace(LEAST_SCALE, 1.0, half)[:, None]

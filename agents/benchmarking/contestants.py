@@ -21,26 +21,26 @@ import glob
 import hashlib
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 ORACLE = "oracle"
-Factory = Callable[[BenchmarkTask], Policy]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,23 +92,17 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     InputError
         Naming the file and what is wrong with it.
     """
-    from agents.agent_file import load_agent
-
     if not one.is_text or _is_factory(one.source):
         return
-    agents: dict[Path, Policy] = {}
+    pairs = [(path, task) for task in tasks for path in _files(one.source, task)]
+    agents = {path: load_agent(path) for path in {path for path, _ in pairs}}
     refusals: list[str] = []
-    fitting = 0
-    for task in tasks:
-        for path in _files(one.source, task):
-            if path not in agents:
-                agents[path] = load_agent(path)
-            try:
-                check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
-                fitting += 1
-            except InputError as error:
-                refusals.append(str(error))
-    if refusals and not fitting:
+    for path, task in pairs:
+        try:
+            check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
+        except InputError as error:
+            refusals.append(str(error))
+    if pairs and len(refusals) == len(pairs):
         raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
 
 
@@ -128,9 +122,11 @@ def contestants(given: Any) -> tuple[Contestant, ...]:
     """
     if isinstance(given, Mapping):
         found = [_named(str(name), source) for name, source in given.items()]
+    elif isinstance(given, str):
+        found = [_contestant(text) for text in given.split(",")]
     else:
-        listed = given.split(",") if isinstance(given, str) else _listed(given)
-        found = [_contestant(one) for one in listed]
+        single = hasattr(given, "predict") or isinstance(given, Contestant) or not isinstance(given, Iterable)
+        found = [_contestant(one) for one in ([given] if single else given)]
     if not found:
         raise InputError("controllers: none found, expected at least one")
     names = [one.name for one in found]
@@ -138,12 +134,6 @@ def contestants(given: Any) -> tuple[Contestant, ...]:
         if names.count(name) > 1:
             raise InputError(f"controllers: '{name}' found twice; give one of them a name: other={name}")
     return tuple(found)
-
-
-def _listed(given: Any) -> list[Any]:
-    if hasattr(given, "predict") or isinstance(given, Contestant) or not isinstance(given, Iterable):
-        return [given]
-    return list(given)
 
 
 def _contestant(one: Any) -> Contestant:
@@ -165,11 +155,9 @@ def _named(name: str, source: Any) -> Contestant:
         raise InputError(f"controllers: name '{name}' found, expected one without any of , = / {{ }} *")
     if isinstance(source, str):
         _check_text(source)
-    elif isinstance(source, Sequence):
-        for run in source:
-            _check_object(run, name)
     else:
-        _check_object(source, name)
+        for run in source if isinstance(source, Sequence) else [source]:
+            _check_object(run, name)
     return Contestant(name, source)
 
 
@@ -184,19 +172,13 @@ def _check_object(source: Any, name: str) -> None:
 def _check_text(text: str) -> None:
     """Refuse what is neither a name, nor a file, nor a function."""
     known = (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
-    if text in known:
-        return
     if _is_factory(text):
         _factory(text)
-        return
-    if "{task}" in text:
-        return
-    for pattern in text.split("+"):
-        if not _matches(pattern):
-            raise InputError(
-                f"controllers: '{text}' found, expected one of {quoted(known)}, a file of an agent that is "
-                f"there, or module:function.{did_you_mean(text, known)}"
-            )
+    elif text not in known and "{task}" not in text and not all(map(_matches, text.split("+"))):
+        raise InputError(
+            f"controllers: '{text}' found, expected one of {quoted(known)}, a file of an agent that is "
+            f"there, or module:function.{did_you_mean(text, known)}"
+        )
 
 
 def _short_name(text: str) -> str:
@@ -225,14 +207,10 @@ def _factory(text: str) -> Any:
         raise InputError(
             f"controllers: '{text}' cannot be imported ({error}); expected module:function"
         ) from None
-    if _is_controller_class(found):
-        return register_controller(found)
+    if isinstance(found, type) and issubclass(found, Controller):
+        return partial(design, register_controller(found).kind)
     _check_object(found, text)
     return found
-
-
-def _is_controller_class(found: Any) -> bool:
-    return isinstance(found, type) and issubclass(found, Controller)
 
 
 def _matches(pattern: str) -> list[Path]:
@@ -260,20 +238,14 @@ def pretrained(task: str, algorithm: str) -> list[Path]:
 
 def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not isinstance(source, str):
-        runs = source if isinstance(source, Sequence) else [source]
-        return [run if hasattr(run, "predict") else _from_factory(run, task) for run in runs]
+        return [_policy(run, task) for run in (source if isinstance(source, Sequence) else [source])]
     if source in controller_kinds():
-        led = controller_class(source).has_autopilot and not isinstance(task.task, PathFollowingTask)
+        led = controller_class(source).has_autopilot and not task.task.follows_path
         return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if _is_factory(source):
-        found = _factory(source)
-        if _is_controller_class(found):
-            return [design(found.kind, task)]
-        return [found if hasattr(found, "predict") else _from_factory(found, task)]
-    from agents.agent_file import load_agent
-
+        return [_policy(_factory(source), task)]
     paths = _files(source, task)
     if not paths:
         what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"
@@ -281,11 +253,12 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     return [load_agent(path) for path in paths]
 
 
-def _from_factory(factory: Factory, task: BenchmarkTask) -> Policy:
-    made = factory(task)
+def _policy(source: Any, task: BenchmarkTask) -> Policy:
+    """A policy itself, or what a function makes of a task."""
+    made: Policy = source if hasattr(source, "predict") else source(task)
     if not callable(getattr(made, "predict", None)):
         raise InputError(
-            f"{getattr(factory, '__name__', factory)}: {made!r} found for task '{task.name}', expected a "
+            f"{getattr(source, '__name__', source)}: {made!r} found for task '{task.name}', expected a "
             f"controller with `predict`"
         )
     return made

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
@@ -23,9 +24,8 @@ from agents.controllers.los_autopilot import CRITICAL
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
+from shipgym.tasks.steering import RUDDER_WEIGHT
 
 Floats = NDArray[np.float64]
 
@@ -76,9 +76,9 @@ class Tuned:
     evaluations: int
 
 
-#: What is searched of LQ's relatives beside its weights. Not MPC's horizon: from an eighth to twice the
+#: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from an eighth to twice the
 #: design's it changes no cost by more than 2e-5, and a plan's time grows with its square.
-OF_ITS_OWN: dict[str, tuple[Setting, ...]] = {
+FURTHER_SETTINGS: dict[str, tuple[Setting, ...]] = {
     "lqg": (Setting("noise", 1.0, 0.01, 100.0), Setting("disturbance_deg", 2.0, 0.01, 100.0)),
     "lq-adaptive": (Setting("forgetting_lengths", 20.0, 0.1, 100.0), Setting("noise", 1.0, 0.01, 100.0)),
 }
@@ -111,8 +111,6 @@ def search(
     InputError
         If every start is refused.
     """
-    from scipy.optimize import minimize
-
     check_whole(evaluations, "evaluations", at_least=len(spaces))
     starts = [cost({one.name: one.start for one in space}) for space in spaces]
     number = int(np.argmin(starts))
@@ -148,7 +146,7 @@ def tunable(task: BenchmarkTask) -> tuple[str, ...]:
     Guidance laws need a path to follow, `lq-adaptive` a ship whose sway is described.
     """
     without = set[str]()
-    if not isinstance(task.task, PathFollowingTask):
+    if not task.task.follows_path:
         without |= {*LAWS}
     if not has_sway(task.ship):
         without |= {"lq-adaptive"}
@@ -206,7 +204,7 @@ def is_sane(controller: Controller) -> bool:
 def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     """What is searched of a controller: alternatives, each a list of settings, the design's own first."""
     if kind in LAWS:
-        if not isinstance(task.task, PathFollowingTask):
+        if not task.task.follows_path:
             raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
@@ -224,7 +222,7 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             integral,
             Setting("rudder_weight", RUDDER_WEIGHT, 0.01, 100.0),
             Setting("rate_weight_s2", plain["rate_weight_s2"], 0.01, 100.0),
-            *OF_ITS_OWN.get(kind, ()),
+            *FURTHER_SETTINGS.get(kind, ()),
         ]
     waves = task.task.weather.waves
     if kind not in ("pid-filtered", "lqg") or waves is None:

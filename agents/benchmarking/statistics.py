@@ -2,7 +2,7 @@
 
 A score is the share of the way from the best constant-gain PID (0) to the oracle (1). Costs of episodes have
 the shape (n_runs, n_episodes), runs being training runs of a learned agent; a controller that is not trained
-has one.
+has one. `task` and `who` are the numbers of a task and of a contestant.
 
 The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement.
 All contestants get the same draws of episodes, because all sailed the same ones: differences are paired.
@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import trim_mean
 
 Floats = NDArray[np.float64]
 
@@ -41,21 +42,12 @@ class Interval(NamedTuple):
 
 
 def finite(number: float) -> float | None:
-    """The number, None if it is none or not finite."""
+    """The number, None if it is not finite."""
     return float(number) if np.isfinite(number) else None
 
 
 def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
-    """Mean of the middle half: a quarter, rounded down, is dropped at each end.
-
-    Parameters
-    ----------
-    values : array-like
-    axis : int, optional
-        By default all values together.
-    """
-    from scipy.stats import trim_mean
-
+    """Mean of the middle half: a quarter, rounded down, is dropped at each end; by default of all values."""
     found: Floats = np.asarray(trim_mean(np.asarray(values, dtype=np.float64), TRIMMED, axis=axis))
     return found
 
@@ -84,30 +76,13 @@ class Draws:
         return random.integers(n_runs, size=(self.n_draws, n_runs))
 
     def means(self, costs: Floats, task: int, who: int = 0) -> Floats:
-        """Mean cost of each run that is drawn, over the episodes that are drawn, shape (n_draws, n_runs).
-
-        Parameters
-        ----------
-        costs : array of shape (n_runs, n_episodes)
-        task : int
-            Number of the task.
-        who : int
-            Number of the contestant.
-        """
+        """Mean cost of each run that is drawn, over the episodes that are drawn, shape (n_draws, n_runs)."""
         by_run = self.episodes[task] @ costs.T
         return np.take_along_axis(by_run, self.runs(task, len(costs), who), axis=1)
 
 
 def interval(value: float, draws: Floats) -> Interval:
-    """A statistic with its percentile interval.
-
-    Parameters
-    ----------
-    value : float
-        Of what was measured.
-    draws : array of shape (n_draws,)
-        Of what was drawn.
-    """
+    """A measured statistic with its percentile interval over draws of shape (n_draws,)."""
     if not np.isfinite(value) or not np.isfinite(draws).all():
         return Interval(float(value), np.nan, np.nan)
     tail = 50.0 * (1.0 - LEVEL)
@@ -116,28 +91,12 @@ def interval(value: float, draws: Floats) -> Interval:
 
 
 def mean_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> Interval:
-    """Mean over runs and episodes of one task.
-
-    Parameters
-    ----------
-    costs : array of shape (n_runs, n_episodes)
-    draws : Draws
-    task, who : int
-        Numbers of task and contestant.
-    """
+    """Mean over runs and episodes of one task."""
     return interval(float(costs.mean()), draws.means(costs, task, who).mean(axis=1))
 
 
 def interquartile_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> Interval:
-    """Interquartile mean over runs and episodes of one task: what usually happens, without the rare bad ends.
-
-    Parameters
-    ----------
-    costs : array of shape (n_runs, n_episodes)
-    draws : Draws
-    task, who : int
-        Numbers of task and contestant.
-    """
+    """Interquartile mean over runs and episodes of one task: what usually happens, without rare bad ends."""
     n_runs, n_episodes = costs.shape
     counts = np.rint(draws.episodes[task] * n_episodes).astype(np.int64)
     runs = draws.runs(task, n_runs, who)
@@ -200,9 +159,7 @@ def aggregate_score(
         Costs of the best constant-gain PID and of the oracle in each task.
     draws : Draws
     tasks : sequence of int
-        Numbers of the tasks.
     who : int
-        Number of the contestant.
     """
     found, drawn = [], []
     for task, cost, (pid, oracle) in zip(tasks, costs, references, strict=True):
@@ -212,66 +169,38 @@ def aggregate_score(
     return interval(value, interquartile_mean(np.concatenate(drawn, axis=1), axis=1))
 
 
-def probability_of_improvement(one: Floats, other: Floats) -> float:
+def improvement(
+    one: Mapping[int, Floats], other: Mapping[int, Floats], draws: Draws, who: tuple[int, int]
+) -> Interval:
     """Probability that a run of one costs less than a run of the other in the same episode; ties count half.
 
     Parameters
     ----------
-    one, other : array of shape (n_runs, n_episodes)
-        Costs of the same episodes.
-    """
-    return float(_wins(one, other).mean())
-
-
-def improvement(
-    one: Mapping[int, Floats], other: Mapping[int, Floats], draws: Draws, who: tuple[int, int]
-) -> Interval:
-    """Mean over the tasks that both took part in of the probability of improvement.
-
-    Parameters
-    ----------
     one, other : dict of int to array of shape (n_runs, n_episodes)
-        Costs by the number of the task.
+        Costs by task; the mean over the tasks that both took part in is taken.
     draws : Draws
     who : tuple of int
-        Numbers of the two contestants.
+        Of both.
     """
     common = sorted(set(one) & set(other))
     if not common:
         return Interval(np.nan, np.nan, np.nan)
     values, drawn = [], np.zeros(draws.n_draws)
+    rows = np.arange(draws.n_draws)[:, None, None]
     for task in common:
-        wins = _wins(one[task], other[task])
+        mine, its = one[task][:, None], other[task][None]
+        wins = (mine < its) + 0.5 * (mine == its)  # of runs i and k in each episode, shape (i, k, n_episodes)
         values.append(wins.mean())
         per_draw = np.tensordot(draws.episodes[task], wins, axes=(1, 2))
         first, second = (
-            draws.runs(task, len(costs[task]), number)
-            for costs, number in zip((one, other), who, strict=True)
+            draws.runs(task, n_runs, number) for n_runs, number in zip(wins.shape, who, strict=False)
         )
-        rows = np.arange(draws.n_draws)[:, None, None]
         drawn += per_draw[rows, first[:, :, None], second[:, None, :]].mean(axis=(1, 2))
     return interval(float(np.mean(values)), drawn / len(common))
 
 
-def _wins(one: Floats, other: Floats) -> Floats:
-    """Whether run i of one costs less than run k of the other in each episode, shape (i, k, n_episodes)."""
-    wins: Floats = (one[:, None] < other[None]) + 0.5 * (one[:, None] == other[None])
-    return wins
-
-
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
-    """Share of the scores above each threshold.
-
-    Parameters
-    ----------
-    scores : array-like
-        Of runs, tasks and, here, episodes: of any shape.
-    thresholds : array-like of shape (n,)
-
-    Returns
-    -------
-    array of shape (n,)
-    """
+    """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
     below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
     above: Floats = 1.0 - below / len(ordered)

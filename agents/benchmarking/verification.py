@@ -128,13 +128,9 @@ def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str,
         raise InputError(
             "results: no contestant that can be made again; name them by a text: a file, or module:function"
         )
-    random = np.random.default_rng(seed)
-    shuffled = [pairs[k] for k in random.permutation(len(pairs))]
-    before: dict[str, int] = {}
-    turns = {}
-    for pair in shuffled:
-        before[pair[0]] = turns[pair] = before.get(pair[0], -1) + 1
-    return sorted(shuffled, key=lambda pair: turns[pair])[:sample]
+    shuffled = [pairs[k] for k in np.random.default_rng(seed).permutation(len(pairs))]
+    turns = {pair: sum(one == pair[0] for one, _ in shuffled[:k]) for k, pair in enumerate(shuffled)}
+    return sorted(shuffled, key=turns.__getitem__)[:sample]
 
 
 def _job(result: BenchmarkResult, name: str, task: str) -> dict[str, Any]:
@@ -148,13 +144,14 @@ def _compared(
 ) -> Check:
     cost = result.figures(name, task)
     about = result.summary["contestants"][name]
-    changed = _changed_files(about["files"])
     other = [key for key, one in result.summary["versions"].items() if versions().get(key) != one]
     learned = about["source"] not in CLASSICAL
     allowed = tolerance if tolerance is not None else ROUNDING if learned or other else 0.0
     note = f"{', '.join(other)} differ from those of the file" if other else ""
-    if changed:
-        note = f"'{changed[0]}' is not the file that took part"
+    for path, sha256 in about["files"].items():
+        if not Path(path).is_file() or file_hash(path) != sha256:
+            note = f"'{path}' is not the file that took part"
+            break
     if len(again["runs"]) != len(cost):
         note = (
             again["refused"] or note or f"{len(again['runs'])} training runs found, {len(cost)} in the file"
@@ -170,7 +167,3 @@ def _compared(
     if not exact and difference == 0.0:  # of another figure than the cost
         difference, note = np.inf, note or "the costs are the same, but another figure is not"
     return Check(name, task, cost.size, 0.0 if exact else difference, exact, allowed, note)
-
-
-def _changed_files(files: dict[str, str]) -> list[str]:
-    return [path for path, sha256 in files.items() if not Path(path).is_file() or file_hash(path) != sha256]

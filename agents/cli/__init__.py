@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import (
-    FAILED,
-    Address,
-    EngineName,
-    Json,
-    ShipFileArgument,
-    Workers,
-    answered,
-    fail,
-)
+from agents.cli.command import FAILED, Address, EngineName, Json, ShipFileArgument, Workers, answered, fail
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.identify_options import takes_identify_options
@@ -163,18 +154,18 @@ def autopilot_command(
     model is unstable; the report then says so.
     """
     from agents.cli.terminal import progress_bars
+    from agents.engines.jobs import JobEngine
     from agents.verification.chain import build_autopilot
-    from agents.verification.monte_carlo import Engine
 
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
-            where=Engine(engine, workers, address),
+            where=JobEngine(engine, workers, address),
         )  # fmt: skip
-    _told(result, out / "report.html", draws, as_json)
+    _print_result(result, out / "report.html", draws, as_json)
 
 
-def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
     """Print the result of the chain; fail for an unstable model."""
     from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.cli.terminal import out as console

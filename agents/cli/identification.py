@@ -82,10 +82,10 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
             console.print(result.summary(), markup=False, soft_wrap=True)
             console.print(prediction_table(result))
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
-    _judge(result)
+    _check_stable(result)
 
 
-def _judge(result: IdentificationResult) -> None:
+def _check_stable(result: IdentificationResult) -> None:
     """Fail for an unstable model, else warn of what has to be known."""
     from agents.cli.terminal import warn
     from identification.validation.warnings import model_warnings, why_unstable
@@ -138,7 +138,7 @@ def advise_command(
     options: dict[str, Any],
     as_json: Json = False,
 ) -> None:
-    """Tell what the trials tell of each coefficient, and which manoeuvres to run next.
+    """Show how much the trials say about each coefficient, and which manoeuvres to run next.
 
     Condition number, variance inflation and Fisher information of each trial; then zigzags, turning circles
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
@@ -207,4 +207,4 @@ def reduce_command(
         console.print(prediction_table(found.reduced, "with the terms left"))
         count = fields["terms"]
         console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
-    _judge(found.reduced)
+    _check_stable(found.reduced)

@@ -8,17 +8,16 @@ integral are in it. The rudder's limit and rate are not.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.envs.task import RATE_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise, nomoto_of, straight_running
+from shipgym.tasks.steering import RATE_WEIGHT
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
@@ -171,11 +170,6 @@ def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats
     A[:, INTEGRAL] = dt * A[:, ERROR]
     A[:, INTEGRAL, INTEGRAL], B[:, INTEGRAL] = 1.0, dt * B[:, ERROR]
     return A, B
-
-
-def feedback_row(feedback: Mapping[str, float]) -> Floats:
-    """Feedback by signal as a row of `SIGNALS`, shape (1, 5)."""
-    return np.array([[feedback.get(signal, 0.0) for signal in SIGNALS]])
 
 
 @dataclass(frozen=True, eq=False)

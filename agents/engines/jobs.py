@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -30,7 +31,7 @@ from agents.engines.serialisation import KeptResults, serialised, shortened, unp
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
-__all__ = ["JobError", "JobProgress", "WorkerDiedError", "check_engine", "run_jobs"]
+__all__ = ["HERE", "JobEngine", "JobError", "JobProgress", "WorkerDiedError", "check_engine", "run_jobs"]
 
 #: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
@@ -145,3 +146,25 @@ def _check_function(function: JobFunction) -> None:
             f"function: {function!r} found, expected a function at the top level of a module, so that "
             f"workers find it"
         )
+
+
+@dataclass(frozen=True)
+class JobEngine:
+    """Where jobs are done: arguments of `run_jobs`."""
+
+    engine: str = "local"
+    workers: int | None = 1
+    address: str | None = None
+    keep: str | Path | None = None
+
+    def check(self) -> None:
+        """Refuse wrong arguments before the work begins, as `run_jobs` does."""
+        check_engine(self.engine, self.workers, self.address)
+
+    def run(self, function: JobFunction, jobs: Sequence[Job], progress: JobProgress) -> list[Any]:
+        """Do the jobs."""
+        return run_jobs(function, jobs, **asdict(self), progress=progress)
+
+
+#: One job after the other, in this process.
+HERE = JobEngine()

@@ -21,7 +21,6 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -29,25 +28,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text, did_you_mean, quoted
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
-from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.ship_env import read_options
-from shipgym.envs.task import Task
-from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import Task
 
-#: Environments by their names in suites and on the command line: id, and class of task.
-ENVIRONMENTS: Mapping[str, tuple[str, type[Task]]] = {
-    "course-keeping": ("shipgym/CourseKeeping-v0", CourseKeepingTask),
-    "path-following": ("shipgym/PathFollowing-v0", PathFollowingTask),
+#: Environments by their names in suites and on the command line: id, and task.
+ENVIRONMENTS: Mapping[str, tuple[str, str]] = {
+    "course-keeping": ("shipgym/CourseKeeping-v0", "CourseKeeping"),
+    "path-following": ("shipgym/PathFollowing-v0", "PathFollowing"),
 }
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
 N_EPISODES = 100
 DEFAULT_SUITE = "shipgym-v1"
+FOLDER = Path(__file__).parent
 FIELDS = ("environment", "model", "why", "sea", "options")
 
 
@@ -85,8 +83,8 @@ class BenchmarkTask:
         return ENVIRONMENTS[self.environment][0]
 
     @cached_property
-    def parts(self) -> tuple[ShipModel, Task, Variety]:
-        """Ship, task and variety of the environment."""
+    def parts(self) -> tuple[ShipModel, Task, Randomisation]:
+        """Ship, task and domain randomisation of the environment."""
         return read_options(ENVIRONMENTS[self.environment][1], self.model, self.options)
 
     @property
@@ -105,17 +103,7 @@ class BenchmarkTask:
         return FIRST_SEED + np.arange(N_EPISODES)
 
     def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
-        """Many ships at once under this task, by default with its own ship.
-
-        Parameters
-        ----------
-        num_envs : int
-            Number of ships.
-        model : ShipModel, optional
-            Another ship for the same task.
-        threads : int
-            Of the kernels.
-        """
+        """Many ships at once under this task, by default with its own ship."""
         ship, task, variety = self.parts
         return Engine(ship if model is None else model, num_envs, task, variety, threads=threads)
 
@@ -143,23 +131,18 @@ class Suite:
         InputError
             For an unknown name, with the nearest known one.
         """
-        for task in self.tasks:
-            if task.name == name:
-                return task
-        known = [task.name for task in self.tasks]
-        raise InputError(
-            f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
-            f"{did_you_mean(name, known)}"
-        )
+        known = {task.name: task for task in self.tasks}
+        if name not in known:
+            raise InputError(
+                f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
+                f"{did_you_mean(name, known)}"
+            )
+        return known[name]
 
 
 def list_suites() -> list[str]:
     """Names of the shipped suites."""
-    return sorted(
-        entry.name.removesuffix(".toml")
-        for entry in files("agents").joinpath("suites").iterdir()
-        if entry.name.endswith(".toml")
-    )
+    return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
 @lru_cache(maxsize=4)
@@ -175,24 +158,18 @@ def load_suite(name: str = DEFAULT_SUITE) -> Suite:
 
 
 def suite_hash(name: str = DEFAULT_SUITE) -> str:
-    """SHA-256 of the file of a shipped suite.
-
-    Raises
-    ------
-    InputError
-        For an unknown name.
-    """
+    """SHA-256 of the file of a shipped suite; an InputError for an unknown name."""
     return hashlib.sha256(_suite_text(name).encode()).hexdigest()
 
 
 def suite_file(name: str, what: str) -> Path:
     """A file that is kept with a shipped suite, `NAME-WHAT.json`; it need not exist."""
-    return Path(str(files("agents").joinpath("suites", f"{name}-{what}.json")))
+    return FOLDER / f"{name}-{what}.json"
 
 
 def _suite_text(name: str) -> str:
     check_choice(name, list_suites(), "suite")
-    return files("agents").joinpath("suites", f"{name}.toml").read_text(encoding="utf-8")
+    return (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
 
 
 def parse_suite(text: str, where: str) -> Suite:

@@ -2,7 +2,7 @@
 
 The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 
-    [defaults]                          # every setting of the algorithm, to learn from nothing
+    [defaults]                          # every setting of the algorithm, to learn from scratch
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
     [suite]                             # those that differ on every task of the suite
     [tasks.mariner-rough]               # those that differ on one of them
@@ -22,8 +22,8 @@ from typing import Any
 from agents.controllers.registry import controller_kinds
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
-from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
+from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED, AUTO = "running", "learned", "auto"
@@ -249,7 +249,7 @@ def load_settings(
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        nothing.
+        scratch.
 
     Raises
     ------

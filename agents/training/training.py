@@ -234,13 +234,11 @@ class _Training:
 
     def _result(self, finished: bool) -> TrainingResult:
         self.agent.logger.close()
+        policy: Any = self.policy
+        if policy is None and self.folder is not None:  # found before the run was resumed
+            policy = load_agent(self.folder / run_folder.AGENT)
+        assert isinstance(policy, LearnedPolicy)
         assert self.best_cost is not None
-        policy = self.policy
-        if policy is None:  # found before the run was resumed
-            assert self.folder is not None
-            loaded = load_agent(self.folder / run_folder.AGENT)
-            assert isinstance(loaded, LearnedPolicy)
-            policy = loaded
         return TrainingResult(
             self.plan, policy, tuple(self.curve), self.best_cost, self.best_steps, self.agent.num_timesteps,
             self.held_out.lq_cost, self.seconds, finished, self.resumed_from,
@@ -293,7 +291,8 @@ class _Training:
         if self.folder is not None:
             for name in [run_folder.LAST] + [run_folder.AGENT] * best:
                 policy.save(self.folder / name)
-            self._write_progress()
+            progress = {"lq_cost": self.held_out.lq_cost, **self._found}
+            write_json(progress, self.folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
         """How a policy was made; without times, so that the same run writes the same file."""
@@ -309,23 +308,17 @@ class _Training:
             "versions": run_folder.versions(),
         }
 
-    def _write_progress(self) -> None:
-        assert self.folder is not None
-        content = {
-            "lq_cost": self.held_out.lq_cost, "best_cost": self.best_cost, "best_steps": self.best_steps,
-            "curve": self.curve,
-        }  # fmt: skip
-        write_json(content, self.folder / run_folder.PROGRESS)
+    @property
+    def _found(self) -> dict[str, Any]:
+        """What evaluations found so far."""
+        return {"best_cost": self.best_cost, "best_steps": self.best_steps, "curve": self.curve}
 
     def keep(self) -> None:
         """Write the run as it is, whole or not at all."""
         self.kept_at = time.monotonic()
         if self.folder is None:
             return
-        own = {
-            "curve": self.curve, "best_cost": self.best_cost, "best_steps": self.best_steps,
-            "seconds": self.seconds,
-        }  # fmt: skip
+        own = {**self._found, "seconds": self.seconds}
         write_values({"run": own, "agent": checkpoints.take(self.agent)}, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:

@@ -13,20 +13,21 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.lq import LQ
 from agents.controllers.pid import PID
+from agents.engines.jobs import HERE, JobEngine
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import check_folder, whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
-from agents.verification.monte_carlo import HERE, Engine, monte_carlo
+from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
 from shipgym.plots import graph_objects
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
+from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.ship_file import ShipFile
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def build_autopilot(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
@@ -73,7 +74,7 @@ def build_autopilot(
         Files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`).
     progress : callable, optional
         Called as the work goes on.
-    where : Engine
+    where : JobEngine
         Where the models drawn are worked on; the results are the same.
 
     Raises
@@ -119,7 +120,7 @@ def examine(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
     _tell(progress, "reading trials", 0, 1)
@@ -147,7 +148,7 @@ def verify(
     draws: int,
     seed: int,
     progress: Progress | None = None,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
 ) -> Verification:
     """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.
@@ -198,7 +199,7 @@ def verify(
 
 def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     """Refuse a guest that was not made for keeping this ship's course."""
-    task = CourseKeepingTask()
+    task = course_keeping_task()
     names = [one.name for one in task.observed(model)]
     if more := [name for name in guest.observation_names if name not in names]:
         raise InputError(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.verification.index_uncertainty import ManoeuvreSpread
+from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from identification.report.predictions import RUDDER
 from shipgym.manoeuvres import Criterion
 from shipgym.plots import (
@@ -90,7 +90,7 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     return figure
 
 
-def manoeuvres_figure(found: ManoeuvreSpread, length: float) -> Figure:
+def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
     """20/20 zigzag and turning circle of the identified model, over those of the draws."""
     figure = subplots(1, 2, titles=["20/20 zigzag", "Turning circle to starboard"], horizontal_spacing=0.1)
     run = found.zigzag

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +26,13 @@ PATHS_KEPT = 40  # turning circles of draws that a report draws
 
 
 @dataclass(frozen=True)
-class ManoeuvreSpread:
+class ManoeuvreUncertainty:
     """Standard manoeuvres of a model and of its draws.
 
     Attributes
     ----------
     criteria : dict of str to Criterion
-        By the names of `imo_assessment`, each with its spread over the draws; those that can be assessed.
+        By the names of `imo_assessment`, each with its interval over the draws; those that can be assessed.
     unstable : bool array of shape (n_draws,)
         Draws that run away in one of the manoeuvres.
     zigzag : Trial
@@ -52,58 +53,6 @@ class ManoeuvreSpread:
     circle_paths: tuple[Floats, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class SailedDraws:
-    """Some models drawn in the standard manoeuvres, in numbers and arrays that can be written down.
-
-    Attributes
-    ----------
-    indices : dict of str to dict of str to array of shape (n_draws,)
-        By manoeuvre and index; NaN where there is none.
-    ran_away : dict of str to bool array of shape (n_draws,)
-        By manoeuvre.
-    lost : bool array of shape (n_draws,)
-        Draws that run away in the 20/20 zigzag or the turning circle that are kept.
-    headings : array of shape (n_draws, n_samples)
-        In that zigzag, rad; of lost draws meaningless, as paths are.
-    paths : array of shape (n_draws, n_samples, 2)
-        North and east in that circle, m.
-    """
-
-    indices: dict[str, dict[str, Floats]]
-    ran_away: dict[str, NDArray[np.bool_]]
-    lost: NDArray[np.bool_]
-    headings: Floats
-    paths: Floats
-
-
-def manoeuvre_spread(
-    model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
-) -> ManoeuvreSpread:
-    """Judge a model and its draws by the IMO criteria and keep their zigzags and turning circles.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The identified model; it must not run away.
-    draws : sequence of ShipModel
-        Drawn from its covariance (`ShipModel.sample`).
-    progress : callable, optional
-        Told the number of draws done.
-
-    Returns
-    -------
-    ManoeuvreSpread
-
-    Raises
-    ------
-    UnstableModelError
-        If the model itself runs away.
-    """
-    nominal = nominal_runs(model)
-    return spread_of(model, nominal, [sail_draws(model, draws, progress)])
-
-
 def nominal_runs(model: ShipModel) -> tuple[Trial, Trial]:
     """Zigzag and turning circle of the model itself.
 
@@ -115,38 +64,52 @@ def nominal_runs(model: ShipModel) -> tuple[Trial, Trial]:
     return _zigzag(model), _circle(model)
 
 
-def sail_draws(
-    model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
-) -> SailedDraws:
-    """Put models drawn from one through the standard manoeuvres."""
+def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
+    """Put models drawn from one through the standard manoeuvres.
+
+    Returns
+    -------
+    dict
+        values : by manoeuvre and index, arrays of shape (n_draws,); NaN where there is none.
+        ran_away : by manoeuvre, bool arrays of shape (n_draws,).
+        lost : bool array of shape (n_draws,), draws that run away in the two runs that are kept.
+        headings : array of shape (n_draws, n_samples), in the zigzag, rad; of lost draws 0, as paths are.
+        paths : array of shape (n_draws, n_samples, 2), north and east in the circle, m.
+    """
     needed = imo_manoeuvres(model)
     empty = {name: test.no_indices for name, test in needed.items()}
-    found = intervals_of(empty, draws, {name: test.evaluate for name, test in needed.items()}, progress)
+    found = intervals_of(empty, draws, {name: test.evaluate for name, test in needed.items()})
     runs = [_kept_runs(draw) for draw in draws]
-    headings, paths = zip(*(run or _nothing(model) for run in runs), strict=True)
-    return SailedDraws(
-        indices={name: {k: one.values for k, one in indices.items()} for name, indices in found.items()},
-        ran_away={name: next(iter(indices.values())).ran_away for name, indices in found.items()},
-        lost=np.array([run is None for run in runs]),
-        headings=np.array(headings),
-        paths=np.array(paths),
-    )
-
-
-def spread_of(
-    model: ShipModel, nominal: tuple[Trial, Trial], parts: Sequence[SailedDraws]
-) -> ManoeuvreSpread:
-    """The spread over draws that were sailed in parts."""
-    criteria = {
-        name: criterion
-        for name, criterion in imo_criteria(model, _intervals(model, parts)).items()
-        if criterion.passed is not None
+    headings, paths = zip(*(run or _no_runs() for run in runs), strict=True)
+    return {
+        "values": {name: {k: one.values for k, one in indices.items()} for name, indices in found.items()},
+        "ran_away": {name: next(iter(indices.values())).ran_away for name, indices in found.items()},
+        "lost": np.array([run is None for run in runs]),
+        "headings": np.array(headings),
+        "paths": np.array(paths),
     }
+
+
+def uncertainty_of(
+    model: ShipModel, nominal: tuple[Trial, Trial], parts: Sequence[dict[str, Any]]
+) -> ManoeuvreUncertainty:
+    """All of it, from the runs of the model itself and what `sail_draws` found of its draws, in parts."""
+    found = {
+        name: {
+            index: IndexInterval(
+                value,
+                np.concatenate([part["values"][name][index] for part in parts]),
+                np.concatenate([part["ran_away"][name] for part in parts]),
+            )
+            for index, value in (attempt(test.evaluate, model)[0] or test.no_indices).items()
+        }
+        for name, test in imo_manoeuvres(model).items()
+    }
+    criteria = {name: one for name, one in imo_criteria(model, found).items() if one.passed is not None}
     unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
-    unstable |= np.concatenate([part.lost for part in parts])
-    headings = np.concatenate([part.headings for part in parts])
-    paths = np.concatenate([part.paths for part in parts])
-    return ManoeuvreSpread(
+    unstable |= np.concatenate([part["lost"] for part in parts])
+    headings, paths = (np.concatenate([part[name] for part in parts]) for name in ("headings", "paths"))
+    return ManoeuvreUncertainty(
         criteria=criteria,
         unstable=unstable,
         zigzag=nominal[0],
@@ -154,21 +117,6 @@ def spread_of(
         circle=nominal[1],
         circle_paths=tuple(paths[~unstable][:PATHS_KEPT]),
     )
-
-
-def _intervals(model: ShipModel, parts: Sequence[SailedDraws]) -> dict[str, dict[str, IndexInterval]]:
-    """Indices of the model itself with those of all draws."""
-    return {
-        name: {
-            index: IndexInterval(
-                value,
-                np.concatenate([part.indices[name][index] for part in parts]),
-                np.concatenate([part.ran_away[name] for part in parts]),
-            )
-            for index, value in (attempt(test.evaluate, model)[0] or test.no_indices).items()
-        }
-        for name, test in imo_manoeuvres(model).items()
-    }
 
 
 def _kept_runs(model: ShipModel) -> tuple[Floats, Floats] | None:
@@ -180,14 +128,12 @@ def _kept_runs(model: ShipModel) -> tuple[Floats, Floats] | None:
     return heading, np.column_stack([circle["x"], circle["y"]])
 
 
-def _nothing(model: ShipModel) -> tuple[Floats, Floats]:
+def _no_runs() -> tuple[Floats, Floats]:
     """In the place of the runs of a draw that runs away."""
-    samples = round(ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH) + 1, round(TURN_LENGTHS * SAMPLES_PER_LENGTH) + 1
-    return np.zeros(samples[0]), np.zeros((samples[1], 2))
-
-
-def _full_rudder(model: ShipModel) -> float:
-    return min(TURN_DEG, model.steering.rudder_limit_deg)
+    zigzag_samples, circle_samples = (
+        round(lengths * SAMPLES_PER_LENGTH) + 1 for lengths in (ZIGZAG_LENGTHS, TURN_LENGTHS)
+    )
+    return np.zeros(zigzag_samples), np.zeros((circle_samples, 2))
 
 
 def _sampling(model: ShipModel) -> float:
@@ -196,11 +142,11 @@ def _sampling(model: ShipModel) -> float:
 
 def _zigzag(model: ShipModel) -> Trial:
     dt = _sampling(model)
-    return zigzag(
-        model, *ZIGZAG_DEG, duration=ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH * dt, dt=dt, must_reverse=False
-    )
+    duration = ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH * dt
+    return zigzag(model, *ZIGZAG_DEG, duration=duration, dt=dt, must_reverse=False)
 
 
 def _circle(model: ShipModel) -> Trial:
     dt = _sampling(model)
-    return turning_circle(model, _full_rudder(model), TURN_LENGTHS * SAMPLES_PER_LENGTH * dt, dt)
+    rudder = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return turning_circle(model, rudder, TURN_LENGTHS * SAMPLES_PER_LENGTH * dt, dt)

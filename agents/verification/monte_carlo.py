@@ -6,71 +6,28 @@ Draws are shared out in jobs of 25, always the same ones: the results do not dep
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.engines.jobs import JobProgress, check_engine, run_jobs
+from agents.controllers.controller import Controller
+from agents.controllers.controller_file import read_controller
+from agents.engines.jobs import HERE, JobEngine, JobProgress
+from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification.index_uncertainty import (
-    ManoeuvreSpread,
-    SailedDraws,
+    ManoeuvreUncertainty,
     nominal_runs,
     sail_draws,
-    spread_of,
+    uncertainty_of,
 )
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import is_course_stable
 
-if TYPE_CHECKING:
-    from agents.controllers.controller import Controller
-    from agents.rollouts.course_keeping import Episodes
-
-Floats = NDArray[np.float64]
-
 DRAWS_A_JOB = 25
-
-
-@dataclass(frozen=True)
-class Engine:
-    """Where jobs are done: see `agents.engines.jobs.run_jobs`, whose arguments these are."""
-
-    engine: str = "local"
-    workers: int | None = 1
-    address: str | None = None
-    keep: str | Path | None = None
-
-    def check(self) -> None:
-        """Refuse wrong arguments before the work begins.
-
-        Raises
-        ------
-        InputError
-            As `run_jobs`.
-        """
-        check_engine(self.engine, self.workers, self.address)
-
-    def run(
-        self, function: Callable[[dict[str, Any]], Any], jobs: Sequence[dict[str, Any]], progress: JobProgress
-    ) -> list[Any]:
-        """Do the jobs."""
-        return run_jobs(
-            function,
-            jobs,
-            engine=self.engine,
-            workers=self.workers,
-            address=self.address,
-            keep=self.keep,
-            progress=progress,
-        )
-
-
-#: One job after the other, in this process.
-HERE = Engine()
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,16 +38,16 @@ class MonteCarlo:
     ----------
     draws : tuple of ShipModel
         The models drawn.
-    manoeuvres : ManoeuvreSpread
+    manoeuvres : ManoeuvreUncertainty
         Standard manoeuvres and IMO criteria over the draws.
     course_unstable : bool array of shape (n_draws,)
-        Draws that do not hold a straight course with the rudder held.
+        Draws that do not keep a straight course with the rudder fixed.
     episodes : tuple of Episodes
         Of each controller, one episode on each draw.
     """
 
     draws: tuple[ShipModel, ...]
-    manoeuvres: ManoeuvreSpread
+    manoeuvres: ManoeuvreUncertainty
     course_unstable: NDArray[np.bool_]
     episodes: tuple[Episodes, ...]
 
@@ -101,7 +58,7 @@ def monte_carlo(
     draws: int = 200,
     seed: int = 0,
     *,
-    where: Engine = HERE,
+    where: JobEngine = HERE,
     progress: Callable[[int], None] | None = None,
 ) -> MonteCarlo:
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
@@ -116,14 +73,10 @@ def monte_carlo(
         Models drawn, at least 2.
     seed : int
         Of the draws and of the episodes.
-    where : Engine
+    where : JobEngine
         In this process, in several, or on a ray cluster; the results are the same, bit for bit.
     progress : callable, optional
         Told the number of draws done.
-
-    Returns
-    -------
-    MonteCarlo
 
     Raises
     ------
@@ -138,14 +91,15 @@ def monte_carlo(
         controller.check_fits_model(model)
     nominal = nominal_runs(model)
     drawn = model.sample(draws, seed)
-    results = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _told(progress, draws))
-    sailed = [SailedDraws(**result["sailed"]) for result in results]
+    found = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _told(progress, draws))
+    episodes = zip(*(part["episodes"] for part in found), strict=True) if controllers else ()
     return MonteCarlo(
         draws=tuple(drawn),
-        manoeuvres=spread_of(model, nominal, sailed),
-        course_unstable=np.concatenate([result["course_unstable"] for result in results]),
+        manoeuvres=uncertainty_of(model, nominal, [part["sailed"] for part in found]),
+        course_unstable=np.concatenate([part["course_unstable"] for part in found]),
         episodes=tuple(
-            _joined([result["episodes"][k] for result in results]) for k in range(len(controllers))
+            Episodes(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+            for parts in episodes
         ),
     )
 
@@ -153,7 +107,7 @@ def monte_carlo(
 def draw_jobs(
     controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
 ) -> list[dict[str, Any]]:
-    """The jobs: coefficients as drawn here, since another machine may draw others in the last digit."""
+    """The jobs: coefficients as drawn here, since another computer may draw others in the last digit."""
     common = {
         "model": replace(model, covariance=None).to_dict(),
         "controllers": [controller.to_dict() for controller in controllers],
@@ -171,38 +125,26 @@ def draw_jobs(
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     """Manoeuvres, course stability and episodes of some draws."""
-    from agents.controllers.controller_file import read_controller
-    from agents.rollouts.course_keeping import sail
-
     model = ShipModel.from_dict(job["model"])
     draws = [
         replace(model, name=name, coefficients=dict(zip(model.coefficients, values, strict=True)))
         for name, values in zip(job["names"], job["coefficients"], strict=True)
     ]
     seeds = job["first_seed"] + np.arange(len(draws))
-    flown = [
-        sail(read_controller(content, "controller"), draws, seeds=seeds) for content in job["controllers"]
-    ]
-    sailed = sail_draws(model, draws)
+    controllers = [read_controller(content, "controller") for content in job["controllers"]]
     return {
-        "sailed": {item.name: getattr(sailed, item.name) for item in fields(sailed)},
-        "course_unstable": np.array([not holds_course(draw) for draw in draws]),
-        "episodes": [{item.name: getattr(one, item.name) for item in fields(one)} for one in flown],
+        "sailed": sail_draws(model, draws),
+        "course_unstable": np.array([not keeps_course(draw) for draw in draws]),
+        "episodes": [asdict(sail(controller, draws, seeds=seeds)) for controller in controllers],
     }
 
 
-def holds_course(model: ShipModel) -> bool:
-    """Whether the ship holds a straight course with the rudder held; not if there is none at all."""
+def keeps_course(model: ShipModel) -> bool:
+    """Whether the ship keeps a straight course with the rudder fixed; not if there is none at all."""
     try:
         return is_course_stable(model)
     except InputError:
         return False
-
-
-def _joined(parts: Sequence[dict[str, Any]]) -> Episodes:
-    from agents.rollouts.course_keeping import Episodes
-
-    return Episodes(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 def _told(progress: Callable[[int], None] | None, draws: int) -> JobProgress:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
-from agents.verification.index_uncertainty import ManoeuvreSpread
+from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from identification import IdentificationResult
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto
@@ -67,7 +67,7 @@ class Verification:
         Number of models drawn from the coefficient covariance.
     seed : int
         Of the draw and of the episodes.
-    manoeuvres : ManoeuvreSpread
+    manoeuvres : ManoeuvreUncertainty
         Indices and IMO criteria of the model and its draws.
     course_unstable : bool array of shape (n_draws,)
         Draws that do not hold a straight course with the rudder held.
@@ -81,7 +81,7 @@ class Verification:
 
     draws: int
     seed: int
-    manoeuvres: ManoeuvreSpread
+    manoeuvres: ManoeuvreUncertainty
     course_unstable: NDArray[np.bool_]
     nomoto: Nomoto
     pilots: tuple[Pilot, ...]

@@ -12,7 +12,7 @@ from ray.rllib.algorithms.ppo import PPOConfig
 from ray.tune.registry import register_env
 
 import shipgym
-from agents import LQ, fly
+from agents import LQ, sail
 
 
 class Steersman:
@@ -71,9 +71,9 @@ def main() -> None:
     ship = shipgym.load_model(options.model)
     seeds = 1_000_000 + np.arange(100)
     for name, controller in (("RLlib PPO", Steersman(algorithm.get_module())), ("LQ", LQ.from_model(ship))):
-        flights = fly(controller, ship, seeds=seeds)
-        rmse = flights.heading_rmse_deg.mean()
-        print(f"{name}: mean cost {flights.cost.mean():.3f}, heading rmse {rmse:.2f} deg")
+        episodes = sail(controller, ship, seeds=seeds)
+        rmse = episodes.heading_rmse_deg.mean()
+        print(f"{name}: mean cost {episodes.cost.mean():.3f}, heading rmse {rmse:.2f} deg")
     algorithm.stop()
 
 

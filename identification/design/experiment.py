@@ -1,4 +1,4 @@
-"""What trials tell about each coefficient, and which manoeuvre to run next.
+"""What trials say about each coefficient, and which manoeuvre to run next.
 
 The Fisher information of a linear regression with white errors, X'X / sigma^2, adds up over trials. Its
 inverse is the least covariance of the coefficients; candidates are simulated on the current model and ranked
@@ -12,13 +12,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from io import StringIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.table import Table
 
 from identification.regression.samples import Samples, build_samples
+from identification.text import as_text
 from shipgym.checks import check_choice
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
@@ -38,7 +39,7 @@ JITTER = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
-    """What one trial tells.
+    """What one trial says about the coefficients.
 
     Attributes
     ----------
@@ -109,10 +110,10 @@ class Advice:
         }
 
     def __str__(self) -> str:
-        from rich.console import Console
-        from rich.table import Table
+        return as_text(self._trials_so_far(), self._candidates(), self._errors())
 
-        told = Table(
+    def _trials_so_far(self) -> Table:
+        table = Table(
             "trial", "condition number", "largest inflation", f"information on {self.coefficient}",
             title="Trials so far", title_justify="left",
         )  # fmt: skip
@@ -122,30 +123,26 @@ class Advice:
             worst = max(trial.inflation, key=lambda name: trial.inflation[name])
             numbers = ", ".join(f"{q} {value:.0f}" for q, value in trial.condition_number.items())
             share = float(trial.information[at, at]) / total if total > 0.0 else 0.0
-            told.add_row(
-                trial.name,
-                numbers,
-                f"{trial.inflation[worst]:.0f} ({worst})",
-                f"{100.0 * share:.0f} % of all",
-            )
+            inflation = f"{trial.inflation[worst]:.0f} ({worst})"
+            table.add_row(trial.name, numbers, inflation, f"{100.0 * share:.0f} % of all")
+        return table
+
+    def _candidates(self) -> Table:
         title = f"Run next ({self.criterion}-optimal; least certain: {self.coefficient})"
-        candidates = Table("candidate", title=title, title_justify="left")
+        table = Table("candidate", title=title, title_justify="left")
         for k in range(len(self.steps)):
-            candidates.add_column(f"gain, choice {k + 1}", justify="right")
+            table.add_column(f"gain, choice {k + 1}", justify="right")
+        choices = list(zip(self.steps, self.chosen, strict=True))
         for name in sorted(self.steps[0], key=lambda name: self.steps[0][name], reverse=True):
-            gains = (
-                f"{s[name]:.2f}{' *' if name == c else ''}"
-                for s, c in zip(self.steps, self.chosen, strict=True)
-            )
-            candidates.add_row(name, *gains)
-        errors = Table("coefficient", "relative error now", "expected", title_justify="left")
+            gains = (f"{gains[name]:.2f}{' *' if name == best else ''}" for gains, best in choices)
+            table.add_row(name, *gains)
+        return table
+
+    def _errors(self) -> Table:
+        table = Table("coefficient", "relative error now", "expected", title_justify="left")
         for name in sorted(self.before, key=lambda name: self.before[name], reverse=True):
-            errors.add_row(name, f"{self.before[name]:.2g}", f"{self.after[name]:.2g}")
-        console = Console(file=StringIO(), width=100, color_system=None)
-        console.print(told, candidates, errors)
-        file = console.file
-        assert isinstance(file, StringIO)
-        return file.getvalue()
+            table.add_row(name, f"{self.before[name]:.2g}", f"{self.after[name]:.2g}")
+        return table
 
 
 def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, float]) -> Floats:
@@ -221,7 +218,7 @@ def advise(
     model : ShipModel
         As identified from the trials so far; with a table of terms.
     trials : sequence of Trial
-        Those trials; their residuals tell the noise.
+        Those trials; their residuals give the noise.
     candidates : mapping of str to callable, optional
         Simulate a manoeuvre with a model; by default `standard_candidates`. One with which the model runs
         away is left out.

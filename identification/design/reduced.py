@@ -96,7 +96,7 @@ def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
 
 
 def _registered(table: Structure, reductions: dict[str, Reduction]) -> Structure:
-    """The reduced structure, under a name that tells the terms apart from other reductions."""
+    """The reduced structure, under a name that is its own among all reductions."""
     small = reduced_structure(table, reductions, table.name)
     terms = repr([(q, [term.name for term in small.terms(q)]) for q in small.equations])
     name = f"{table.name}-{hashlib.sha256(terms.encode()).hexdigest()[:6]}"

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from io import StringIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from rich.table import Table
 
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
+from identification.text import as_text
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships import ShipModel, Structure
@@ -83,10 +84,6 @@ class Reduction:
         return self.path[self.chosen].coefficients
 
     def __str__(self) -> str:
-        from rich.console import Console
-        from rich.table import Table
-
-        console = Console(file=StringIO(), width=100, color_system=None)
         table = Table("terms", "changed", "worst relative error", "R2", "held-out R2", "")
         for k, step in enumerate(self.path):
             worst = max(step.relative_errors, key=lambda name: step.relative_errors[name])
@@ -94,10 +91,7 @@ class Reduction:
                 str(len(step.terms)), step.changed, f"{step.relative_errors[worst]:.3g} ({worst})",
                 f"{step.r_squared:.6f}", f"{step.held_out:.6f}", "chosen" if k == self.chosen else "",
             )  # fmt: skip
-        console.print(table)
-        file = console.file
-        assert isinstance(file, StringIO)
-        return file.getvalue()
+        return as_text(table)
 
 
 def backward_elimination(
@@ -204,23 +198,10 @@ def forward_selection(
 def reduce(
     samples: Samples, structure: Structure, direction: str = "backward", tolerance: float = 1e-3
 ) -> dict[str, Reduction]:
-    """Reduce each equation of a structure.
+    """Reduce each equation of a structure by elimination ("backward") or selection ("forward").
 
-    Parameters
-    ----------
-    samples : Samples
-        The regression, built for the structure.
-    structure : Structure
-        Names the terms.
-    direction : {"backward", "forward"}
-        Elimination or selection.
-    tolerance : float
-        Of the held-out R2.
-
-    Returns
-    -------
-    dict of str to Reduction
-        By equation, with the coefficients of the features in SI units.
+    Returns the reductions by equation, with the coefficients of the features in SI units; the tolerance is
+    that of the held-out R2.
     """
     check_choice(direction, ("backward", "forward"), "direction")
     run = backward_elimination if direction == "backward" else forward_selection
@@ -231,21 +212,9 @@ def reduce(
 
 
 def reduced_structure(structure: Structure, reductions: dict[str, Reduction], name: str) -> Structure:
-    """The structure with the terms that were chosen.
+    """The structure, by a name of its own, with the terms that were chosen; register it to identify it.
 
-    Parameters
-    ----------
-    structure : Structure
-        That was reduced.
-    reductions : dict of str to Reduction
-        From `reduce`.
-    name : str
-        Of the new structure; register it to identify it (`shipgym.register_structure`).
-
-    Returns
-    -------
-    Structure
-        Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
+    Of forces, sway and yaw, which inertia couples, keep the terms that either needs.
     """
     kept = {
         q: {t.name for t, label in zip(structure.terms(q), structure.names(q), strict=True)

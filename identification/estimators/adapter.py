@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 
 
 class Adapted:
-    """An estimator with scikit-learn's interface, and the moment and covariance that it does not tell.
+    """An estimator with scikit-learn's interface, and the moment and covariance that it lacks.
 
     These are those of least squares on the features whose coefficients are not 0: an approximation for an
     estimator that shrinks its coefficients.

@@ -8,9 +8,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from identification.estimators.decomposition import centre_and_scale
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import MAD
-from identification.regression.decomposition import centre_and_scale
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]

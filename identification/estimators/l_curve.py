@@ -35,12 +35,8 @@ def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outsi
 
     Parameters
     ----------
-    singular_values : array of shape (n_ranks,)
-        Of the scaled features, descending.
-    projections : array of shape (n_ranks,)
-        Targets in the left singular vectors, U'y.
-    filters : array of shape (n_ranks,)
-        s / (s^2 + 1/C).
+    singular_values, projections, filters : array of shape (n_ranks,)
+        Of the scaled features, descending; targets in the left singular vectors, U'y; s / (s^2 + 1/C).
     outside : float
         Squared norm of the part of the targets that no direction reaches.
     """
@@ -52,26 +48,13 @@ def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outsi
 
 
 def corner_rank(curve: LCurve, n_samples: int) -> int:
-    """Rank at the corner of the L-curve, Xu 2020, section 3.2.
+    """Rank, from 1 to n_ranks, at the corner of the L-curve of `n_samples` samples (Xu 2020, section 3.2).
 
-    The corner is the point farthest towards the origin of the doubly logarithmic curve, where a line of
-    slope -1 touches it (Reginska 1996, SIAM J. Sci. Comput. 17(3)). Unlike the point of largest curvature
-    this one is well defined on the few points of a truncated decomposition, and can be an end: data
-    without noise keep every direction. A corner whose residuals are larger than those of full rank by more
-    than chance (F test) is passed over for the first rank where they are not: what the data do
-    determine is not dropped.
-
-    Parameters
-    ----------
-    curve : LCurve
-        Norms by rank.
-    n_samples : int
-        Number of samples behind the residuals.
-
-    Returns
-    -------
-    int
-        1 to n_ranks.
+    The corner is the point farthest towards the origin of the doubly logarithmic curve, where a line of slope
+    -1 touches it (Reginska 1996, SIAM J. Sci. Comput. 17(3)). Unlike the point of largest curvature this one
+    is well defined on the few points of a truncated decomposition, and can be an end: data without noise keep
+    every direction. A corner whose residuals are larger than those of full rank by more than chance (F test)
+    is passed over for the first rank where they are not: what the data do determine is not dropped.
     """
     residual, solution = curve.residual_norm, curve.solution_norm
     full = len(residual)
@@ -92,17 +75,7 @@ def corner_rank(curve: LCurve, n_samples: int) -> int:
 def gcv_rank(curve: LCurve, n_samples: int) -> int:
     """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979).
 
-    Parameters
-    ----------
-    curve : LCurve
-        Norms by rank.
-    n_samples : int
-        Number of samples.
-
-    Returns
-    -------
-    int
-        1 to n_ranks, below the number of samples where possible.
+    Below the number of samples where possible.
     """
     freedom = n_samples - np.arange(1, len(curve.residual_norm) + 1)
     with np.errstate(divide="ignore"):
@@ -111,19 +84,9 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
 
 
 def variance_rank(singular_values: Floats, share: float) -> int:
-    """Least rank that holds a share of the variance of the features, as principal component regression does.
+    """Least rank that holds a share, 0 to 1, of the variance of the features.
 
-    Parameters
-    ----------
-    singular_values : array of shape (n_ranks,)
-        Of the scaled features, descending.
-    share : float
-        0 to 1.
-
-    Returns
-    -------
-    int
-        1 to n_ranks.
+    As in principal component regression.
     """
     held = np.cumsum(singular_values**2)
     # the last sum is compared with itself, so that a share of 1 keeps all

@@ -16,10 +16,10 @@ from scipy.linalg import cho_factor, cho_solve
 from sklearn.metrics.pairwise import pairwise_kernels
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.estimators.decomposition import Decomposition, centre_and_scale, decompose
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import reweighted
-from identification.regression.decomposition import Decomposition, centre_and_scale, decompose
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 

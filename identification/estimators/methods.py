@@ -14,6 +14,7 @@ from sklearn.base import clone
 from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.free_running import fit_free_running
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -23,7 +24,6 @@ from identification.estimators.recursive import (
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples
-from identification.search.free_running import fit_free_running
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
 
@@ -171,17 +171,9 @@ def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
     """Estimators whose terms are held back by what they do in a hard turn.
 
-    Ridge regression in which each feature is scaled by its size in a hard turn over a window: the
-    penalty falls on what is invisible in the data and large in the turn.
-
-    Parameters
-    ----------
-    samples : Samples
-        The regression.
-    sizes : dict of str to array of shape (n_terms,)
-        Size of each term in a hard turn (`guard.hard_turn_features`).
-    strength : float
-        Of the penalty, relative to the terms' contribution in the hard turn.
+    Ridge regression in which each feature is scaled by its size in a hard turn (`guard.hard_turn_features`)
+    over a window: the penalty falls on what is invisible in the data and large in the turn. Its strength is
+    relative to the terms' contribution there.
     """
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)

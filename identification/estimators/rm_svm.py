@@ -200,7 +200,7 @@ def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     asked.check()
     if not isinstance(task.blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected 'grey-box', "
+            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected structure 'grey-box', "
             "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
             "file; or choose another method, such as 'tls-svm'"
         )
@@ -300,18 +300,7 @@ class _Tuner:
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
     """How far the heading of an open-loop simulation is from the measured one.
 
-    Parameters
-    ----------
-    model : ShipModel
-    trial : Trial
-        With the heading.
-    objective : {"rmse", "correlation"}
-        Root mean square, rad, or 1 less Pearson's correlation.
-
-    Returns
-    -------
-    float
-        Infinite where the model runs away.
+    Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the model runs away.
     """
     prediction = predict(model, trial)
     if prediction is None:

@@ -20,17 +20,8 @@ SETTLED = 1e-3  # change of a weight
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
     """Weights of samples by their residuals (Suykens et al. 2002, Neurocomputing 48, eq. 14).
 
-    Parameters
-    ----------
-    residuals : array of shape (n_samples,)
-        Of a fit; their scale is estimated by the median absolute deviation.
-    largest : float
-        Of the targets: residuals of its rounding all have the weight 1.
-
-    Returns
-    -------
-    array of shape (n_samples,)
-        1 within 2.5 scales, 1e-4 beyond 3, straight in between.
+    1 within 2.5 scales, 1e-4 beyond 3, straight in between. The scale is estimated by the median absolute
+    deviation; residuals of the rounding of the `largest` target all have the weight 1.
     """
     scale = MAD * float(np.median(np.abs(residuals - np.median(residuals))))
     if scale <= ROUNDING * largest:
@@ -43,17 +34,8 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
 def reweighted(fit: Callable[[Floats | None], Floats], largest: float) -> Floats:
     """Fit, weight the samples by their residuals and fit again until the weights settle.
 
-    Parameters
-    ----------
-    fit : callable
-        Fits with given weights (None for equal ones) and returns the residuals.
-    largest : float
-        Of the targets, absolute.
-
-    Returns
-    -------
-    array of shape (n_samples,)
-        Weights of the last fit. After 50 rounds without settling the last ones are taken.
+    `fit` takes weights, None for equal ones, and returns the residuals; `largest` is the size of the largest
+    target. Returns the weights of the last fit; after 50 rounds without settling the last ones are taken.
     """
     weights = hampel_weights(fit(None), largest)
     for _ in range(MOST_ROUNDS):

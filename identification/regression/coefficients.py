@@ -16,12 +16,7 @@ Floats = NDArray[np.float64]
 def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from coefficients of accelerations.
 
-    Parameters
-    ----------
-    blank : ShipModel
-        The model but for its coefficients.
-    accelerations : mapping of str to array of shape (n_terms,)
-        Coefficients of the terms of each equation, SI units.
+    Coefficients of the terms of each equation, arrays of shape (n_terms,), SI units.
     """
     matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
     values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.regressed]))

@@ -247,22 +247,16 @@ def identify_forces(
 
     Parameters
     ----------
-    trials : sequence of Trial
-        With u, v, r, X, Y, N.
+    trials, particulars, model_inertia
+        As in `force_regression`; the service speed is that of the model.
     structure : str
         `pmm38`, `pmm18` or another table of shares.
-    particulars : Particulars
-        Length, mass, centre of gravity, yaw gyradius, water density; the service speed.
     method : {"tls-svm", "ls"}
         Truncated LS-SVM, or least squares. X, Y and N count alike, each by its root mean square.
     rank : int, optional
         Directions that `tls-svm` keeps; by default by its L-curve.
-    model_inertia : bool
-        See `force_regression`.
-    steering : SteeringGear, optional
-        Of the model.
-    name : str, optional
-        Of the model; by default the ship's.
+    steering, name : optional
+        Of the model; the name by default the ship's.
 
     Returns
     -------
@@ -274,21 +268,14 @@ def identify_forces(
     InputError
         For a structure of free-running trials, and what `force_regression` refuses.
     """
-    table = get_structure(structure)
     check_choice(method, METHODS, "method")
     if rank is not None and method != "tls-svm":
         raise InputError(f"rank: {rank} found with method {method!r}, which keeps all; choose 'tls-svm'")
-    if not isinstance(table, SharedStructure):
-        raise InputError(
-            f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
-            "captive tests, such as 'pmm18'; use identify"
-        )
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
-    regression = force_regression(trials, table, particulars, model_inertia)
-    estimator = TruncatedLSSVM(
-        selection="full" if method == "ls" else "l-curve", rank=rank, fit_intercept=False
-    )
+    regression = force_regression(trials, _captive_table(structure), particulars, model_inertia)
+    selection = "full" if method == "ls" else "l-curve"
+    estimator = TruncatedLSSVM(selection=selection, rank=rank, fit_intercept=False)
     coefficients, covariance = fit_forces(regression, estimator)
     provenance = {
         "structure": structure,
@@ -298,7 +285,7 @@ def identify_forces(
         "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
     }
     return ShipModel(
-        name=particulars.name if name is None else name,
+        name=name or particulars.name,
         structure=structure,
         particulars=particulars.completed(),
         steering=steering or SteeringGear(),
@@ -306,3 +293,13 @@ def identify_forces(
         covariance=covariance,
         provenance=provenance,
     )
+
+
+def _captive_table(structure: str) -> SharedStructure:
+    table = get_structure(structure)
+    if not isinstance(table, SharedStructure):
+        raise InputError(
+            f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
+            "captive tests, such as 'pmm18'; use identify"
+        )
+    return table

@@ -97,18 +97,9 @@ def _with_block_coefficient(particulars: Particulars) -> Particulars:
 
 
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """How well the reference ship alone, without the terms, predicts trials.
+    """How well the reference ship of a grey box alone predicts trials.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A grey box.
-    trials : sequence of Trial
-
-    Returns
-    -------
-    dict
-        Name of the reference ship, and `prediction.trial_metrics` by trial.
+    Its name, and `trial_metrics` by trial.
     """
     assert isinstance(model.table, GreyBox)
     bare = replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None)

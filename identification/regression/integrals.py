@@ -89,15 +89,8 @@ def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
     """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
 
-    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the
-    acceleration of the rudder jumps, the third does.
-
-    Parameters
-    ----------
-    t, values : array of shape (n_samples,)
-        s and the unit of the channel.
-    rudder : Rudder
-        With the corners.
+    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the acceleration of
+    the rudder jumps, the third does.
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)
@@ -127,20 +120,9 @@ def _solvable(t: Floats, knots: Floats) -> bool:
 
 
 def twice_integrated(t: Floats, integrals: Floats, moments: Floats) -> Floats:
-    """Integral over each step of the integral since the first sample.
+    """Integral over each step of the integral since the first sample, shape (n_samples - 1, n_terms).
 
-    Parameters
-    ----------
-    t : array of shape (n_samples,)
-        s.
-    integrals : array of shape (n_samples - 1, n_terms)
-        Of the terms over each step.
-    moments : array of shape (n_samples - 1, n_terms)
-        Integrals over each step of term times the time left to its end.
-
-    Returns
-    -------
-    array of shape (n_samples - 1, n_terms)
+    `integrals` are those of the terms over each step, `moments` those of term times the time left to its end.
     """
     before = np.cumsum(integrals, axis=0) - integrals
     return before * np.diff(t)[:, None] + moments

@@ -141,7 +141,7 @@ def _table(
 
 
 def _used(trials: Sequence[Trial]) -> list[Trial]:
-    """Trials to fit, after checking that names tell all trials apart."""
+    """Trials to fit, after checking that all trials have different names."""
     names = [trial.name for trial in trials]
     twice = [name for name in names if names.count(name) > 1]
     if twice:

@@ -80,14 +80,9 @@ class Rudder:
 
 
 def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) -> Rudder:
-    """Rebuild the rudder between samples.
+    """Rebuild the rudder between samples, s and rad, of shape (n_samples,).
 
-    Parameters
-    ----------
-    t, delta : array-like of shape (n_samples,)
-        s and rad.
-    gear : SteeringGear, optional
-        Tried first; a gear estimated from the samples takes its place where it explains them better.
+    A given gear is tried first; one estimated from the samples takes its place where it explains them better.
     """
     t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
     candidates = [estimate_gear(t, delta)]
@@ -112,21 +107,10 @@ def straight(t: Floats, delta: Floats) -> Rudder:
 
 
 def estimate_gear(t: Floats, delta: Floats) -> tuple[float, float]:
-    """Rate and time constant of a gear from exact samples of its rudder.
+    """Rate, rad/s, and time constant, s, of a gear from exact samples of its rudder, s and rad.
 
-    The rate is the largest that occurs; the time constant the one for which the order is steadiest.
-
-    Parameters
-    ----------
-    t, delta : array of shape (n_samples,)
-        s and rad.
-
-    Returns
-    -------
-    rate : float
-        rad/s.
-    time_constant : float
-        s; 0 for a gear of constant rate.
+    The rate is the largest that occurs; the time constant, 0 for a gear of constant rate, the one for which
+    the order is steadiest.
     """
     steps = np.diff(t)
     rates = np.abs(np.diff(delta)) / steps

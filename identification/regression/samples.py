@@ -39,7 +39,7 @@ SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
 LARGEST_STEPS = 5.0  # of the usual time step; a longer one is a gap,
 SHORTEST_GAP = 0.15  # unless it is shorter than this part of the time to sail one ship length
-NEIGHBOURS = 11  # steps that tell which is usual
+NEIGHBOURS = 11  # steps whose median is the usual one
 FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 
@@ -199,25 +199,11 @@ class _Sampling:
 
 
 def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
-    """Cut a trial where samples are missing.
+    """Cut a trial where samples are missing; the trial itself if it has no gap.
 
     A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
     0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
-    the regression is longer than a quarter of it.
-
-    Parameters
-    ----------
-    trial : Trial
-        The record.
-    particulars : Particulars
-        Length and service speed.
-    fewest : int
-        Shorter pieces, and those of fewer than 10 samples, are left out.
-
-    Returns
-    -------
-    list of Trial
-        The trial itself if it has no gap.
+    the regression is longer than a quarter of it. Pieces shorter than `fewest`, or 10, samples are left out.
 
     Raises
     ------
@@ -249,17 +235,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
 def default_window(trial: Trial, particulars: Particulars) -> int:
     """Sampling steps over which a trial's velocities change by much more than their noise.
 
-    Parameters
-    ----------
-    trial : Trial
-        With u, v, r.
-    particulars : Particulars
-        Length and service speed.
-
-    Returns
-    -------
-    int
-        1 without noise; at most a third of the time to sail one ship length.
+    1 without noise; at most a third of the time to sail one ship length.
     """
     step = float(np.median(np.diff(trial.t)))
     longest = max(int(LONGEST_WINDOW * particulars["length"] / particulars["speed"] / step), 1)
@@ -279,19 +255,9 @@ def without_memory(part: Samples) -> Samples:
     Of rdot = (terms of `r`) + q, qdot = (terms of `q`) the memory q is not measured. At the start of a window
     it is the same constant in the mean yaw acceleration of two windows of one trial once the terms of `q`,
     integrated from the start of the trial, stand on the right; so their difference is free of it. That is the
-    regression of the second-order equation weighted by two boxes convolved, a modulating function
-    (Shinbrot 1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a
-    measured channel is formed.
-
-    Parameters
-    ----------
-    part : Samples
-        Of one trial, the memory's terms among those of yaw.
-
-    Returns
-    -------
-    Samples
-        Of the rows that have a window after theirs; yaw in units of a change of velocity as before.
+    regression of the second-order equation weighted by two boxes convolved, a modulating function (Shinbrot
+    1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a measured
+    channel is formed. The rows returned are those with a window after theirs.
 
     Raises
     ------

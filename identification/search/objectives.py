@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.regression.decomposition import Decomposition, decompose_triangle, stacked, triangle
+from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -66,12 +66,8 @@ def held_out_error(
 ) -> ErrorOfC:
     """Error on each block of samples of the fit to all others.
 
-    Parameters
-    ----------
-    X, y, scale, fit_intercept, weights
-        As of `LSSVM` and `decomposition.triangle`.
-    blocks : array of shape (n_samples,)
-        Index of each sample's block, 0 to n_blocks - 1.
+    `blocks` is the index of each sample's block, 0 to n_blocks - 1; the other arguments are those of `LSSVM`
+    and `decomposition.triangle`.
     """
     rows = [blocks == k for k in range(int(blocks.max()) + 1)]
     parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]

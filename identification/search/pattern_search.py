@@ -25,28 +25,11 @@ def pattern_search(
     finest: float = 1.0 / 64.0,
     most_evaluations: int = 200,
 ) -> SearchResult:
-    """Minimise a function of few variables without derivatives.
+    """Minimise a function of few variables without derivatives, from a start within bounds of shape (n,).
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it is better; else the
-    mesh is halved. No point is looked at twice.
-
-    Parameters
-    ----------
-    objective : callable
-        From a point to the value to be small; infinity is allowed.
-    start, low, high : array-like of shape (n,)
-        Where to begin, and the bounds.
-    mesh : float
-        First size of the mesh, by the distance of the bounds.
-    finest : float
-        Size at which the search ends.
-    most_evaluations : int
-        After which it ends, too.
-
-    Returns
-    -------
-    SearchResult
-        A round is one of polls.
+    mesh, given by the distance of the bounds, is halved until it is finer than `finest`. No point is looked
+    at twice. The objective may be infinite.
     """
     lowest, highest = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
     known: dict[tuple[float, ...], float] = {}

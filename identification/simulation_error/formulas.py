@@ -27,16 +27,8 @@ LINEAR_SYMBOLS = ("v", "r", "delta")
 def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
     """Sway force and yaw moment by sway speed, yaw rate and rudder, Clarke et al. 1983.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        With beam, draught, block coefficient and rudder area.
-
-    Returns
-    -------
-    dict of str to float
-        Y_v, Y_r, Y_delta, N_v, N_r, N_delta of the hydrodynamic forces alone, without the ship's own inertia;
-        rudder positive to starboard.
+    From beam, draught, block coefficient and rudder area: Y_v, Y_r, Y_delta, N_v, N_r, N_delta of the
+    hydrodynamic forces alone, without the ship's own inertia; rudder positive to starboard.
     """
     slender, flat, full, shallow = _proportions(particulars)
     scale = -math.pi * shallow**2
@@ -52,8 +44,8 @@ def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
 def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
     """Sway force and yaw moment by sway speed and yaw rate, Kijima et al. 1990; the rudder by Clarke.
 
-    Parameters and returns as in `clarke_derivatives`. Kijima's beta is -v/U, and his Y_r comes less the
-    mass and added mass in surge, which is added here.
+    Arguments and result as in `clarke_derivatives`. Kijima's beta is -v/U, and his Y_r comes less the mass
+    and added mass in surge, which is added here.
     """
     p = particulars
     slender, _, full, shallow = _proportions(p)
@@ -108,7 +100,7 @@ def formula_coefficients(
     Raises
     ------
     InputError
-        For a structure that the formulas tell nothing of, and for particulars that do not suffice.
+        For a structure that the formulas do not cover, and for particulars that do not suffice.
     """
     ship = particulars.completed()
     found = {q: [_linear_symbol(term) for term in terms] for q, terms in structure.equations.items()}

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -57,7 +56,7 @@ class Prior:
     roots : dict of str to array of shape (n_rows, n_terms)
         Root of S per sample and second of window: S is strength^2 n_samples duration^2 root' root.
     known : dict of str to array of bool of shape (n_terms,)
-        Which coefficients the prior tells; the others are free.
+        Which coefficients the prior determines; the others are free.
     """
 
     name: str
@@ -82,12 +81,8 @@ def formula_prior(formula: str, blank: ShipModel) -> Prior:
 def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     """The prior of a reference ship: its virtual trials at the target's scale, in the target's structure.
 
-    Parameters
-    ----------
-    reference : str or ShipModel
-        A model, its name or file; "auto" for the shipped one most like the target.
-    blank : ShipModel
-        The target but for its coefficients.
+    A model, its name or file, or "auto" for the shipped one most like the target, which is complete but for
+    its coefficients.
 
     Raises
     ------
@@ -127,17 +122,7 @@ def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:
-    """Zigzags and turning circles to both sides, up to the rudder's limit.
-
-    Parameters
-    ----------
-    model : ShipModel
-
-    Returns
-    -------
-    list of Trial
-        With the channel n.
-    """
+    """Zigzags and turning circles to both sides, up to the rudder's limit, with the channel n."""
     travel = model.particulars["length"] / model.particulars["speed"]
     timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
@@ -169,12 +154,12 @@ def with_prior(
     blank : ShipModel
         The target but for its coefficients.
     folds : {"trials", "largest-rudder"}
-        What the strength is chosen by (`choose_strength`).
+        What the strength is chosen by (`Pulled.chosen_strength`).
 
     Raises
     ------
     InputError
-        For a grey box, which has a reference ship, and for a prior that tells nothing of the structure.
+        For a grey box, which has a reference ship, and for a prior without coefficients for the structure.
     """
     if isinstance(blank.table, GreyBox):
         raise InputError(
@@ -185,69 +170,81 @@ def with_prior(
         check_number(
             strength, "prior_strength", at_least=0.0, hint="0 for no prior, inf for the prior itself"
         )
-    given = (
-        formula_prior(prior, blank)
-        if isinstance(prior, str) and prior in FORMULAS
-        else reference_prior(prior, blank)
-    )
-    return replace(
-        method, fit=partial(_fit, method, given, strength, check_choice(folds, FOLDS, "prior_folds"))
-    )
+    check_choice(folds, FOLDS, "prior_folds")
+    by_formula = isinstance(prior, str) and prior in FORMULAS
+    given = formula_prior(str(prior), blank) if by_formula else reference_prior(prior, blank)
+
+    def fit(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+        return Pulled(method, make, given, task).fitted(strength, folds)
+
+    return replace(method, fit=fit)
 
 
-def _fit(
-    method: Method,
-    prior: Prior,
-    strength: float | None,
-    folds: str,
-    make: Callable[[], Estimator],
-    task: FitTask,
-) -> Estimators:
-    report: dict[str, Any] = {"prior_source": prior.name}
-    if strength is None:
-        strength, scores = choose_strength(make, method, prior, task, folds)
-        report["prior_scores"] = scores
-        best, strength = strength, _steady_strength(make, method, prior, strength, task)
-        if strength > best:
-            report["prior_raised_from"] = best
-    estimators = fit_toward(make, method, prior, strength, task)
-    report["prior_strength"] = None if np.isinf(strength) else strength  # JSON knows no infinity
-    for estimator in estimators.values():
-        estimator.prior_ = report  # type: ignore[attr-defined]
-    return estimators
+@dataclass(frozen=True, eq=False)
+class Pulled:
+    """A method whose coefficients are pulled toward a prior.
 
-
-def _steady_strength(
-    make: Callable[[], Estimator], method: Method, prior: Prior, least: float, task: FitTask
-) -> float:
-    """The least strength, from a given one on, with which the model does not run away; that one if none."""
-    for strength in STRENGTHS[STRENGTHS.index(least) :]:
-        estimators = fit_toward(make, method, prior, strength, task)
-        if not reasons_unstable(with_coefficients(task.blank, estimators), task.trials):
-            return float(strength)
-    return least
-
-
-def fit_toward(
-    make: Callable[[], Estimator], method: Method, prior: Prior, strength: float, task: FitTask
-) -> Estimators:
-    """Estimators pulled toward a prior with a given strength.
-
-    Parameters
+    Attributes
     ----------
+    method : Method
+        Fits where there is no pull.
     make : callable
         Makes an unfitted estimator.
-    method : Method
-        Fits them where there is no pull.
     prior : Prior
-    strength : float
-        From 0, which is the method as it is, to infinity, which is the prior.
     task : FitTask
         With the regression.
     """
-    if strength == 0.0:
-        return method.fit(make, task)
-    return {q: _toward(make(), task.samples, q, prior, strength) for q in task.samples.features}
+
+    method: Method
+    make: Callable[[], Estimator]
+    prior: Prior
+    task: FitTask
+
+    def at(self, strength: float, samples: Samples | None = None) -> Estimators:
+        """Estimators fitted with a strength: 0 is the method as it is, infinity the prior."""
+        samples = self.task.samples if samples is None else samples
+        if strength == 0.0:
+            return self.method.fit(self.make, replace(self.task, samples=samples))
+        return {q: _toward(self.make(), samples, q, self.prior, strength) for q in samples.features}
+
+    def fitted(self, strength: float | None, folds: str) -> Estimators:
+        """Estimators fitted with the strength given, or chosen, with a report as `prior_`."""
+        report: dict[str, Any] = {"prior_source": self.prior.name}
+        if strength is None:
+            best, report["prior_scores"] = self.chosen_strength(folds)
+            strength = self.steady_strength(best)
+            if strength > best:
+                report["prior_raised_from"] = best
+        estimators = self.at(strength)
+        report["prior_strength"] = None if np.isinf(strength) else strength  # JSON knows no infinity
+        for estimator in estimators.values():
+            estimator.prior_ = report  # type: ignore[attr-defined]
+        return estimators
+
+    def steady_strength(self, least: float) -> float:
+        """The least strength, from a given one on, with which the model does not run away, else that one."""
+        for strength in STRENGTHS[STRENGTHS.index(least) :]:
+            model = with_coefficients(self.task.blank, self.at(strength))
+            if not reasons_unstable(model, self.task.trials):
+                return float(strength)
+        return least
+
+    def chosen_strength(self, folds: str = TRIALS) -> tuple[float, dict[str, float]]:
+        """The strongest pull that is as good as the best on samples held out, and the error of each strength.
+
+        Held out are the trials one by one, or blocks of time of a single trial, or each of those with the
+        largest rudder by a fit to all that have less. As good: within one standard error of the best (Breiman
+        et al. 1984), because what the prior is for, hard turns, is in none of them. Errors are mean squares
+        by that of no change at all.
+        """
+        splits = list(_folds(self.task, folds))
+        errors = np.array([[_error(self.at(s, fit), held) for fit, held in splits] for s in STRENGTHS])
+        mean = errors.mean(axis=1)
+        excess = errors - errors[int(np.argmin(mean))]
+        standard_error = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
+        as_good = np.flatnonzero(excess.mean(axis=1) <= standard_error)
+        scores = {f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)}
+        return float(STRENGTHS[int(as_good[-1])]), scores
 
 
 def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, strength: float) -> Estimator:
@@ -266,7 +263,7 @@ def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, streng
 def _held(
     estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]
 ) -> Estimator:
-    """The prior's own coefficients; those it does not tell are fitted."""
+    """The prior's own coefficients; those it leaves open are fitted."""
     free = np.flatnonzero(~known)
     estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
     coefficients, moment, covariance = centre.copy(), np.zeros((len(known),) * 2), np.zeros((len(known),) * 2)
@@ -277,43 +274,6 @@ def _held(
     estimator.coef_, estimator.inverse_moment_, estimator.covariance_ = coefficients, moment, covariance
     estimator.n_features_in_ = len(known)  # type: ignore[attr-defined]
     return estimator
-
-
-def choose_strength(
-    make: Callable[[], Estimator], method: Method, prior: Prior, task: FitTask, folds: str = TRIALS
-) -> tuple[float, dict[str, float]]:
-    """The strongest pull that is as good as the best on samples held out.
-
-    Held out are the trials one by one, or blocks of time of a single trial, or each of those with the largest
-    rudder by a fit to all that have less. As good: within one standard error of the best (Breiman et al.
-    1984), because what the prior is for, hard turns, is in none of them.
-
-    Parameters
-    ----------
-    make, method, prior, task
-        As in `fit_toward`.
-    folds : {"trials", "largest-rudder"}
-        What is held out.
-
-    Returns
-    -------
-    strength : float
-    scores : dict of str to float
-        Mean square error held out, by that of no change at all, for each strength.
-    """
-    splits = list(_folds(task, folds))
-    errors = np.array([
-        [_error(fit_toward(make, method, prior, s, replace(task, samples=fit)), held) for fit, held in splits]
-        for s in STRENGTHS
-    ])  # fmt: skip
-    mean = errors.mean(axis=1)
-    best = int(np.argmin(mean))
-    excess = errors - errors[best]
-    standard_error = excess.std(axis=1) / np.sqrt(max(len(splits) - 1, 1))
-    as_good = np.flatnonzero(excess.mean(axis=1) <= standard_error)
-    return float(STRENGTHS[int(as_good[-1])]), {
-        f"{s:.3g}": float(value) for s, value in zip(STRENGTHS, mean, strict=True)
-    }
 
 
 def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:

@@ -10,13 +10,13 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from identification.estimators.estimator import FitTask
 from identification.regression.samples import Samples
 from identification.simulation_error.prior import reference_turns
 from identification.simulation_error.segments import (
@@ -41,8 +41,8 @@ Floats = NDArray[np.float64]
 STARTS = ("free", "measured")
 ROUNDS = 3  # of fits, between which scales of the residuals and starts of the segments are renewed
 OFFSET = np.radians(1.0)  # standard deviation of a rudder's offset, as far as is known beforehand
-STRONGER = 10.0  # times as strong is the prior while the refined model runs away,
-ATTEMPTS = 4  # so often at most
+STRONGER = 10.0  # factor on the pull from attempt to attempt, while the refined model runs away
+ATTEMPTS = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Refinement:
     Attributes
     ----------
     segment_lengths : float
-        Length of a segment: the time to sail so many ship lengths at service speed.
+        Length of a segment: the time to sail that many ship lengths at service speed.
     staggered : bool
         Whether a second set of segments begins half a segment later.
     segment_start : {"free", "measured"}
@@ -63,7 +63,7 @@ class Refinement:
         acceleration (root mean squares over the trials).
     rudder_offsets : bool
         Whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
-        the mean of them: its own terms tell the neutral helm.
+        the mean of them: its own terms give the neutral helm.
     extra_trials : sequence of Trial
         Further trials that the refinement alone sees, such as turns of a reference ship.
     extra_weight : float
@@ -134,19 +134,15 @@ class Refined:
     width: float = 0.0
 
 
-def refine(
-    start: GuardedFit, samples: Samples, trials: Sequence[Trial], settings: Refinement, memory: float
-) -> Refined:
+def refine(start: GuardedFit, task: FitTask, settings: Refinement, memory: float) -> Refined:
     """Refine a fit by the errors of what its model simulates in segments of the trials.
 
     Parameters
     ----------
     start : GuardedFit
         The fit to start from.
-    samples : Samples
-        Its regression: tells how large the terms are in the trials.
-    trials : sequence of Trial
-        Those behind the samples.
+    task : FitTask
+        Its regression, which shows how large the terms are in the trials, and the trials.
     settings : Refinement
     memory : float
         Time over which residuals are taken to be correlated, s.
@@ -161,7 +157,7 @@ def refine(
     InputError
         For extra trials that lack channels.
     """
-    problem = _Problem(start, samples, trials, settings)
+    problem = _Problem(start, task, settings)
     if not start.stable or not problem.finite():
         return Refined(start, None, [], settings.plain() | {"decision": "not refined: the start runs away"})
     rejected: list[dict[str, Any]] = []
@@ -169,7 +165,7 @@ def refine(
     for _ in range(ATTEMPTS):
         solution = problem.solve(prior)
         model = problem.model(solution.parameters)
-        reasons = reasons_unstable(model, trials)
+        reasons = reasons_unstable(model, task.trials)
         if not reasons:
             fit = replace(start, model=model, estimators=problem.estimators(solution.parameters))
             covariance, influences = problem.covariance(solution, prior, memory)
@@ -194,59 +190,63 @@ class _Solution:
     evaluations: int
 
 
+def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
+    """Refuse a structure whose state is not recorded, and extra trials that lack channels."""
+    if "q" in blank.table.equations:
+        raise InputError(
+            f"method 'output-error': structure {blank.structure!r} with a memory of yaw found,"
+            " whose state no trial records, expected one without; choose method 'tls-svm'"
+        )
+    for trial in extra_trials:
+        missing = [c for c in blank.table.required_channels if c not in trial]
+        if missing:
+            raise InputError(
+                f"extra trial {trial.name!r}: channel {missing[0]!r} is missing, expected "
+                f"{', '.join(blank.table.required_channels)}"
+            )
+
+
 class _Problem:
     """Segments, parameters and their prior of one refinement."""
 
-    def __init__(
-        self, start: GuardedFit, samples: Samples, trials: Sequence[Trial], settings: Refinement
-    ) -> None:
-        self.start, self.settings, self.trials = start, settings, trials
+    def __init__(self, start: GuardedFit, task: FitTask, settings: Refinement) -> None:
+        self.start, self.settings, self.trials = start, settings, task.trials
         blank = start.model
-        if "q" in blank.table.equations:
-            raise InputError(
-                f"method 'output-error': structure {blank.structure!r} with a memory of yaw found,"
-                " whose state no trial records, expected one without; choose method 'tls-svm'"
-            )
+        _check_refinable(blank, settings.extra_trials)
         self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
-        self.sizes = np.concatenate([_term_sizes(samples, q) for q in blank.table.equations])
+        self.sizes = np.concatenate([_term_sizes(task.samples, q) for q in blank.table.equations])
+        channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
+        free, offsets = settings.segment_start == "free", settings.rudder_offsets
+        self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
+        self.segments = self._segments(task.trials)
+        self.own, count = len(self.segments), len(task.trials)
         turns = [] if settings.anchor is None else reference_turns(settings.anchor, blank)
-        channels = compared_channels(blank, [*trials, *settings.extra_trials])
-        for trial in settings.extra_trials:
-            missing = [c for c in blank.table.required_channels if c not in trial]
-            if missing:
-                raise InputError(
-                    f"extra trial {trial.name!r}: channel {missing[0]!r} is missing, expected "
-                    f"{', '.join(blank.table.required_channels)}"
-                )
-        lengths, staggered = settings.segment_lengths, settings.staggered
-        own = cut(trials, blank, channels, lengths, staggered)
-        self.own = len(own)
-        self.segments, count = own, len(trials)
         for further, weight in (
             (settings.extra_trials, settings.extra_weight),
             (turns, settings.anchor_weight),
         ):
-            extra = cut(further, blank, channels, lengths, staggered)
-            self.segments = self.segments + [
-                replace(segment, trial=count + segment.trial, weight=weight) for segment in extra
+            self.segments += [
+                replace(segment, trial=count + segment.trial, weight=weight)
+                for segment in self._segments(further)
             ]
             count += len(further)
-        free, offsets = settings.segment_start == "free", settings.rudder_offsets
-        self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
         values = np.concatenate([start.estimators[q].coef_ for q in blank.table.equations])
-        self.first = np.concatenate([values / self.sizes, np.zeros(len(trials) if offsets else 0)])
+        self.first = np.concatenate([values / self.sizes, np.zeros(len(task.trials) if offsets else 0)])
+        self.scales = self._scales(
+            self.shoot(self.first, self.segments, self.shooter.units), self.shooter.units
+        )
+
+    def _segments(self, trials: Sequence[Trial]) -> list[Segment]:
+        settings = self.settings
+        channels = self.shooter.channels
+        return cut(trials, self.start.model, channels, settings.segment_lengths, settings.staggered)
 
     def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
         return self.shooter.shoot(parameters, segments, scales, len(self.trials))
 
     def finite(self) -> bool:
         """Whether the start sails all segments."""
-        self._first_scales()
         return bool(np.all(np.isfinite(self.scales)))
-
-    def _first_scales(self) -> None:
-        shooting = self.shoot(self.first, self.segments, self.shooter.units)
-        self.scales = self._scales(shooting, self.shooter.units)
 
     def _scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals of each channel in the trials, per sample."""
@@ -265,32 +265,15 @@ class _Problem:
         evaluations, before = 0, 0.0
         for _ in range(ROUNDS):
             weights = self._prior_weights(prior, segments)
-
-            @lru_cache(maxsize=2)
-            def shot(key: bytes, held: tuple[Any, ...] = (segments, scales)) -> Shooting:
-                return self.shoot(np.frombuffer(key), *held)
-
-            def residuals(z: Floats, held: Floats = weights, look: Any = shot) -> Floats:
-                pull = held * (z - self.first)
-                return np.concatenate([look(np.ascontiguousarray(z).tobytes()).residuals, pull])
-
-            def jacobian(z: Floats, held: Floats = weights, look: Any = shot) -> Floats:
-                return np.vstack([look(np.ascontiguousarray(z).tobytes()).jacobian, np.diag(held)])
-
+            current = _Round(self, segments, scales, weights)
             before = self._mean_cost(self.shoot(self.first, segments, scales))
             found = least_squares(
-                residuals,
-                parameters,
-                jacobian,
-                method="trf",
-                x_scale="jac",
-                ftol=1e-6,
-                xtol=1e-6,
-                max_nfev=30,
-            )
+                current.residuals, parameters, current.jacobian,
+                method="trf", x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30,
+            )  # fmt: skip
             evaluations += found.nfev
             parameters = found.x
-            shooting = shot(np.ascontiguousarray(parameters).tobytes())
+            shooting = current.at(parameters)
             last = (segments, scales)
             segments = self.shooter.moved(segments, shooting.moves)
             scales = self._scales(shooting, scales)
@@ -361,6 +344,31 @@ class _Problem:
             "residual_rms": dict(zip(self.shooter.channels, solution.scales.tolist(), strict=True)),
             "rudder_offsets_deg": dict(zip(names, offsets, strict=True)) if offsets else {},
         }
+
+
+class _Round:
+    """The least-squares problem between two renewals of scales and starts; the last shooting is kept."""
+
+    def __init__(
+        self, problem: _Problem, segments: Sequence[Segment], scales: Floats, weights: Floats
+    ) -> None:
+        self.problem, self.segments, self.scales, self.weights = problem, segments, scales, weights
+        self.shot: tuple[bytes, Shooting] | None = None
+
+    def at(self, z: Floats) -> Shooting:
+        """The shooting at some parameters."""
+        key = z.tobytes()
+        if self.shot is None or self.shot[0] != key:
+            self.shot = key, self.problem.shoot(z.copy(), self.segments, self.scales)
+        return self.shot[1]
+
+    def residuals(self, z: Floats) -> Floats:
+        """Of the segments, and of the pull toward the start."""
+        return np.concatenate([self.at(z).residuals, self.weights * (z - self.problem.first)])
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Of the residuals."""
+        return np.vstack([self.at(z).jacobian, np.diag(self.weights)])
 
 
 def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:

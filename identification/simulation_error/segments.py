@@ -73,22 +73,10 @@ def cut(
     staggered: bool,
     smooth: Callable[[Floats, Floats], Floats] = preprocess.smooth,
 ) -> list[Segment]:
-    """Cut trials into segments, and again into a set that begins half a segment later.
+    """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        The records; a gap in time ends a segment.
-    model : ShipModel
-        Gives length, service speed and steering gear.
-    channels : sequence of str
-        To compare.
-    lengths : float
-        Of a segment: the time to sail so many ship lengths at service speed.
-    staggered : bool
-        Whether the second set is added.
-    smooth : callable
-        Of times and values: gives the state at the start of a segment.
+    A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed;
+    `smooth` gives, of times and values, the state at its start.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     segments = []

@@ -25,19 +25,10 @@ CORRELATION_TOLERANCE = 0.01
 
 
 def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
-    """Block coefficient, L/B, B/T, inverse Froude number and rudder area by L T.
+    """Block coefficient, L/B, B/T, inverse Froude number and rudder area by L T; nan for what is not known.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        Of a ship; what is not known becomes nan.
-    printed : bool
-        Whether the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of sqrt(g L)/V0: then a model
-        of 7 m is like no ship at all.
-
-    Returns
-    -------
-    array of shape (5,)
+    With `printed` the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of sqrt(g L)/V0: then a
+    model of 7 m is like no ship at all.
     """
     p = particulars
     L = p.length

@@ -22,22 +22,10 @@ DRAWS = 200
 
 
 def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random.Generator) -> Rows:
-    """Rows drawn in blocks with replacement, each group (in the order of time) by itself.
+    """Rows drawn in blocks with replacement, as many as there are, each group by itself.
 
-    Künsch 1989, Annals of Statistics 17(3): every stretch of the block's length is as likely.
-
-    Parameters
-    ----------
-    groups : sequence of array of shape (n_rows_of_group,)
-        Rows that follow one another in time, such as those of one trial.
-    lengths : sequence of int
-        Rows in a block, by group.
-    rng : Generator
-
-    Returns
-    -------
-    array of shape (n_rows,)
-        As many rows of each group as it has.
+    Künsch 1989, Annals of Statistics 17(3): every stretch of the block's length is as likely. A group are
+    rows that follow one another in time, such as those of one trial; lengths are rows in a block, by group.
     """
     drawn = []
     for rows, length in zip(groups, lengths, strict=True):
@@ -91,19 +79,8 @@ def influence_covariance(
     """Covariance of coefficients by a block bootstrap of what each stretch of time adds to them.
 
     One Newton step instead of a refit (Davidson & MacKinnon 1999, International Economic Review 40(2)).
-
-    Parameters
-    ----------
-    influences : sequence of array of shape (n_stretches, n_coefficients)
-        By trial, in the order of time.
-    block : int
-        Stretches in a block.
-    draws, seed : int
-        Number of draws, and their seed.
-
-    Returns
-    -------
-    array of shape (n_coefficients, n_coefficients)
+    Influences by trial, in the order of time, of shape (n_stretches, n_coefficients); a block is so many
+    stretches.
     """
     rng = np.random.default_rng(seed)
     stacked = np.concatenate([part - part.mean(axis=0) for part in influences])

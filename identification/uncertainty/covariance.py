@@ -81,16 +81,8 @@ def effective_freedom(estimator: Estimator, features: Floats) -> float:
 def coefficient_covariance(acceleration_covariance: Floats, acceleration_matrix: Floats) -> Floats:
     """Covariance of the hydrodynamic derivatives from that of the coefficients of the accelerations.
 
-    Parameters
-    ----------
-    acceleration_covariance : array of shape (n, n)
-        Of the coefficients of the features.
-    acceleration_matrix : array of shape (n, n)
-        Maps hydrodynamic derivatives to those coefficients (`Structure.acceleration_matrix`).
-
-    Returns
-    -------
-    array of shape (n, n)
+    Both have the shape (n, n), as the matrix, which maps derivatives to those coefficients
+    (`Structure.acceleration_matrix`).
     """
     half = np.linalg.solve(acceleration_matrix, acceleration_covariance)
     covariance: Floats = np.linalg.solve(acceleration_matrix, half.T)

@@ -1,4 +1,4 @@
-"""What the data can tell and what the fit left over: excitation, collinearity, residuals."""
+"""What the data can determine and what the fit left over: excitation, collinearity, residuals."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
-RUDDER_NOISE = 6.0  # neither does one that moves less than so many times its noise,
+RUDDER_NOISE = 6.0  # neither does one that moves less than this many times its noise,
 MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
@@ -154,22 +154,7 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
 def diagnose(
     estimators: Mapping[str, Estimator], samples: Samples, structure: Structure
 ) -> dict[str, EquationDiagnostics]:
-    """Diagnostics of each equation.
-
-    Parameters
-    ----------
-    estimators : mapping of str to Estimator
-        Fitted to `samples`, by equation.
-    samples : Samples
-        The regression.
-    structure : Structure
-        Names the terms.
-
-    Returns
-    -------
-    dict of str to EquationDiagnostics
-        By equation: those of `u`, `v`, `r` that the structure has.
-    """
+    """Diagnostics of each equation, of estimators fitted to the samples."""
     errors = residuals(estimators, samples)
     apart = without_overlap(samples)
     found = {}
@@ -196,20 +181,7 @@ def diagnose(
 
 
 def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
-    """Autocorrelation at lags of 1, 2, ... samples.
-
-    Parameters
-    ----------
-    values : array of shape (n_samples,)
-        A series.
-    lags : int
-        How many lags at most.
-
-    Returns
-    -------
-    tuple of float
-        Shorter for a short series.
-    """
+    """Autocorrelation of a series at lags of 1, 2, ... samples; fewer lags for a short series."""
     centred = values - values.mean()
     power = float(centred @ centred)
     if power == 0.0:
@@ -218,19 +190,10 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
 
 
 def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
-    """Correlation of one series with another that is shifted.
+    """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
 
-    Parameters
-    ----------
-    first, second : array of shape (n_samples,)
-        Two series at the same times.
-    lags : array of int of shape (n_lags,)
-        Samples by which the first comes after the second; negative where it comes before.
-
-    Returns
-    -------
-    array of shape (n_lags,)
-        Between -1 and 1; 0 where a series is constant or shorter than the lag.
+    Lags are samples by which the first comes after the second, negative where it comes before. 0 where a
+    series is constant or shorter than the lag.
     """
     a, b = first - first.mean(), second - second.mean()
     power = float(np.sqrt((a @ a) * (b @ b)))
@@ -247,15 +210,7 @@ def _shifted(a: Floats, b: Floats, lag: int) -> float:
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
-    Parameters
-    ----------
-    scaled : array of shape (n_samples, n_features)
-        Features with a root mean square of 1.
-
-    Returns
-    -------
-    array of shape (n_features,)
-        1 for a feature orthogonal to the others.
+    1 for an orthogonal one. Features of shape (n_samples, n_features) with a root mean square of 1.
     """
     moment = scaled.T @ scaled / len(scaled)
     factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)

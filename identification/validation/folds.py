@@ -18,19 +18,8 @@ LEAST_RUDDER_SHARE = 0.9  # of the largest rudder; from there on a rudder counts
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
     """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
 
-    The hard turn is in no zigzag. How well small rudders predict larger ones is the nearest that the data
-    tells of it.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        With the channel delta.
-    where : str
-        The argument that asks for it, for messages.
-
-    Returns
-    -------
-    array of bool of shape (n_trials,)
+    The hard turn is in no zigzag. How well small rudders predict larger ones is the closest
+    substitute in the data. `where` is the argument that asks for it, for messages.
 
     Raises
     ------

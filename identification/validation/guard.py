@@ -70,22 +70,11 @@ def hard_turn_features(
 
 
 def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
-    """Simulations in which a model runs away.
+    """Simulations in which a model runs away, in words; empty for a stable model.
 
-    The trials themselves, open loop; turning circles to both sides; and rudder reversed at intervals,
-    from short to long, which excites what a zigzag of any other angle would.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The candidate.
-    trials : sequence of Trial
-        Those it was identified from.
-
-    Returns
-    -------
-    list of str
-        What ran away, in words; empty for a stable model. Stops after the first kind that does.
+    The trials that it was identified from, open loop; turning circles to both sides; and rudder reversed at
+    intervals, from short to long, which excites what a zigzag of any other angle would. Stops after the first
+    kind in which it does.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     angles = sorted({min(angle, model.steering.rudder_limit_deg) for angle in RUDDERS_DEG}, reverse=True)

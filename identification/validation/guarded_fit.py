@@ -43,21 +43,7 @@ def guarded_fit(
 ) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
 
-    Parameters
-    ----------
-    method : Method
-        Makes the estimators.
-    settings : mapping
-        Of the estimators.
-    task : FitTask
-        The regression, the model but for its coefficients, and the trials.
-    guarded : bool
-        Whether penalties may be tried.
-
-    Returns
-    -------
-    GuardedFit
-        Not stable, and without a penalty, where none helped.
+    Not stable, and without a penalty, where none helped or it is not `guarded`.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from identification.estimators.methods import get_method
 from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
-from identification.simulation_error.prior import Prior, fit_toward, reference_prior
+from identification.simulation_error.prior import Prior, Pulled, reference_prior
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import with_coefficients
 from real_ships.data import MeasuredShip
@@ -84,8 +84,8 @@ def pulled(
     runs = [ship.runs[name] for name in names]
     samples = build_samples(runs, blank.table, blank.particulars, gear=blank.steering)
     method = get_method("ls")
-    estimators = fit_toward(method.estimator, method, prior, strength, FitTask(samples, blank, runs))
-    return with_coefficients(blank, estimators)
+    pulled_fit = Pulled(method, method.estimator, prior, FitTask(samples, blank, runs))
+    return with_coefficients(blank, pulled_fit.at(strength))
 
 
 def held_out_error(

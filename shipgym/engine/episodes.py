@@ -103,10 +103,10 @@ class Outcome(NamedTuple):
     """What comes of an interval beside the task's own."""
 
     reward: float
-    terminated: bool
-    truncated: bool
+    terminated: float  # 1 or 0
+    truncated: float
     envelope_distance: float
-    extrapolating: bool
+    extrapolating: float  # 1 or 0
     end: float  # part of the reward: the rest of an episode that failed
 
 

@@ -260,7 +260,7 @@ def _type(record: Record) -> Any:
         _type(kind) if is_record(kind) else types.float64[::1] if is_list(kind) else types.float64
         for kind in field_types(record).values()
     ]
-    return types.BaseTuple.from_types(kinds, record)
+    return types.Tuple.from_types(kinds, record)  # type: ignore[attr-defined]
 
 
 def _coded(

@@ -20,7 +20,7 @@ from shipgym.envs.stability import refuse_unstable
 from shipgym.envs.tiles import Threads, lanes_of, ship_columns, ship_tiles
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-from shipgym.tasks.task import Task
+from shipgym.tasks.task import Task, course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
@@ -38,8 +38,8 @@ class Engine:
         One ship for all, or one for each lane; all of one structure.
     num_envs : int
         Number of lanes.
-    task : Task
-        What is asked.
+    task : Task, optional
+        What is asked; by default course keeping.
     randomisation : Randomisation, optional
         What differs from episode to episode; only with one ship for all.
     allow_unstable : bool
@@ -58,7 +58,7 @@ class Engine:
         self,
         models: ShipModel | Sequence[ShipModel],
         num_envs: int,
-        task: Task,
+        task: Task | None = None,
         randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
         threads: int = 1,
@@ -72,6 +72,7 @@ class Engine:
         refuse_unstable(fleet, allow_unstable)
         if any(model.vessel is not self.model.vessel for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
+        task = task or course_keeping_task()
         task.check_fits(self.model)
         self.num_envs = num_envs
         self.task = task
@@ -401,7 +402,7 @@ class Engine:
         the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
         """
         state = {name: self.read(name) for name in self.model.state_names}
-        if "course" in self.task.definition.State._fields:
+        if "course" in self._voyages.state["state"].present:
             state["set_point"] = self.read("course")
         state["delta_command"] = self.read("rudder_command") * self._ship_row("rudder_limit")
         if "n" in self.model.command_names:

@@ -55,12 +55,14 @@ class Outputs:
     @property
     def terminated(self) -> NDArray[np.bool_]:
         """Whether episodes have come to an end."""
-        return self.flags[0]
+        row: NDArray[np.bool_] = self.flags[0]
+        return row
 
     @property
     def truncated(self) -> NDArray[np.bool_]:
         """Whether episodes have run out of time."""
-        return self.flags[1]
+        row: NDArray[np.bool_] = self.flags[1]
+        return row
 
 
 def named_rows(outcomes: Any, flags: Any, names: Sequence[str], flag_names: Sequence[str]) -> dict[str, Any]:

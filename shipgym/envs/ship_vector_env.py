@@ -233,6 +233,10 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
             begun = self._engine.steps[row] == 0
             artist.begin(self._engine) if begun else artist.note(self._engine)
 
+    def write(self, name: str, values: Any) -> None:
+        """Write one number of the state in all rows (see `Engine.write`)."""
+        self._engine.write(name, values)
+
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
         assert self._keys is not None

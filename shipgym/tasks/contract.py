@@ -16,7 +16,7 @@ and may define
   set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays it for the rest of the
   episode, so that ending early never pays.
-* `REPORTED`: names of fields of `State` that `info` has; those annotated `bool` as flags.
+* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true or false.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts over an episode.
 * `check(settings, model)`: raises `InputError` for settings that do not fit; `listed(settings)`: what a keyword of
   another kind, such as a list of waypoints, means as numbers.
@@ -30,7 +30,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,8 +38,11 @@ from numpy.typing import NDArray
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import uniform
 
-#: A last field of `Settings` that holds any number of numbers.
+#: A last field of `Settings` that holds any number of numbers, and its default, none.
 Numbers = NDArray[np.float64]
+NO_NUMBERS: Numbers = np.zeros(0)
+#: A field of `State` that is true, 1, or false, 0.
+Flag = Annotated[float, bool]
 #: Physical value of an observation of 1, or how it follows from ship and settings.
 Scale = float | Callable[[Ship, Any], float]
 
@@ -135,6 +138,8 @@ def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
 
 
 __all__ = [
+    "NO_NUMBERS",
+    "Flag",
     "Interval",
     "Motion",
     "Numbers",

@@ -13,6 +13,7 @@ from typing import Annotated, NamedTuple
 from shipgym.engine.mathematics import wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import (
+    NO_NUMBERS,
     Interval,
     Numbers,
     Random,
@@ -54,14 +55,14 @@ class Settings(NamedTuple):
     ] = 90.0
     weights: Weights = Weights()
     course_changes_deg: Annotated[
-        Numbers | None,
+        Numbers,
         Setting(
             "Changes of the set-point one after another, degrees, positive to starboard, in place of drawn ones: "
             "the first at the start, the others every `change_interval_steps`.",
             at_least=-180.0,
             at_most=180.0,
         ),
-    ] = None
+    ] = NO_NUMBERS
 
 
 class State(NamedTuple):

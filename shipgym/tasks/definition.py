@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 
 from shipgym.checks import check_keys, check_number, check_whole, did_you_mean, quoted
-from shipgym.engine.records import Record, field_types, is_record, leaves
+from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen, Setting
 
@@ -83,8 +83,8 @@ class TaskDefinition:
     @cached_property
     def flags(self) -> tuple[str, ...]:
         """Reported fields that are true or false."""
-        kinds = field_types(self.State)
-        return tuple(name for name in self.reported if kinds[name] is bool)
+        kinds = field_types(self.State, notes=True)
+        return tuple(name for name in self.reported if bool in getattr(kinds[name], "__metadata__", ()))
 
     @cached_property
     def reward_names(self) -> tuple[str, ...]:
@@ -131,14 +131,14 @@ def _made(
     record: Record, options: Mapping[str, Any], bounds: Mapping[str, Setting], listed: Callable[[Any], Any]
 ) -> Any:
     """A record of settings, the given ones in place of its defaults."""
-    values = {}
+    values: dict[str, Any] = {}
     for name, hint in field_types(record).items():
         default = record._field_defaults[name]  # type: ignore[attr-defined]
         if is_record(hint) and hint._field_defaults:
             values[name] = _made(hint, options, bounds, listed)
         elif name not in options:
-            values[name] = np.zeros(0) if default is None else default
-        elif default is None:
+            values[name] = default
+        elif is_list(hint):
             values[name] = _list_of_numbers(options[name], name, bounds[name], listed)
         elif is_record(hint):
             values[name] = _small_record(hint, options[name], name, bounds[name])
@@ -159,7 +159,7 @@ def _small_record(kind: Record, value: Any, name: str, bounds: Setting) -> Any:
     if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(names):
         raise InputError(f"{name}: {value!r} found, expected {words}")
     return kind(
-        *(_number(one, f"{name}: the {word}", bounds) for one, word in zip(value, names, strict=True))
+        *[_number(one, f"{name}: the {word}", bounds) for one, word in zip(value, names, strict=True)]  # type: ignore[arg-type]
     )
 
 
@@ -223,7 +223,7 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
         )
     else:
         namespace = source
-    where = getattr(namespace, "__file__", None) or getattr(namespace, "__name__", str(source))
+    where = str(getattr(namespace, "__file__", None) or getattr(namespace, "__name__", source))
     if reward is not None:
         other = load_file(Path(reward)) if isinstance(reward, str | Path) else reward
         namespace = SimpleNamespace(**{**vars(namespace), "Reward": other.Reward, "step": other.step})
@@ -239,12 +239,12 @@ def _definition(namespace: Any, where: str) -> TaskDefinition:
     for name in RECORDS:
         if not is_record(getattr(namespace, name)):
             raise InputError(f"{where}: {name} is no NamedTuple, expected {_what(name)}")
-    functions = {"due": never_due, "on_event": no_event, "worst_cost": no_worst_cost}
+    functions: dict[str, Any] = {"due": never_due, "on_event": no_event, "worst_cost": no_worst_cost}
     functions |= {name: getattr(namespace, name) for name in FUNCTIONS if hasattr(namespace, name)}
     for name, function in functions.items():
         _check_arguments(function, name, where)
     name = getattr(namespace, "NAME", None) or Path(where).stem
-    optional = {
+    optional: dict[str, Any] = {
         key: getattr(namespace, key) for key in ("plan_length", "check", "listed") if hasattr(namespace, key)
     }
     definition = TaskDefinition(

@@ -20,6 +20,8 @@ from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import InputError
 from shipgym.tasks.contract import (
+    NO_NUMBERS,
+    Flag,
     Interval,
     Numbers,
     Random,
@@ -81,11 +83,11 @@ class Settings(NamedTuple):
     )
     weights: Weights = Weights()
     waypoints: Annotated[
-        Numbers | None,
+        Numbers,
         Setting(
             "North and east, m, of a path that is always the same, shape (n, 2); by default one is drawn."
         ),
-    ] = None
+    ] = NO_NUMBERS
 
 
 class State(NamedTuple):
@@ -107,9 +109,9 @@ class State(NamedTuple):
     heading_error: float  # rad
     cross_track: float  # m, positive to starboard of the path
     distance_made_good: float  # m
-    success: bool  # whether the end of the path is reached
-    in_corridor: bool
-    grounded: bool
+    success: Flag  # whether the end of the path is reached
+    in_corridor: Flag
+    grounded: Flag
 
 
 class Reward(NamedTuple):

@@ -41,6 +41,12 @@ class Weights(NamedTuple):
     ] = 10.0
 
 
+DEFAULTS = Weights()
+HEADING_SCALE, ROLL_SCALE = radians(DEFAULTS.heading_scale_deg), radians(DEFAULTS.roll_scale_deg)
+INTEGRAL_ZONE = radians(DEFAULTS.integral_zone_deg)
+RUDDER_WEIGHT, RATE_WEIGHT = DEFAULTS.rudder_weight, DEFAULTS.rudder_rate_weight
+
+
 class SteeringReward(NamedTuple):
     """Costs of the rudder and of what it does, with the sign turned."""
 

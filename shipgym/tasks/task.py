@@ -17,6 +17,7 @@ from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
 from shipgym.tasks.definition import TaskDefinition, read_definition
+from shipgym.tasks.steering import Helm
 
 Floats = NDArray[np.float64]
 Sea = str | Weather
@@ -28,6 +29,8 @@ ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
 RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
 MEASUREMENTS = ("raw", "filtered")
+#: What every autopilot sees, in order.
+OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
 
 
 class Observed(NamedTuple):
@@ -137,6 +140,11 @@ class Task:
     def changed(self, **options: Any) -> Task:
         """The same task with other options."""
         return Task.of(self.definition, **{**self.options, **options})
+
+    @property
+    def follows_path(self) -> bool:
+        """Whether there is a path to follow, of waypoints."""
+        return "waypoints" in self.definition.settings
 
     @property
     def name(self) -> str:
@@ -264,3 +272,18 @@ def control_interval(model: ShipModel) -> float:
     wanted = model.particulars["length"] / model.particulars["speed"] / STEPS_PER_LENGTH
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted))) * power)
+
+
+def course_keeping_task(**options: Any) -> Task:
+    """The task of course keeping by keywords (`Task.of`)."""
+    return Task.of("CourseKeeping", **options)
+
+
+def path_following_task(**options: Any) -> Task:
+    """The task of path following by keywords (`Task.of`)."""
+    return Task.of("PathFollowing", **options)
+
+
+def observation_scales(model: ShipModel) -> Floats:
+    """Physical value of a course-keeping observation of 1, in the order of `OBSERVATION_NAMES`, SI units."""
+    return np.array([quantity.scale for quantity in course_keeping_task().observed(model)])

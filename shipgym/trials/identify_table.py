@@ -85,7 +85,7 @@ _refinement = partial(_option, "refinement", setting=True)
 _uncertainty, _prior = partial(_option, "uncertainty"), partial(_option, "prior")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Options:
     """The options of `identify`; each field says in its metadata what it is.
 

@@ -6,21 +6,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, AdaptiveLQ, check_controller, fly, load_agent
+from agents import LQ, AdaptiveLQ, check_controller, load_agent, sail
 from agents.controllers.adaptive_lq import GAINS
 from agents.controllers.batched_lq import lq_rows
 from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
 from agents.controllers.lq import lq_gain
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.task import control_interval
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.linear import linearise, straight_running
+from shipgym.tasks.task import control_interval, course_keeping_task
 
 MARINER = load_model("mariner")
-GENTLE = CourseKeepingTask(course_change_deg=10.0, episode_steps=2000)
+GENTLE = course_keeping_task(course_change_deg=10.0, episode_steps=2000)
 
 
 @pytest.mark.parametrize("name", ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"])
@@ -46,9 +45,9 @@ WEAK_RUDDER = changed(N_d=0.5, N_ud=0.5, N_r=1.5, N_ur=1.5, N_v=1.3, N_uv=1.3)
 UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
 
-def sail(controller, model, steps, task=GENTLE, state=None):
+def state_after(controller, model, steps, task=GENTLE, state=None):
     """State after so many steps of two episodes, shape (2, memory_size)."""
-    engine = CourseKeepingEngine(model, 2, task)
+    engine = Engine(model, 2, task)
     seen = engine.reset(np.arange(2))
     for _ in range(steps):
         action, state = controller.predict(seen, state)
@@ -63,7 +62,7 @@ def test_it_converges_to_the_design_of_the_true_ship(believed, true):
     adaptive = AdaptiveLQ.from_model(believed, noise=0.0)
     wanted = np.array([LQ.from_model(true).gains[signal] for signal in SIGNALS])
     begun = np.array([adaptive.gains[signal] for signal in SIGNALS])
-    reached = sail(adaptive, true, 1500)[:, GAINS]
+    reached = state_after(adaptive, true, 1500)[:, GAINS]
     size = np.abs(wanted)
     assert np.all(np.abs(reached - wanted) < 0.12 * size)
     before, after = (np.linalg.norm((gains - wanted) / size, axis=-1) for gains in (begun, reached))
@@ -76,22 +75,22 @@ def test_a_ship_that_changes_at_sea_is_followed():
     effects = []
     state = None
     for ship in (MARINER, WEAK_RUDDER):
-        state = sail(adaptive, ship, 1000 if state is None else 2000, state=state)
+        state = state_after(adaptive, ship, 1000 if state is None else 2000, state=state)
         effects.append(adaptive.coefficients(state[0])[1, 2] / AdaptiveLQ.from_model(ship).prior[1, 2])
     assert effects == pytest.approx([1.0, 1.0], abs=0.08)
 
 
 def test_on_its_own_ship_it_stays_near_its_design_at_no_more_cost():
     adaptive, lq = AdaptiveLQ.from_model(MARINER), LQ.from_model(MARINER)
-    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(12)) for pilot in (adaptive, lq))
+    ours, theirs = (sail(pilot, MARINER, seeds=np.arange(12)) for pilot in (adaptive, lq))
     assert ours.cost.mean() < 1.01 * theirs.cost.mean()
 
 
 def test_in_noise_it_keeps_what_it_gained():
     """A model wrong by half in the rudder's effect; noise of a sea trial's sensors."""
-    task = CourseKeepingTask(course_change_deg=30.0, episode_steps=1500, noise=1.0)
+    task = course_keeping_task(course_change_deg=30.0, episode_steps=1500, noise=1.0)
     ours, theirs = (
-        fly(kind.from_model(WEAK_RUDDER), MARINER, task, np.arange(12)) for kind in (AdaptiveLQ, LQ)
+        sail(kind.from_model(WEAK_RUDDER), MARINER, task, np.arange(12)) for kind in (AdaptiveLQ, LQ)
     )
     assert ours.cost.mean() < theirs.cost.mean()
     assert not ours.terminated.any()
@@ -102,7 +101,7 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     check_controller(adaptive, MARINER, n_steps=45)
     adaptive.save(tmp_path / "adaptive.json")
     again = load_agent(tmp_path / "adaptive.json", MARINER)
-    assert np.array_equal(*(sail(one, MARINER, 50) for one in (adaptive, again)))
+    assert np.array_equal(*(state_after(one, MARINER, 50) for one in (adaptive, again)))
 
 
 @pytest.mark.parametrize("weights", [{}, {"rudder_weight": 0.02, "rate_weight_s2": 30.0}])
@@ -119,14 +118,14 @@ def test_weights_go_through_the_file_and_an_older_one_has_the_environment_s(tmp_
     weighty = AdaptiveLQ.from_model(MARINER, rudder_weight=0.02, redesign_lengths=0.1, noise=0.0)
     weighty.save(path)
     again = load_agent(path, MARINER)
-    assert np.array_equal(*(sail(one, MARINER, 20) for one in (weighty, again)))
+    assert np.array_equal(*(state_after(one, MARINER, 20) for one in (weighty, again)))
     plain = AdaptiveLQ.from_model(MARINER, redesign_lengths=0.1, noise=0.0)
     plain.save(path)
     content = json.loads(path.read_text())
     del content["design"]["rudder_weight"]
     path.write_text(json.dumps(content))
     older = load_agent(path, MARINER)
-    assert np.array_equal(*(sail(one, MARINER, 20) for one in (plain, older)))
+    assert np.array_equal(*(state_after(one, MARINER, 20) for one in (plain, older)))
 
 
 @pytest.mark.parametrize("name", ["rudder_weight", "rate_weight_s2"])
@@ -143,7 +142,7 @@ def test_a_ship_without_sway_is_refused():
 
 def test_waves_teach_it_little_that_is_wrong():
     """First-order yawing is not steering: without a guard the gains run away (cost 700 in place of 27)."""
-    task, seeds = CourseKeepingTask(sea="moderate", noise=1.0), np.arange(16)
-    ours, theirs = (fly(kind.from_model(MARINER), MARINER, task, seeds) for kind in (AdaptiveLQ, LQ))
+    task, seeds = course_keeping_task(sea="moderate", noise=1.0), np.arange(16)
+    ours, theirs = (sail(kind.from_model(MARINER), MARINER, task, seeds) for kind in (AdaptiveLQ, LQ))
     assert not ours.terminated.any()
     assert ours.cost.mean() < 1.2 * theirs.cost.mean()

@@ -4,10 +4,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, LineOfSight, fly
+from agents import LQ, LineOfSight, sail
 from agents.cli.terminal import ranking_table
 from agents.verification.chain import build_autopilot, verify
-from agents.verification.index_uncertainty import manoeuvre_spread
+from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
 from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from identification import identify
@@ -58,7 +58,7 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     guest = random_policy(result.model, base=LQ.from_model(result.model), authority=0.01)
     found = verify(result.model, 24, 1, guests=[guest])
     told = verification_metrics(found)["controllers"]
-    alone = fly(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
+    alone = sail(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
     assert told["learned"]["cost_mean"] == pytest.approx(alone.cost.mean(), rel=1e-6)
     assert told["learned"]["gains"] is told["learned"]["margins"] is None
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
@@ -147,10 +147,11 @@ def test_unstable_draws_count_as_failed_and_are_never_dropped():
     model = load_model("mariner")
     backwards = dict(model.coefficients) | {"N_r": 5e-3}  # yaw that feeds itself
     wild = type(model)(**{**_fields(model), "coefficients": backwards})
-    spread = manoeuvre_spread(model, [model, wild, model, wild])
-    assert spread.unstable.tolist() == [False, True, False, True]
-    assert spread.criteria["advance"].share_passed == 0.5
-    assert len(spread.zigzag_headings) == 2
+    sailed = [sail_draws(model, [model, wild]) for _ in range(2)]
+    found = uncertainty_of(model, nominal_runs(model), sailed)
+    assert found.unstable.tolist() == [False, True, False, True]
+    assert found.criteria["advance"].share_passed == 0.5
+    assert len(found.zigzag_headings) == 2
 
 
 def _fields(model):

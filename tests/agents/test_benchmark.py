@@ -288,7 +288,7 @@ def test_the_command_ranks_and_writes(tmp_path):
         "--out", tmp_path / "r", "--resume", "--json", "--no-page",
     )  # fmt: skip
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
-    assert not page.exists()  # it would be of what was flown before
+    assert not page.exists()  # it would be of the results before
 
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):

@@ -13,7 +13,6 @@ from agents.benchmarking.statistics import (
     interval,
     mean_cost,
     performance_profile,
-    probability_of_improvement,
     score,
     weighted_interquartile_mean,
 )
@@ -76,6 +75,10 @@ def test_aggregate_score_without_chance_is_the_interquartile_mean_of_the_scores(
     found = aggregate_score(costs, [(30.0, 20.0)] * 8, Draws(8, 10), range(8), 0)
     expected = float(interquartile_mean(levels))
     assert found == pytest.approx((expected, expected, expected))
+
+
+def probability_of_improvement(one, other):
+    return improvement({0: one}, {0: other}, Draws(1, one.shape[1]), (0, 1)).value
 
 
 def test_probability_of_improvement_is_paired_and_ties_count_half():

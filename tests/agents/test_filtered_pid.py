@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from agents import PID, FilteredPID, check_controller, fly, load_agent, step_response
+from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
 from agents.controllers.filtered_pid import LEAD, TURN, notch_band
-from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task, observation_scales
 
 MARINER = load_model("mariner")
 INFINITE = float("inf")
@@ -54,7 +54,9 @@ def test_a_gentler_reference_needs_less_rudder(filtered):
 
 
 def test_with_the_reference_it_costs_less_than_the_plain_pid(filtered):
-    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(16)) for pilot in (filtered, PID.from_model(MARINER)))
+    ours, theirs = (
+        sail(pilot, MARINER, seeds=np.arange(16)) for pilot in (filtered, PID.from_model(MARINER))
+    )
     assert ours.cost.mean() < theirs.cost.mean()
 
 
@@ -84,8 +86,8 @@ def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
 
 def test_the_wave_filter_spares_the_rudder(filtered):
     deaf = FilteredPID.from_model(MARINER, wave_period=9.0)
-    task = CourseKeepingTask(sea="moderate")
-    ours, theirs = (fly(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
+    task = course_keeping_task(sea="moderate")
+    ours, theirs = (sail(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
     assert ours.rudder_travel_deg_min.mean() < 0.7 * theirs.rudder_travel_deg_min.mean()
     assert ours.cost.mean() < theirs.cost.mean()
     assert 35.0 < deaf.margins.phase_margin_deg < filtered.margins.phase_margin_deg
@@ -99,7 +101,7 @@ def test_a_steady_course_is_reached_without_error(filtered):
 @pytest.mark.parametrize("period", [None, 9.0])
 def test_it_is_a_controller_and_a_file(period, tmp_path):
     pid = FilteredPID.from_model(MARINER, wave_period=period)
-    check_controller(pid, MARINER, CourseKeepingTask(noise=1.0), n_steps=20)
+    check_controller(pid, MARINER, course_keeping_task(noise=1.0), n_steps=20)
     pid.save(tmp_path / "pid.json")
     again = load_agent(tmp_path / "pid.json", MARINER)
     shown = np.random.default_rng(0).uniform(-0.3, 0.3, (4, 8))

@@ -8,14 +8,15 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents import LQ, fly, step_response
+from agents import LQ, sail, step_response
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.task import control_interval
 
 MARINER = load_model("mariner")
 LENGTH_TIME = 160.93 / 7.7175
@@ -111,9 +112,9 @@ def test_a_course_change_ends_on_the_course_with_little_overshoot():
 )
 def test_ships_hard_to_steer_are_kept_on_course(model):
     lq = LQ.from_model(model)
-    flights = fly(lq, model, seeds=np.arange(32))
-    assert not flights.terminated.any()
-    assert flights.cost.mean() < 70.0
+    episodes = sail(lq, model, seeds=np.arange(32))
+    assert not episodes.terminated.any()
+    assert episodes.cost.mean() < 70.0
     step = step_response(lq, model, duration=60.0 * LENGTH_TIME)
     assert np.degrees(step.heading[0, -200:]) == pytest.approx(20.0, abs=0.1)
 

@@ -1,13 +1,14 @@
-"""Monte Carlo over the posterior gives the same in this process, in others, resumed, and draw by draw."""
+"""Monte Carlo over the covariance gives the same in this process, in others, resumed, and draw by draw."""
 
 from dataclasses import fields
 
 import numpy as np
 import pytest
 
-from agents import LQ, PID, fly
-from agents.verification.index_uncertainty import manoeuvre_spread
-from agents.verification.monte_carlo import Engine, monte_carlo
+from agents import LQ, PID, sail
+from agents.engines.jobs import JobEngine
+from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
+from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
 
 DRAWS, SEED = 28, 3  # two jobs
@@ -42,25 +43,25 @@ def assert_same(one, other):
 
 def test_two_workers_give_the_same_and_what_they_did_is_resumed(found, ship, pilots, tmp_path):
     told = []
-    engine = Engine(workers=2, keep=tmp_path)
+    engine = JobEngine(workers=2, keep=tmp_path)
     assert_same(monte_carlo(pilots, ship, DRAWS, SEED, where=engine, progress=told.append), found)
     assert told == sorted(told)
     assert (told[0], told[-1]) == (0, DRAWS)
     told.clear()
     assert_same(
-        monte_carlo(pilots, ship, DRAWS, SEED, where=Engine(keep=tmp_path), progress=told.append), found
+        monte_carlo(pilots, ship, DRAWS, SEED, where=JobEngine(keep=tmp_path), progress=told.append), found
     )
     assert told == [DRAWS]
 
 
-def test_jobs_change_nothing_in_what_is_sailed_and_flown(found, ship, pilots):
+def test_jobs_change_nothing_in_what_is_sailed(found, ship, pilots):
     drawn = ship.sample(DRAWS, SEED)
-    together = fly(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
+    together = sail(pilots[1], drawn, seeds=SEED + np.arange(DRAWS))
     np.testing.assert_array_equal(found.episodes[1].cost, together.cost)
-    spread = manoeuvre_spread(ship, drawn)
-    for name, criterion in spread.criteria.items():
+    whole = uncertainty_of(ship, nominal_runs(ship), [sail_draws(ship, drawn)])
+    for name, criterion in whole.criteria.items():
         assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()
-    for one, other in zip(spread.circle_paths, found.manoeuvres.circle_paths, strict=True):
+    for one, other in zip(whole.circle_paths, found.manoeuvres.circle_paths, strict=True):
         np.testing.assert_array_equal(one, other)
 
 
@@ -70,4 +71,4 @@ def test_wrong_arguments(ship, pilots):
     with pytest.raises(InputError, match="draws: 1 found"):
         monte_carlo(pilots, ship, 1)
     with pytest.raises(InputError, match="Did you mean 'local'"):
-        Engine("lokal").check()
+        JobEngine("lokal").check()

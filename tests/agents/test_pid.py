@@ -8,15 +8,14 @@ import pytest
 from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
-from agents import PID, fly, step_response
+from agents import PID, sail, step_response
 from agents.controllers.linear_loop import rate_weight, sample_ship
 from agents.controllers.pid import optimal_poles, place_poles
-from shipgym.envs.course_keeping_task import observation_scales
-from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.linear import Nomoto, nomoto
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.task import control_interval, observation_scales
 
 MARINER = load_model("mariner")
 
@@ -103,9 +102,9 @@ def test_a_course_change_ends_on_the_course_with_little_overshoot():
 )
 def test_ships_hard_to_steer_are_kept_on_course(model):
     pid = PID.from_model(model)
-    flights = fly(pid, model, seeds=np.arange(32))
-    assert not flights.terminated.any()
-    assert flights.cost.mean() < 70.0
+    episodes = sail(pid, model, seeds=np.arange(32))
+    assert not episodes.terminated.any()
+    assert episodes.cost.mean() < 70.0
     step = step_response(pid, model, duration=60.0 * 160.93 / 7.7175)
     assert np.degrees(step.heading[0, -200:]) == pytest.approx(20.0, abs=0.1)
 

@@ -194,7 +194,7 @@ def spoil(tensors):
 
 
 CHANGES = {
-    "not finite": (spoil, r"weights 'layers.1.weight': nan found at \[2, 3\], expected finite"),
+    "not finite": (spoil, r"layers\[1\].weight: nan found at \[2, 3\], expected finite"),
     "missing": (lambda tensors: tensors.pop("layers.1.bias"), "weights 'layers.1.bias' are missing"),
     "more": (lambda tensors: tensors.update(x=np.zeros(1)), "unknown 'x' found beside the weights"),
     "double": (

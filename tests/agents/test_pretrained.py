@@ -10,6 +10,7 @@ from agents.policies.policy import LearnedPolicy
 from agents.rollouts.rollout import check_fits, episode_costs
 from agents.suites.suite import load_suite
 from agents.training.plan import Given, make_plan
+from agents.training.settings import present_names
 
 SUITE = load_suite()
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode
@@ -28,7 +29,7 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
     check_fits(agent, task.task, task.ship, task.name)
     assert agent.model_sha256 == model_hash(task.ship)
     assert path.stat().st_size + path.with_suffix(".safetensors").stat().st_size < 300_000
-    record = agent.training
+    record = {**agent.training, "settings": present_names(agent.training["settings"])}
     assert record["task"] == task.name
     assert f"--task {task.name} --seed {record['seed']}" in record["command"]
     commanded = make_plan(Given("ppo", task=task.name, seed=record["seed"])).configuration()
@@ -42,7 +43,7 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
 
 
 @pytest.mark.parametrize("name", ["mariner-calm", "container-path"])
-def test_the_score_is_what_is_flown(name):
+def test_the_score_is_what_it_costs(name):
     task = SUITE.task(name)
     _, agent = agent_of(task)
     costs = episode_costs(agent, task.engine(len(task.seeds)), np.asarray(task.seeds))

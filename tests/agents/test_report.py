@@ -11,7 +11,7 @@ from agents.cli.trials_page import write_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
 from shipgym import Trial, load_model
-from shipgym.manoeuvres import IndexInterval, Manoeuvre, ZigzagIndices, zigzag, zigzag_indices
+from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
 from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
@@ -160,15 +160,9 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
 
 def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     name = f"zigzag {HOSTILE}"
-    manoeuvre = Manoeuvre(zigzag, zigzag_indices, ZigzagIndices)
-    found = StandardTrials(
-        {"zigzags": {name: manoeuvre}},
-        {},
-        {name: {"period_s": IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))}},
-        {},
-        {name: HOSTILE},
-        0,
-    )
+    zigzags = {name: standard_manoeuvres(load_model("mariner"))["zigzag 20/20, port first"]}
+    index = IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))
+    found = StandardTrials({"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0)
     write_page(replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html")
     source = (tmp_path / "trials.html").read_text()
     assert Page(source).scripts == 1

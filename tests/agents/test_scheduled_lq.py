@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents import LQ, ScheduledLQ, check_controller, fly, load_agent
+from agents import LQ, ScheduledLQ, check_controller, load_agent, sail
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
@@ -68,7 +68,7 @@ def test_between_the_speeds_the_loop_is_stable(of_kvlcc2):
 
 def test_on_the_nonlinear_ship_it_costs_no_more_than_lq(of_mariner):
     pilots = (of_mariner, LQ.from_model(MARINER))
-    ours, theirs = (fly(pilot, MARINER, seeds=np.arange(16)) for pilot in pilots)
+    ours, theirs = (sail(pilot, MARINER, seeds=np.arange(16)) for pilot in pilots)
     assert ours.cost.mean() < 1.01 * theirs.cost.mean()
 
 

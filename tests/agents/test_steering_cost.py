@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from agents import LQ, PID, fly
-from shipgym.envs.course_keeping_task import CourseKeepingTask
+from agents import LQ, PID, sail
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task
 
 SEEDS = np.arange(64)
 MARINER = load_model("mariner")
@@ -22,7 +22,7 @@ def best_cost(controller, model, task):
 
     def cost(factors):
         other = replace(controller, gains=dict(zip(names, design * factors, strict=True)))
-        return fly(other, model, task, seeds=SEEDS).cost.mean()
+        return sail(other, model, task, seeds=SEEDS).cost.mean()
 
     spread = np.diag(np.full(len(names), -0.4)) + 1.0  # the design, and each gain lowered
     simplex = np.vstack([np.ones(len(names)), spread])
@@ -37,8 +37,8 @@ def best_cost(controller, model, task):
     ids=["mariner", "mariner small changes", "mariner one course", "tanker"],
 )
 def test_designs_are_near_the_best_of_their_kind(design, model, change_deg):
-    task = CourseKeepingTask(course_change_deg=change_deg)
+    task = course_keeping_task(course_change_deg=change_deg)
     controller = design.from_model(model)
-    cost = fly(controller, model, task, seeds=SEEDS).cost.mean()
+    cost = sail(controller, model, task, seeds=SEEDS).cost.mean()
     best = best_cost(controller, model, task)
     assert best <= cost <= 1.15 * best

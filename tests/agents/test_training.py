@@ -114,8 +114,8 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     plan = tiny(base="lq", authority=0.3)
     result = train(plan, tmp_path / "run")
     seeds = EVALUATION_SEED + np.arange(10)
-    flown = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
-    assert flown.mean() == result.best_cost == min(row["cost"] for row in result.curve)
+    costs = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
+    assert costs.mean() == result.best_cost == min(row["cost"] for row in result.curve)
     progress = json.loads((tmp_path / "run" / "progress.json").read_text())
     assert progress["best_cost"] == result.best_cost
     assert progress["lq_cost"] == result.lq_cost

@@ -7,11 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
+from agents.engines.jobs import JobEngine
 from agents.training.plan import Given, make_plan
 from agents.training.search_space import SPACES, Choice, Wholes, with_parameters
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
-from agents.verification.monte_carlo import Engine
 from shipgym.errors import InputError
 
 optuna = pytest.importorskip("optuna", reason="optuna is not installed")
@@ -88,7 +88,7 @@ def test_interrupted_study_goes_on_as_if_nothing_had_happened(trainings, tmp_pat
 
 def test_two_workers_find_the_same(trainings, tmp_path):
     one = tune(plan(), tmp_path / "one", 5, training=trainings.bowl)
-    assert tune(plan(), tmp_path / "two", 5, training=trainings.bowl, where=Engine(workers=2)) == one
+    assert tune(plan(), tmp_path / "two", 5, training=trainings.bowl, where=JobEngine(workers=2)) == one
 
 
 def test_settings_that_are_given_are_not_varied(trainings, tmp_path):

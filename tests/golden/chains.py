@@ -59,7 +59,7 @@ def record_demo(_: str) -> dict[str, Floats]:
 
 
 def record_pretrained(task: str) -> dict[str, Floats]:
-    """All figures of a few scored episodes of a task, flown by PID, LQ and the pretrained agent."""
+    """All figures of a few scored episodes of a task, steered by PID, LQ and the pretrained agent."""
     result = benchmark(list(CONTESTANTS), tasks=[task], episodes=EPISODES)
     return {
         f"{one} {name}": vector(result.figures(one, task, name))

@@ -12,7 +12,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.regression.decomposition import decompose_triangle, triangle
+from identification.estimators.decomposition import decompose_triangle, triangle
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]

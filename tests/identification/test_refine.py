@@ -69,7 +69,7 @@ def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zig
     for q, estimator in start.estimators.items():
         start.estimators[q] = estimator
         estimator.coef_ = estimator.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(estimator.coef_))))
-    refined = refine(start, samples, [cao_zigzag], Refinement(pull=0.0), 20.0)
+    refined = refine(start, FitTask(samples, mariner, [cao_zigzag]), Refinement(pull=0.0), 20.0)
     truth = np.array(list(mariner.coefficients.values()))
     found = np.array(list(refined.fit.model.coefficients.values()))
     assert np.median(np.abs(found / truth - 1.0)) < 5e-3
@@ -168,7 +168,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
     start = replace(
         guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag])), stable=False
     )
-    kept = refine(start, samples, [cao_zigzag], Refinement(), 20.0)
+    kept = refine(start, FitTask(samples, mariner, [cao_zigzag]), Refinement(), 20.0)
     assert kept.fit is start
     assert kept.report["decision"] == "not refined: the start runs away"
 

@@ -60,8 +60,10 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 
 def test_the_dense_dual_fits_by_its_own_multipliers_and_predicts_nothing(moments):
+    """What it predicts is rounding, another number in each run; its coefficients are never the ship's."""
     assert moments.training["classical"] > 0.99
-    assert moments.validation["classical"] < 0.0
+    assert moments.validation["classical"] < 0.99 < moments.validation["primal"]
+    assert max(abs(value / TABLE_11[name] - 1.0) for name, value in moments.classical.items()) > 0.5
 
 
 def test_truncated_and_primal_machines_predict(moments):

@@ -18,19 +18,7 @@ UNEVEN = 1e-3  # relative difference of time steps beyond which a record is filt
 
 
 def median(t: ArrayLike, values: ArrayLike, width: int = MEDIAN_WIDTH) -> Floats:
-    """Running median, which takes away spikes of up to half its width and keeps steps.
-
-    Parameters
-    ----------
-    t, values : array-like of shape (n_samples,)
-        s and the unit of the channel; the steps in time do not matter.
-    width : int
-        Samples, odd.
-
-    Returns
-    -------
-    array of shape (n_samples,)
-    """
+    """Running median of `width` samples, odd; takes away spikes of up to half its width and keeps steps."""
     found: Floats = median_filter(np.asarray(values, dtype=float), width, mode="nearest")
     return found
 

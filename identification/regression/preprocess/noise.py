@@ -14,22 +14,11 @@ NOISY = 0.02
 
 
 def noise_level(t: ArrayLike, values: ArrayLike) -> float:
-    """Standard deviation of the sample-to-sample noise of a channel.
+    """Standard deviation of the sample-to-sample noise of a channel, in its unit.
 
     Each sample is compared with the cubic through its two neighbours on either side; the median of the
-    differences is not moved by corners of the signal.
-
-    Parameters
-    ----------
-    t : array-like of shape (n_samples,)
-        s.
-    values : array-like of shape (n_samples,)
-        The channel.
-
-    Returns
-    -------
-    float
-        In the unit of the channel; 0 with fewer than five samples.
+    differences is not moved by corners of the signal. Times in s, of shape (n_samples,) as the values; 0 with
+    fewer than five samples.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5:
@@ -48,20 +37,7 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
 
 
 def noise_ratio(t: ArrayLike, values: ArrayLike, window: int = 1) -> float:
-    """Noise of the change over a window relative to the change itself (root mean squares).
-
-    Parameters
-    ----------
-    t, values : array-like of shape (n_samples,)
-        s and the unit of the channel.
-    window : int
-        Number of sampling steps.
-
-    Returns
-    -------
-    float
-        0 for a channel without noise.
-    """
+    """Noise of the change over a window of steps relative to the change itself (root mean squares)."""
     values = np.asarray(values, dtype=float)
     change = values[window:] - values[:-window]
     size = float(np.sqrt(np.mean(change**2))) if len(change) else 0.0

@@ -1,4 +1,4 @@
-"""Outliers and dropouts of a record: found, filled from their neighbours, and told."""
+"""Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
 
 from __future__ import annotations
 
@@ -23,21 +23,10 @@ MEASURED = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
 
 
 def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Flags:
-    """Samples away from the running median by several times the noise (Hampel 1974, JASA 69).
+    """Samples away from the running median by several times the noise (Hampel 1974, JASA 69), as flags.
 
     What the signal itself moves from sample to sample is allowed for by the running median's own steps, so
-    that corners of a clean signal are no outliers.
-
-    Parameters
-    ----------
-    t, values : array-like of shape (n_samples,)
-        s and the unit of the channel.
-    threshold : float
-        In standard deviations of the noise.
-
-    Returns
-    -------
-    array of bool of shape (n_samples,)
+    that corners of a clean signal are no outliers. The threshold is in standard deviations of the noise.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(values) < WIDTH:

@@ -18,18 +18,9 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     """Smooth a channel by a cubic spline whose stiffness generalised cross-validation picks.
 
     The natural smoothing spline of Reinsch 1967 (Numerische Mathematik 10); the trace in the criterion of
-    Craven & Wahba 1979 (Numerische Mathematik 31) is estimated by random signs (Girard 1989), always the
-    same ones.
-
-    Parameters
-    ----------
-    t, values : array-like of shape (n_samples,)
-        s and the unit of the channel.
-
-    Returns
-    -------
-    array of shape (n_samples,)
-        The values themselves where they are free of noise (`NOISY`) or fewer than five.
+    Craven & Wahba 1979 (Numerische Mathematik 31) is estimated by random signs (Girard 1989), always the same
+    ones. Times in s, of shape (n_samples,) as the values, which are returned as they are where they are free
+    of noise (`NOISY`) or fewer than five.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5 or noise_ratio(t, values) < NOISY:

@@ -299,7 +299,7 @@ def time_rows() -> Iterator[Row]:
                 best,
                 f"below {FAST:g}",
                 best < FAST,
-                f"the same search, by one decomposition; least of {REPEATS} on this estimator",
+                f"the same search, by one decomposition; least of {REPEATS} on this machine",
             )
 
 

@@ -142,7 +142,7 @@ def time_rows() -> Iterator[Row]:
             found,
             f"below {FAST:g}",
             found < FAST,
-            f"the thesis shows a picture; least of {FINE_REPEATS} on this estimator",
+            f"the thesis shows a picture; least of {FINE_REPEATS} on this machine",
         )
     for method in SEARCHES:
         few, many = (seconds(count, method) for count in TIMED)

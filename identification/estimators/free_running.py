@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.decomposition import decompose
 from identification.estimators.estimator import FitTask
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
-from identification.regression.decomposition import decompose
 from identification.search import get_optimiser
 from identification.validation.prediction import predict
 from shipgym.ships import ShipModel
@@ -20,23 +20,13 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 COMPARED = ("u", "v", "r")
-RAN_AWAY = 1e3  # counts as an error of so many times the motion
+RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The candidate.
-    trials : sequence of Trial
-        With u, v, r, psi and the rudder.
-
-    Returns
-    -------
-    float
-        0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
+    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
     """
     errors = []
     for trial in trials:

@@ -67,18 +67,10 @@ class Decomposition:
         return max(int(np.sum(s > threshold)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of the first directions; 0 for the others and those lost in rounding.
+        """Factors s / (s^2 + 1/C) of the first directions, shape (..., n_directions).
 
-        Parameters
-        ----------
-        C : float or array of shape (..., 1)
-            Weight of the errors; several give a row of factors each.
-        rank : int
-            Number of directions.
-
-        Returns
-        -------
-        array of shape (..., n_directions)
+        They are 0 beyond `rank` and for what is lost in rounding; several C of shape (..., 1) give a row
+        each.
         """
         s = self.singular_values
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -90,20 +82,8 @@ class Decomposition:
 def triangle(X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None) -> Floats:
     """Triangle of an orthogonal decomposition of [1 X y], without the ones where there is no intercept.
 
-    Parameters
-    ----------
-    X : array of shape (n_samples, n_features)
-        Features.
-    y : array of shape (n_samples,)
-        Targets.
-    fit_intercept : bool
-        Whether the ones come first.
-    weights : array of shape (n_samples,), optional
-        Of the squared errors.
-
-    Returns
-    -------
-    array of shape (n_columns, n_columns)
+    Features of shape (n_samples, n_features) and targets of shape (n_samples,); the weights are those of the
+    squared errors.
     """
     first = int(fit_intercept)
     table = np.empty((len(y), X.shape[1] + 1 + first), order="F")
