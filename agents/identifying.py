@@ -10,7 +10,7 @@ from identification.design.reduced import ReducedIdentification, identify_reduce
 from identification.estimators.methods import METHODS
 from identification.validation.comparison import Comparison, compare_methods
 from shipgym.errors import InputError
-from shipgym.ships.grey_box import GREY_BOX
+from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.identify_table import check_options
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial

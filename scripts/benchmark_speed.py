@@ -29,8 +29,9 @@ from rich.table import Table
 import shipgym
 from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
 from shipgym.checks import check_choice
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.records import LANES
 from shipgym.envs.registration import TASKS
-from shipgym.kernels import layout
 from shipgym.manoeuvres import zigzag
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.trials.sensors import Sensors
@@ -241,15 +242,15 @@ def batched_physics(name: str, n_ships: int, aim: str) -> Row:
     model = shipgym.load_model(name)
     random = np.random.default_rng(0)
     rudders = np.radians(30.0) * random.uniform(-1.0, 1.0, n_ships)
-    states = np.repeat(model.kernel_states(model.service_state[None]), n_ships, axis=0)
+    states = np.repeat(model.service_state[None], n_ships, axis=0)
     commands = np.column_stack([rudders, np.full(n_ships, model.service_shaft_speed)])
-    tiles, ships = n_ships // layout.LANES, model.ship_tile()[None]
+    tiles, ships = n_ships // LANES, model.ship_numbers()[None]
     tiled, orders = (
-        np.ascontiguousarray(a.reshape(tiles, layout.LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)
+        np.ascontiguousarray(a.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)
         for a in (states, commands)
     )
     h, steps = 0.01 * model.particulars["length"] / model.particulars["speed"], SHORT_STEPS // n_ships
-    advance, on_arrays = model.kernel("fleet").advance_batch, numpy_step(model)
+    advance, on_arrays = ship_loop(model.vessel, "alike"), numpy_step(model)
     columns, shafts = tuple(np.ascontiguousarray(states.T)), np.ascontiguousarray(commands[:, 1])
     compiled = steps * n_ships / best_time(lambda: advance(tiled, orders, h, steps, ships), SHORT_REPEATS)
     plain = n_ships / best_time(lambda: on_arrays(columns, rudders, shafts, h), SHORT_REPEATS)

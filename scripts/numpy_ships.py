@@ -1,6 +1,6 @@
-"""The kernels' own files run on NumPy arrays: what a batch of ships costs without compiling.
+"""The engine's own functions run on NumPy arrays: what a batch of ships costs without compiling.
 
-The files are rewritten mechanically: choices become `numpy.where`, least and largest become their NumPy
+The functions are rewritten mechanically: choices become `numpy.where`, least and largest become their NumPy
 functions, and sine, cosine, exponential and arc tangent are NumPy's own, which are faster on arrays than
 our polynomials.
 """
@@ -8,34 +8,43 @@ our polynomials.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
-from pathlib import Path
+import inspect
+import textwrap
+from collections.abc import Callable, Mapping
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from shipgym.kernels import layout
+from shipgym.engine import motion
+from shipgym.engine.motion import Motion, Push, Ship
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import named_globals
 
-KERNELS = Path(shipgym.__file__).parent / "kernels"
 Floats = NDArray[np.float64]
 Batch = tuple[Floats, ...]
 MATHEMATICS = {
-    "sqrt": np.sqrt, "fabs": np.abs, "floor": np.floor, "copysign": np.copysign, "pi": np.pi,
+    "sqrt": np.sqrt, "fabs": np.abs, "copysign": np.copysign,
     "minimum": np.minimum, "maximum": np.maximum, "where": np.where,
     "sin_cos": lambda x: (np.sin(x), np.cos(x)), "small_sin_cos": lambda x: (np.sin(x), np.cos(x)),
-    "small_cosine": np.cos, "exponential": np.exp, "arctan": np.arctan,
-    "arctan2": np.arctan2, "inlined": lambda function: function, "Any": Any,
+    "turn_sin_cos": lambda x: (np.sin(x), np.cos(x)), "small_cosine": np.cos, "exponential": np.exp,
+    "arctan2": np.arctan2,
 }  # fmt: skip
 
 
 class OnArrays(ast.NodeTransformer):
     """Turns choices between numbers into choices between the elements of arrays."""
 
+    def __init__(self, constants: Mapping[str, Any]) -> None:
+        self.constants = constants
+
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        """`a if c else b` becomes `where(c, a, b)`."""
+        """`a if c else b` becomes `where(c, a, b)`, unless c is known."""
         self.generic_visit(node)
+        if isinstance(node.test, ast.Name) and node.test.id in self.constants:
+            return node.body if self.constants[node.test.id] else node.orelse
         return ast.Call(ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], [])
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
@@ -43,17 +52,20 @@ class OnArrays(ast.NodeTransformer):
         name = {"min": "minimum", "max": "maximum"}.get(node.id, node.id)
         return ast.Name(name, node.ctx)
 
-    def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST | None:
-        """What would be imported is given."""
-        return node if node.module == "__future__" else None
 
-
-def on_arrays(source: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Names that a file of kernels defines, its functions working on arrays."""
-    tree = ast.fix_missing_locations(OnArrays().visit(ast.parse(source)))
-    namespace = {**MATHEMATICS, **given}
-    exec(compile(tree, "<kernels on arrays>", "exec"), namespace)
-    return namespace
+def on_arrays(function: Any, parts: Mapping[str, Any]) -> Any:
+    """A plain function of the engine and all that it calls, working on arrays."""
+    namespace: dict[str, Any] = dict(MATHEMATICS)
+    for name, found in named_globals(function, parts):
+        value = found.function if isinstance(found, Part) else found
+        if name not in MATHEMATICS:
+            namespace[name] = on_arrays(value, parts) if isinstance(value, FunctionType) else value
+    source = textwrap.dedent(inspect.getsource(function))
+    tree = ast.fix_missing_locations(OnArrays(namespace).visit(ast.parse(source)))
+    exec(compile(tree, "<on arrays>", "exec", dont_inherit=False), {**namespace, "Any": Any}, made := {})
+    made_function = made[function.__name__]
+    made_function.__globals__.update(namespace)
+    return made_function
 
 
 def numpy_step(
@@ -71,21 +83,21 @@ def numpy_step(
     Returns
     -------
     callable
-        From the state (10 arrays of shape (n_ships,), `layout.STATE_NAMES`), rudder command, shaft command
-        and step to the state after it.
+        From the state (arrays of shape (n_ships,) in the order of `state_names`), rudder command, shaft
+        command and step to the state after it.
     """
-    rows = {name: value for name, value in vars(layout).items() if name.isupper()}
-    ship = on_arrays(model.accelerations_source, rows)
-    names = ("ROLL", "SHAFT", "accelerations", "shaft_acceleration")
-    motion = on_arrays(
-        (KERNELS / "motion.py").read_text(encoding="utf-8"),
-        rows | {name: ship[name] for name in names} | {"WEATHER": False},
-    )
-    tile = model.ship_tile(depth)
+    sail = on_arrays(motion.sail, model.vessel.parts())
+    numbers = model.ship_numbers(depth)
+    ship = Ship(*numbers[: len(Ship._fields)])
+    coefficients = model.vessel.coefficients(*numbers[len(ship) :])
+    calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     def step(state: Batch, rudder: Floats, shaft: Floats, h: float) -> Batch:
+        known = dict(zip(model.state_names, state, strict=True))
+        zero = np.zeros_like(rudder)
+        start = Motion(**{name: known.get(name, zero) for name in Motion._fields})
         with np.errstate(divide="ignore"):  # of the branch that is not chosen
-            after: Batch = motion["runge_kutta"](state, rudder, shaft, h, motion["CALM"], tile, 0)
-        return after
+            after = sail(start, rudder, shaft, h, calm, coefficients, ship)
+        return tuple(getattr(after, name) for name in model.state_names)
 
     return step

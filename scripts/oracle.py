@@ -46,15 +46,14 @@ from agents.rollouts.rollout import episode_costs, rollout
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
 from shipgym.checks import check_number, check_whole
-from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.envs.engine import Engine
-from shipgym.envs.task import INTEGRAL_ZONE, Task
-from shipgym.envs.variety import Variety
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
-from shipgym.kernels.course_keeping import NEXT_CHANGE
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import Task, observation_scales
 
 Floats = NDArray[np.float64]
 Rudder = NDArray[np.float32]
@@ -141,7 +140,7 @@ def run_oracle(
     seeds: ArrayLike,
     start: Policy | None = None,
     settings: OracleSettings | None = None,
-    variety: Variety | None = None,
+    variety: Randomisation | None = None,
 ) -> OracleRun:
     """Steer episodes as well as sampling on the true ship can.
 
@@ -157,7 +156,7 @@ def run_oracle(
         What each plan begins with; by default `LQ.from_model(model)`.
     settings : OracleSettings, optional
         How hard is searched.
-    variety : Variety, optional
+    variety : Randomisation, optional
         What differs from episode to episode beside the task's own.
 
     Returns
@@ -233,7 +232,7 @@ class _Ships:
         self.engine.copy_lanes(source.engine, lanes)
         self.integral, self.over = source.integral[lanes], source.over[lanes]
         if keep_course:
-            self.engine.write(NEXT_CHANGE, np.inf)
+            self.engine.write("next_change", np.inf)
 
 
 class _Search:
@@ -241,13 +240,13 @@ class _Search:
 
     def __init__(
         self, engine: Engine, seeds: NDArray[Any], feedback: Controller, settings: OracleSettings,
-        variety: Variety | None,
+        variety: Randomisation | None,
     ) -> None:  # fmt: skip
         self.task, self.seeds, self.settings, self.variety = engine.task, seeds, settings, variety
         self.n = len(seeds)
         self.ships = _Ships(engine, feedback)
         self._sizes: dict[int, _Ships] = {}
-        self._changes_course = isinstance(engine.task, CourseKeepingTask)
+        self._changes_course = not engine.task.follows_path
         self._ordered = np.zeros(
             (self.n, engine.task.episode_steps), dtype=np.bool_
         )  # a new course at this step

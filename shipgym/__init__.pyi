@@ -15,10 +15,12 @@ from .sea.conditions import Waves as Waves
 from .sea.conditions import Weather as Weather
 from .sea.conditions import Wind as Wind
 from .sea.conditions import sea_states as sea_states
+from .ships import ShipEquations as ShipEquations
 from .ships import ShipModel as ShipModel
 from .ships import list_models as list_models
 from .ships import list_structures as list_structures
 from .ships import load_model as load_model
+from .ships import register_ship_equations as register_ship_equations
 from .ships import register_structure as register_structure
 from .ships.checker import ModelCheck as ModelCheck
 from .ships.checker import check_ship_model as check_ship_model

@@ -36,7 +36,6 @@ from agents.controllers.registry import controller_class, controller_kinds, regi
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import did_you_mean, quoted
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
@@ -241,7 +240,7 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not isinstance(source, str):
         return [_policy(run, task) for run in (source if isinstance(source, Sequence) else [source])]
     if source in controller_kinds():
-        led = controller_class(source).has_autopilot and not isinstance(task.task, PathFollowingTask)
+        led = controller_class(source).has_autopilot and not task.task.follows_path
         return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
         return [tuned(source.removeprefix(TUNED), task, suite)]

@@ -24,9 +24,8 @@ from agents.controllers.los_autopilot import CRITICAL
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
+from shipgym.tasks.steering import RUDDER_WEIGHT
 
 Floats = NDArray[np.float64]
 
@@ -147,7 +146,7 @@ def tunable(task: BenchmarkTask) -> tuple[str, ...]:
     Guidance laws need a path to follow, `lq-adaptive` a ship whose sway is described.
     """
     without = set[str]()
-    if not isinstance(task.task, PathFollowingTask):
+    if not task.task.follows_path:
         without |= {*LAWS}
     if not has_sway(task.ship):
         without |= {"lq-adaptive"}
@@ -205,7 +204,7 @@ def is_sane(controller: Controller) -> bool:
 def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     """What is searched of a controller: alternatives, each a list of settings, the design's own first."""
     if kind in LAWS:
-        if not isinstance(task.task, PathFollowingTask):
+        if not task.task.follows_path:
             raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]

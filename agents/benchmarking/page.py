@@ -23,7 +23,6 @@ from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
 from agents.suites.suite import N_EPISODES, load_suite
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.files import write_text
 from shipgym.pages import plotly_script, render
 
@@ -169,7 +168,7 @@ def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]
     if not episodes:
         return {}
     found = {"histories": histories_figure(episodes, result.ranking)}
-    if isinstance(load_suite(result.summary["suite"]["name"]).task(task).task, PathFollowingTask):
+    if load_suite(result.summary["suite"]["name"]).task(task).task.follows_path:
         found["tracks"] = tracks_figure(episodes, result.ranking)
     return found
 

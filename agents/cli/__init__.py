@@ -12,16 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import (
-    FAILED,
-    Address,
-    EngineName,
-    Json,
-    ShipFileArgument,
-    Workers,
-    answered,
-    fail,
-)
+from agents.cli.command import FAILED, Address, EngineName, Json, ShipFileArgument, Workers, answered, fail
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.identify_options import takes_identify_options
@@ -171,10 +162,10 @@ def autopilot_command(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
             where=JobEngine(engine, workers, address),
         )  # fmt: skip
-    _told(result, out / "report.html", draws, as_json)
+    _print_result(result, out / "report.html", draws, as_json)
 
 
-def _told(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
     """Print the result of the chain; fail for an unstable model."""
     from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
     from agents.cli.terminal import out as console

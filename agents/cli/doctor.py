@@ -14,7 +14,7 @@ from platformdirs import user_cache_path
 from rich.markup import escape
 
 import shipgym
-from shipgym.engine.compiled import CACHE_VARIABLE
+from shipgym.engine.compiling import CACHE_VARIABLE
 
 NEEDED = (
     "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",

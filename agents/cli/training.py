@@ -74,7 +74,7 @@ def train_command(
         own, seed, randomise, threads,
     )  # fmt: skip
     result = _train(given, out, resume, max_seconds, as_json)
-    _told(result, out, as_json)
+    _print_result(result, out, as_json)
 
 
 def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_json: bool) -> TrainingResult:
@@ -105,8 +105,8 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_
         raise  # not reached: `fail` leaves
 
 
-def _told(result: TrainingResult, out: Path, as_json: bool) -> None:
-    """Print what came out."""
+def _print_result(result: TrainingResult, out: Path, as_json: bool) -> None:
+    """Print costs, and where the agent was written."""
     from agents.cli.terminal import out as console
     from agents.cli.terminal import print_json
 
@@ -116,7 +116,7 @@ def _told(result: TrainingResult, out: Path, as_json: bool) -> None:
     if result.resumed_from is not None:
         console.print(f"resumed at step {result.resumed_from:,}")
     lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"
-    found = f"cost of an episode held out: {result.best_cost:.2f}{lq}"
+    found = f"cost of a held-out episode: {result.best_cost:.2f}{lq}"
     console.print(f"{found} (step {result.best_steps:,} of {result.steps:,})", soft_wrap=True)
     reached = result.lq_reached
     if reached is not None:

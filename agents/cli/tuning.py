@@ -57,7 +57,7 @@ def tune_command(
     address: Address = None,
     as_json: Json = False,
 ) -> None:
-    """Seek the settings with which an agent learns best (Optuna), and write them for `train --settings`.
+    """Search the settings with which an agent learns best (Optuna), and write them for `train --settings`.
 
     Four trials are proposed at a time, so more than four workers are of no use. Killed at any moment, the
     same command goes on with the trials that were not done.
@@ -81,11 +81,11 @@ def tune_command(
     with progress_bars(not as_json) as bars:
         tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
         found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
-    _told(found, out, as_json)
+    _print_result(found, out, as_json)
 
 
-def _told(found: Tuning, out: Path, as_json: bool) -> None:
-    """Print what came out."""
+def _print_result(found: Tuning, out: Path, as_json: bool) -> None:
+    """Print trials and where the best settings are."""
     from dataclasses import asdict
 
     from agents.cli.terminal import out as console

@@ -21,10 +21,10 @@ from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
 from identification.estimators.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import LARGEST_RUDDER, linearise, straight_running
+from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL
 
 # Sway and yaw acceleration each are explained by sway, yaw rate, rudder and what is always there, in the

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER
-from shipgym.envs.task import RUDDER_WEIGHT
+from shipgym.tasks.steering import RUDDER_WEIGHT
 
 Floats = NDArray[np.float64]
 

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import SCALE_TOLERANCE, Policy, check_names
 from shipgym.checks import check_whole
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
-from shipgym.envs.task import Task
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
+from shipgym.tasks.task import Task, course_keeping_task
 
 Observations = NDArray[np.float32]
 
@@ -51,7 +50,7 @@ def check_controller(
     """
     check_whole(n_steps, "n_steps", at_least=2)
     ship = load_model("mariner") if model is None else model
-    asked = CourseKeepingTask() if task is None else task
+    asked = course_keeping_task() if task is None else task
     who = type(controller).__name__
     _check_signature(controller, who)
     _check_observations(controller, ship, asked, who)

@@ -25,10 +25,10 @@ from agents.controllers.linear_loop import (
     sample_ship,
 )
 from agents.controllers.memory import checked_observation, heading_error
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
 Floats = NDArray[np.float64]
 Action = NDArray[np.float32]
@@ -41,11 +41,7 @@ class Policy(Protocol):
     """Anything that steers: our controllers, stable-baselines3's agents, a user's own."""
 
     def predict(
-        self,
-        observation: Any,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Any, Any]:
         """Commands for one or many observations, with the signature of stable-baselines3.
 
@@ -196,11 +192,7 @@ class Controller:
         return self.kind
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; nothing is remembered, and the state is returned as given."""
         seen = checked_observation(observation, self.observation_names)

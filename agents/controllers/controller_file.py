@@ -27,14 +27,7 @@ import numpy as np
 from agents.controllers.controller import FORMAT, Controller, check_names
 from agents.controllers.linear_loop import Margins
 from agents.controllers.registry import controller_class, controller_kinds
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    quoted,
-)
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.errors import InputError
 
 REMEDY = "design the controller again or take another copy"

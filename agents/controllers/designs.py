@@ -12,7 +12,6 @@ from agents.controllers.controller import Controller, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 
@@ -46,7 +45,7 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     if not made.has_autopilot:
         written = json.dumps(dict(given), sort_keys=True)
         return _designed(made, _Ship(task.ship), task.task.interval(task.ship), written)
-    if not isinstance(task.task, PathFollowingTask):
+    if not task.task.follows_path:
         raise no_path(kind, task)
     inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
     own = {key: value for key, value in given.items() if not key.startswith(INNER)}

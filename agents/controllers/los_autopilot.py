@@ -23,12 +23,11 @@ from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats, begun, checked_observation
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.task import INTEGRAL_ZONE
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import OBSERVATION_NAMES, Task, path_following_task
 
 N_HEADING = len(OBSERVATION_NAMES)
 CRITICAL = 4.0  # integral time over lookahead time with which s^2 + s / T + 1 / (T Ti) has a double root
@@ -59,7 +58,7 @@ class Guided(Controller):
         model: ShipModel,
         *,
         autopilot: Policy | None = None,
-        task: PathFollowingTask | None = None,
+        task: Task | None = None,
         lookahead_lengths: float | None = None,
         integral_lengths: float | None = None,
     ) -> Self:
@@ -71,7 +70,7 @@ class Guided(Controller):
             The ship.
         autopilot : Policy, optional
             Any heading autopilot, also one that was learned; by default `LQ.from_model(model)`.
-        task : PathFollowingTask, optional
+        task : Task, optional
             Its lookahead, corridor and control interval are used; by default the environment's own.
         lookahead_lengths : float, optional
             Ship lengths; by default that of the task. Longer turns gentler, shorter comes back sooner.
@@ -85,7 +84,7 @@ class Guided(Controller):
         InputError
             If an argument is out of its range or the autopilot was designed for another ship.
         """
-        asked = task or PathFollowingTask()
+        asked = task or path_following_task()
         length = model.particulars["length"]
         if lookahead_lengths is None:
             lookahead_lengths = asked.lookahead
@@ -134,11 +133,7 @@ class Guided(Controller):
         """
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
         given = checked_observation(observation, self.observes).copy()

@@ -25,8 +25,9 @@ from agents.controllers.linear_loop import (
     sample_ship,
 )
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.ships import ShipModel
+from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.task import control_interval
 
 Floats = NDArray[np.float64]
 

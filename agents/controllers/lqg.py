@@ -28,10 +28,10 @@ from agents.controllers.lq import LQ, lq_gain, lq_settings
 from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise
 from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL
 
 OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states

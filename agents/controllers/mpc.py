@@ -25,9 +25,9 @@ from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RATE_WEIGHT, RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
 
 ACCURACY = 1e-4  # of the solver, rad
 MOST_ITERATIONS = 20_000

@@ -15,9 +15,10 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import length_time, rate_weight, sample_ship
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
+from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.task import control_interval
 
 # Measured by the environment's cost on ships stable and unstable, gears slow and fast, and lags up to half
 # a ship length: with these the PID costs at most 1.1 times its best, 1.2 times in course changes of 5 deg.

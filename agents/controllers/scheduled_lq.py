@@ -17,9 +17,9 @@ from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import RUDDER_WEIGHT
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.steering import RUDDER_WEIGHT
 
 SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed
 

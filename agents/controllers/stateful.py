@@ -43,11 +43,7 @@ class Stateful(Controller):
         """
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; the state is an array of shape (memory_size,) or (n, memory_size)."""
         n = len(self.observation_names)

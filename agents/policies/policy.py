@@ -26,11 +26,16 @@ from agents.policies.network import Network
 from agents.policies.policy_extraction import sb3_fields
 from agents.policies.weights_file import Tensors, as_json, write_policy
 from shipgym.checks import check_choice, check_number, check_whole
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.task import ACTIONS, RUDDER_ORDERS, Observed, Task
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import (
+    ACTIONS,
+    RUDDER_ORDERS,
+    Observed,
+    Task,
+    course_keeping_task,
+    path_following_task,
+)
 
 Numbers = NDArray[np.float32]
 
@@ -152,11 +157,7 @@ class LearnedPolicy:
         """The state with which an episode begins: None, whatever the number of ships."""
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
 
@@ -242,12 +243,13 @@ class LearnedPolicy:
 
     def _observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What its environment shows of a ship."""
-        task: type[Task] = PathFollowingTask if "cross_track" in self.observation_names else CourseKeepingTask
+        make = path_following_task if "cross_track" in self.observation_names else course_keeping_task
         known = {"action": self.action, "roll": "roll" in self.observation_names, **self.env_options}
-        fields = task.__dataclass_fields__
-        asked = task.from_options({name: known[name] for name in SHOWING if name in known and name in fields})
+        names = Task.option_names(make().definition)
+        asked = make(**{name: known[name] for name in SHOWING if name in known and name in names})
         asked.check_fits(model)
-        return asked.observed(model)
+        shown: tuple[Observed, ...] = asked.observed(model)
+        return shown
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""

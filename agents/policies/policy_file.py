@@ -48,9 +48,9 @@ from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
 from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, quoted
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
 from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
+from shipgym.tasks.task import OBSERVATION_NAMES
 
 LEARNED = (
     "format", "kind", "observation_names", "observation_scales", "action", "network", "frame_stack", "base",

@@ -31,10 +31,9 @@ from agents.controllers.memory import Flags, Floats, begun
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
-from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import Envelope, ShipModel
+from shipgym.tasks.task import OBSERVATION_NAMES, control_interval
 
 # what is remembered of each ship
 STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)
@@ -128,9 +127,9 @@ class Shielded:
     Attributes
     ----------
     policy : Policy
-        Who steers; any, also one that was learned.
+        The policy that steers; any, also a learned one.
     fallback : Controller
-        Who takes over: the rudder alone, a shaft stays with the policy.
+        Takes over the rudder; the shaft stays with the policy.
     dt : float
         Control interval, s.
     envelope : Envelope or None
@@ -174,7 +173,7 @@ class Shielded:
         model : ShipModel
             The ship; if it has an envelope the shield knows it.
         policy : Policy
-            Who steers.
+            The policy that steers.
         fallback : Controller, optional
             By default `LQ.from_model(model)`.
         dt : float, optional
@@ -212,11 +211,7 @@ class Shielded:
         """The state with which an episode begins: None, whatever the number of ships."""
 
     def predict(
-        self,
-        observation: ArrayLike,
-        state: Any = None,
-        episode_start: Any = None,
-        deterministic: bool = True,
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, ShieldState]:
         """See `Policy.predict`: the policy's commands, or those with the fallback's rudder."""
         given = np.asarray(observation)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,15 +13,15 @@ from agents.controllers.controller import Policy
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
 from shipgym.checks import check_number
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, CourseKeepingTask, observation_scales
-from shipgym.envs.task import INTEGRAL_ZONE
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import OBSERVATION_NAMES, Task, course_keeping_task, observation_scales
 
 Floats = NDArray[np.float64]
 
-RECORDED = ("psi", "delta", "set_point", *CourseKeepingTask.info_names)
+RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory
 STEP_LENGTHS = 16.0  # duration of a step response, in times to travel one ship length
 LARGEST_STEP_DEG = 60.0  # so that an overshoot is not yet loss of control
@@ -86,7 +86,7 @@ class StepResponses(NamedTuple):
 def sail(
     controller: Policy,
     models: ShipModel | Sequence[ShipModel],
-    task: CourseKeepingTask | None = None,
+    task: Task | None = None,
     seeds: ArrayLike = 0,
     *,
     allow_unstable: bool = False,
@@ -99,7 +99,7 @@ def sail(
         Anything with `predict`; it is given the observations of all ships together.
     models : ShipModel or sequence of ShipModel
         One ship for all episodes, or several of one structure.
-    task : CourseKeepingTask, optional
+    task : Task, optional
         What is asked; by default the environment's own task.
     seeds : array-like of int
         Seeds of the episodes. With several models: one for all, or of shape (n_models,), one each, or
@@ -121,12 +121,12 @@ def sail(
     fleet = _fleet(models)
     numbers = _seeds(seeds, len(fleet))
     lanes = [model for model in fleet for _ in range(numbers[0].size)] if len(fleet) > 1 else fleet
-    check_fits(controller, task or CourseKeepingTask(), lanes[0], f"model '{lanes[0].name}'")
+    check_fits(controller, task or course_keeping_task(), lanes[0], f"model '{lanes[0].name}'")
     found = []
     for first in range(0, numbers.size, AT_ONCE):
         some = numbers.reshape(-1)[first : first + AT_ONCE]
         ships = lanes[first : first + AT_ONCE] if len(fleet) > 1 else fleet
-        engine = CourseKeepingEngine(ships, some.size, task, allow_unstable=allow_unstable)
+        engine = Engine(ships, some.size, task, allow_unstable=allow_unstable)
         found.append(_figures(rollout(controller, engine, some, record=RECORDED)))
     joined = {
         name: np.concatenate([part[name] for part in found]).reshape(numbers.shape) for name in found[0]
@@ -167,7 +167,7 @@ def step_response(
     models: ShipModel | Sequence[ShipModel],
     step_deg: float = 20.0,
     duration: float | None = None,
-    task: CourseKeepingTask | None = None,
+    task: Task | None = None,
     *,
     allow_unstable: bool = False,
 ) -> StepResponses:
@@ -183,7 +183,7 @@ def step_response(
         Change of course, degrees, positive to starboard.
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
-    task : CourseKeepingTask, optional
+    task : Task, optional
         Its control interval and bounds are used.
     allow_unstable : bool
         As in `sail`.
@@ -199,15 +199,15 @@ def step_response(
     """
     fleet = _fleet(models)
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
-    check_fits(controller, task or CourseKeepingTask(), fleet[0], f"model '{fleet[0].name}'")
+    check_fits(controller, task or course_keeping_task(), fleet[0], f"model '{fleet[0].name}'")
     length_time = fleet[0].particulars["length"] / fleet[0].particulars["speed"]
     if duration is None:
         duration = STEP_LENGTHS * length_time
     check_number(duration, "duration", above=0.0)
-    asked = task or CourseKeepingTask()
+    asked = task or course_keeping_task()
     steps = int(np.ceil(duration / asked.interval(fleet[0])))
-    straight = replace(asked, course_change_deg=0.0, episode_steps=steps)
-    engine = CourseKeepingEngine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
+    straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
+    engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     course = _ShiftedCourse(engine, np.radians(step_deg))
     seeds = np.zeros(len(fleet), dtype=np.int64)
     states = rollout(controller, engine, seeds, record=RECORDED, show=course.shown).states
@@ -223,7 +223,7 @@ def step_response(
 class _ShiftedCourse:
     """Shows ships that keep their course in the engine another course, the same step away for all."""
 
-    def __init__(self, engine: CourseKeepingEngine, step: float) -> None:
+    def __init__(self, engine: Engine, step: float) -> None:
         self.engine = engine
         self.step = step
         self.reach = observation_scales(engine.model)[-1]

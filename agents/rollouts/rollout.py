@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import Policy
 from agents.policies.shield import ShieldState, interventions
 from shipgym.envs.engine import Engine
-from shipgym.envs.task import Task
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import Task
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

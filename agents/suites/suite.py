@@ -28,20 +28,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text, did_you_mean, quoted
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
-from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.ship_env import read_options
-from shipgym.envs.task import Task
-from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import Task
 
-#: Environments by their names in suites and on the command line: id, and class of task.
-ENVIRONMENTS: Mapping[str, tuple[str, type[Task]]] = {
-    "course-keeping": ("shipgym/CourseKeeping-v0", CourseKeepingTask),
-    "path-following": ("shipgym/PathFollowing-v0", PathFollowingTask),
+#: Environments by their names in suites and on the command line: id, and task.
+ENVIRONMENTS: Mapping[str, tuple[str, str]] = {
+    "course-keeping": ("shipgym/CourseKeeping-v0", "CourseKeeping"),
+    "path-following": ("shipgym/PathFollowing-v0", "PathFollowing"),
 }
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
@@ -85,8 +83,8 @@ class BenchmarkTask:
         return ENVIRONMENTS[self.environment][0]
 
     @cached_property
-    def parts(self) -> tuple[ShipModel, Task, Variety]:
-        """Ship, task and variety of the environment."""
+    def parts(self) -> tuple[ShipModel, Task, Randomisation]:
+        """Ship, task and domain randomisation of the environment."""
         return read_options(ENVIRONMENTS[self.environment][1], self.model, self.options)
 
     @property

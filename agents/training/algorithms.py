@@ -27,8 +27,6 @@ from agents.training.settings import (
 )
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
-from shipgym.kernels import layout
-from shipgym.kernels import voyage_rows as rows
 
 ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 #: Settings that do not go to the algorithms' classes as keywords of the same name.
@@ -47,12 +45,8 @@ class StaggeredShips(ShipVecEnv):
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each row, each of them of another age."""
         observations: NDArray[np.float32] = super().reset()
-        memory = self.memory()
-        ages = memory["states"][:, rows.STEPS : rows.STEPS + layout.LANES]
-        lanes = np.arange(self.num_envs)
         longest = self.vector_env.task.episode_steps
-        ages[lanes // layout.LANES, lanes % layout.LANES] += lanes * longest // self.num_envs
-        self.remember(memory)
+        self.vector_env.write("steps", np.arange(self.num_envs) * longest // self.num_envs)
         return observations
 
 

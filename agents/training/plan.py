@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from agents.controllers.controller import model_hash
+from agents.policies.weights_file import as_json
 from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, load_suite
 from agents.training.settings import (
     ALGORITHMS,
@@ -109,7 +110,7 @@ class Plan:
             "environment": self.task.environment,
             "model": self.task.model,
             "model_sha256": model_hash(self.task.ship),
-            "options": {name: _plain(value) for name, value in self.task.options.items()},
+            "options": as_json(self.task.options),
             "randomise": self.randomise,
             "seed": self.seed,
             "settings": self.settings.to_dict(),
@@ -263,15 +264,6 @@ def _sails(plan: Plan, sea: Weather) -> bool:
     return True
 
 
-def _plain(value: Any) -> Any:
-    """An option in JSON."""
-    if isinstance(value, Weather):
-        return value.to_dict()
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [_plain(one) for one in value]
-    return str(value) if isinstance(value, Path) else value
-
-
 def _read(value: Any, name: str) -> Any:
     """An option from JSON."""
     if isinstance(value, Mapping):
@@ -280,7 +272,7 @@ def _read(value: Any, name: str) -> Any:
 
 
 def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], where: str = "") -> str | None:
-    """The first entry in which two configurations differ, with both values; None where they are alike."""
+    """The first entry in which two configurations differ, with both values; None if they are the same."""
     for name in [*expected, *(name for name in found if name not in expected)]:
         one, other = found.get(name), expected.get(name)
         if isinstance(one, Mapping) and isinstance(other, Mapping):

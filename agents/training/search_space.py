@@ -42,12 +42,7 @@ SPACES: Mapping[str, Mapping[str, BaseDistribution]] = {
         "log_std_init": Reals(-3.0, 0.5),
     },
     "sac": {**ALL, **OFF_POLICY, **ENTROPY},
-    "td3": {
-        **ALL,
-        **OFF_POLICY,
-        "action_noise": Reals(0.03, 0.5, log=True),
-        "policy_delay": Wholes(1, 8),
-    },
+    "td3": {**ALL, **OFF_POLICY, "action_noise": Reals(0.03, 0.5, log=True), "policy_delay": Wholes(1, 8)},
     "tqc": {**ALL, **OFF_POLICY, **ENTROPY, "top_quantiles_to_drop": Wholes(0, 5)},
 }
 #: Settings that stand behind parameters of other names.

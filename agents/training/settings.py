@@ -22,8 +22,8 @@ from typing import Any
 from agents.controllers.registry import controller_kinds
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
-from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
+from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED, AUTO = "running", "learned", "auto"

@@ -1,4 +1,4 @@
-"""Tuning: settings of an algorithm sought by Optuna, many trainings at once, resumed after any end.
+"""Tuning: settings of an algorithm searched with Optuna, many trainings at once, resumable.
 
 Trials are proposed in batches of four by a tree-structured Parzen estimator (Bergstra et al. 2011) that knows
 the batches before, so that what is found does not depend on how many trials are trained at once or where. The
@@ -32,7 +32,7 @@ except ModuleNotFoundError:
 
 optuna.logging.set_verbosity(optuna.logging.WARNING)
 
-#: Trials proposed at once: so many workers are of use.
+#: Trials proposed at once: more workers are of no use.
 BATCH = 4
 #: Finished trials, and share of a training, before any is stopped early.
 TRIALS_BEFORE_STOPPING, SHARE_BEFORE_STOPPING = 4, 0.25
@@ -91,12 +91,12 @@ def tune(
     progress: Callable[[int, int, float | None], None] | None = None,
     training: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
 ) -> Tuning:
-    """Seek settings with which an agent learns a task best; a study that is there already goes on.
+    """Search the settings with which an agent learns a task best; a study that is there goes on.
 
     Parameters
     ----------
     plan : Plan
-        What is learned, with the settings to begin from; every trial has its seed.
+        What is learned, with the settings to begin from and the seed of every trial.
     out : str or Path
         Folder of the study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is
         there as soon as a trial has finished and is settings for training.
@@ -109,7 +109,7 @@ def tune(
     progress : callable, optional
         Called with the trials done, their total and the best cost.
     training : callable, optional
-        In the place of `train_trial`: a job in, cost, curve and how it ended out.
+        Used instead of `train_trial`: takes a job, returns cost, curve and how it ended.
 
     Raises
     ------
@@ -269,7 +269,7 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
 
 
 def _record(study: optuna.Study, found: Sequence[Trial], plan: Plan, fixed: Sequence[str]) -> None:
-    """Add to the study what it does not have yet: it may have been written until anywhere."""
+    """Add to the study what it does not have yet: an interruption may have left it incomplete."""
     there = {trial.user_attrs.get("number") for trial in study.trials}
     space = search_space(plan.algorithm, fixed)
     study.add_trials([_frozen(trial, space) for trial in found if trial.number not in there])

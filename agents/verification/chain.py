@@ -22,12 +22,12 @@ from agents.verification.monte_carlo import monte_carlo
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
 from shipgym.plots import graph_objects
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
+from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.ship_file import ShipFile
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ def verify(
 
 def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     """Refuse a guest that was not made for keeping this ship's course."""
-    task = CourseKeepingTask()
+    task = course_keeping_task()
     names = [one.name for one in task.observed(model)]
     if more := [name for name in guest.observation_names if name not in names]:
         raise InputError(

@@ -26,7 +26,6 @@ from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import is_course_stable
-from shipgym.ships.model_file import model_fields, read_model
 
 DRAWS_A_JOB = 25
 
@@ -110,7 +109,7 @@ def draw_jobs(
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another computer may draw others in the last digit."""
     common = {
-        "model": model_fields(replace(model, covariance=None)),
+        "model": replace(model, covariance=None).to_dict(),
         "controllers": [controller.to_dict() for controller in controllers],
     }
     return [
@@ -126,7 +125,7 @@ def draw_jobs(
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     """Manoeuvres, course stability and episodes of some draws."""
-    model = read_model(job["model"], "model")
+    model = ShipModel.from_dict(job["model"])
     draws = [
         replace(model, name=name, coefficients=dict(zip(model.coefficients, values, strict=True)))
         for name, values in zip(job["names"], job["coefficients"], strict=True)

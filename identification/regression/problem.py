@@ -16,7 +16,7 @@ from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, get_structure
-from shipgym.ships.grey_box import GREY_BOX
+from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options

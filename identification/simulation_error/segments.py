@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from identification.regression import preprocess
 from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
-from shipgym.kernels import layout
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.records import LANES
 from shipgym.ships import ShipModel
 from shipgym.ships.simulate import LONGEST_STEP
 from shipgym.trials.trial import Trial
@@ -43,7 +44,7 @@ class Segment:
     times : array of shape (n_blocks,)
         When the blocks begin, s.
     start : array of shape (n_state,)
-        State of the kernels at the first sample.
+        State at the first sample, in the order of the model's `state_names`.
     weight : float
         Of its squared residuals.
     """
@@ -81,7 +82,7 @@ def cut(
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
-            states, rudder = _states(piece, smooth), _rudder(piece, model)
+            states, rudder = _states(piece, model, smooth), _rudder(piece, model)
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
                 segments += [
@@ -101,10 +102,10 @@ def _edges(t: Floats, duration: float, shift: float) -> Integers:
     return np.asarray(edges[apart] if len(t) > FEWEST_SAMPLES else edges[[0, -1]])
 
 
-def _states(trial: Trial, smooth: Callable[[Floats, Floats], Floats]) -> Floats:
-    """States of the kernels along a trial, smoothed, shape (n_samples, n_state)."""
-    states = np.zeros((len(trial), layout.N_STATE))
-    for k, name in enumerate(layout.STATE_NAMES):
+def _states(trial: Trial, model: ShipModel, smooth: Callable[[Floats, Floats], Floats]) -> Floats:
+    """States along a trial, smoothed, shape (n_samples, n_state)."""
+    states = np.zeros((len(trial), len(model.state_names)))
+    for k, name in enumerate(model.state_names):
         if name in trial and name not in ("x", "y"):
             states[:, k] = trial[name] if name in ("delta", "n") else smooth(trial.t, trial[name])
     return states
@@ -188,11 +189,11 @@ class Shooter:
         self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool, offsets: bool
     ) -> None:
         self.model, self.channels, self.sizes = model, tuple(channels), term_sizes
-        self.columns = [layout.STATE_NAMES.index(name) for name in channels]
+        self.columns = [model.state_names.index(name) for name in channels]
         self.free = self.columns if free else []
         self.offsets = offsets
-        self.sail = model.kernel("segments").sail
-        self.column = model.ship_column()
+        self.sail = ship_loop(model.vessel, "segments")
+        self.numbers = model.ship_numbers()
         ship = model.particulars
         units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
         units["p"] = units["r"]
@@ -262,17 +263,17 @@ class Shooter:
         """Simulated channels, and their derivatives by coefficients, rudder offset and start."""
         n_terms, n_free = len(parameters), len(self.free)
         n_moves = n_terms + 1 + n_free
-        column = self.column.copy()
-        column[layout.row(layout.COEFFICIENTS) :] = parameters * self.sizes
-        first = layout.row(layout.COEFFICIENTS)
+        n_state, first = len(segment.start), len(self.numbers) - n_terms  # the terms' come last
+        numbers = self.numbers.copy()
+        numbers[first:] = parameters * self.sizes
         slopes = np.empty((len(segment.measured), len(self.channels), n_moves))
         nominal = np.empty((len(segment.measured), len(self.channels)))
-        for begin in range(0, n_moves, layout.LANES - 1):
-            moves = np.arange(begin, min(begin + layout.LANES - 1, n_moves))
+        for begin in range(0, n_moves, LANES - 1):
+            moves = np.arange(begin, min(begin + LANES - 1, n_moves))
             lanes = np.arange(1, len(moves) + 1)
-            ship = np.repeat(column, layout.LANES).reshape(-1, layout.LANES)
-            state = np.repeat(segment.start, layout.LANES).reshape(-1, layout.LANES)
-            offsets = np.full(layout.LANES, offset)
+            ship = np.repeat(numbers, LANES).reshape(-1, LANES)
+            state = np.repeat(segment.start, LANES).reshape(-1, LANES)
+            offsets = np.full(LANES, offset)
             for lane, move in zip(lanes.tolist(), moves.tolist(), strict=True):
                 if move < n_terms:
                     ship[first + move, lane] += STEP * self.sizes[move]
@@ -280,9 +281,9 @@ class Shooter:
                     offsets[lane] += STEP
                 else:
                     state[self.free[move - n_terms - 1], lane] += STEP * self.units[move - n_terms - 1]
-            out = np.empty((len(segment.measured), layout.N_STATE * layout.LANES))
+            out = np.empty((len(segment.measured), n_state * LANES))
             self.sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
-            found = out.reshape(len(out), layout.N_STATE, layout.LANES)[:, self.columns]
+            found = out.reshape(len(out), n_state, LANES)[:, self.columns]
             nominal = found[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
                 slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP

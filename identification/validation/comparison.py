@@ -19,7 +19,7 @@ from identification.validation.prediction import COMPARED
 from identification.validation.ranking import Ranking, Standing
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
-from shipgym.ships.grey_box import GREY_BOX
+from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.identify_table import OPTIONS
 from shipgym.trials.trial import Trial
 

@@ -18,8 +18,8 @@ from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.estimators.tuned import TunedLSSVM
 from identification.pipeline import identify
 from papers.row import Row
-from shipgym.kernels import container as own
 from shipgym.manoeuvres import zigzag, zigzag_indices
+from shipgym.ships import container as own
 from shipgym.ships import load_model
 from shipgym.ships.inertia import inertia
 from shipgym.ships.terms import read_terms
@@ -48,11 +48,11 @@ OWN_SWAY = "v, r, phi, v^3, r^3, v^2 r, v r^2, v^2 phi, v phi^2, r^2 phi, r phi^
 
 #: By number: its equation, what Table 4-2 prints of Yukun, what the container ship has.
 PROPULSION = {
-    "C_P = 1 - t": ("u", 1.3940, 1.0 - own.t),
-    "C_Ru = 1 - t_R": ("u", 0.5816, own.c_RX),
-    "C_Rv = 1 + a_H": ("v", 0.9274, 1.0 + own.a_H),
-    "C_Rp = -(1 + a_H) z_R": ("p", -0.0882, -(1.0 + own.a_H) * own.z_R),
-    "C_Rr = x_R + a_H x_H": ("r", -0.5867, own.x_R + own.a_H * own.x_H),
+    "C_P = 1 - t": ("u", 1.3940, 1.0 - own.PUBLISHED.t),
+    "C_Ru = 1 - t_R": ("u", 0.5816, own.PUBLISHED.c_RX),
+    "C_Rv = 1 + a_H": ("v", 0.9274, 1.0 + own.PUBLISHED.a_H),
+    "C_Rp = -(1 + a_H) z_R": ("p", -0.0882, -(1.0 + own.PUBLISHED.a_H) * own.PUBLISHED.z_R),
+    "C_Rr = x_R + a_H x_H": ("r", -0.5867, own.PUBLISHED.x_R + own.PUBLISHED.a_H * own.PUBLISHED.x_H),
 }
 REMARKS = {
     "C_P = 1 - t": "printed: a thrust deduction of -0.39, which no ship has",
@@ -75,12 +75,17 @@ def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, 
     """Thrust and normal force of the rudder, prime system, from velocities in SI units."""
     L, U = own.LENGTH, np.hypot(u, v)
     u_, v_, r_ = u / U, v / U, r * L / U
-    u_P = u_ * (1.0 - own.wp + own.tau * (v_ + own.xp * r_) ** 2)
+    u_P = u_ * (1.0 - own.PUBLISHED.wp + own.PUBLISHED.tau * (v_ + own.PUBLISHED.xp * r_) ** 2)
     J = u_P * U / (n * own.DIAMETER)
     K_T = 0.527 - 0.455 * J
     thrust = 2.0 * own.DIAMETER**4 / (L * L) * K_T * n * np.abs(n) / U**2
-    v_R = own.gamma * v_ + own.c_Rr * r_ + own.c_Rrrr * r_**3 + own.c_Rrrv * r_**2 * v_
-    u_R = u_P * own.epsilon * np.sqrt(1.0 + 8.0 * own.kappa / np.pi * K_T / J**2)
+    v_R = (
+        own.PUBLISHED.gamma * v_
+        + own.PUBLISHED.c_Rr * r_
+        + own.PUBLISHED.c_Rrrr * r_**3
+        + own.PUBLISHED.c_Rrrv * r_**2 * v_
+    )
+    u_R = u_P * own.PUBLISHED.epsilon * np.sqrt(1.0 + 8.0 * own.PUBLISHED.kappa / np.pi * K_T / J**2)
     lift = 6.13 * own.ASPECT_RATIO / (own.ASPECT_RATIO + 2.25) * own.RUDDER_AREA / (L * L)
     return thrust, -lift * (u_R**2 + v_R**2) * np.sin(delta + np.arctan2(v_R, u_R))
 
@@ -121,10 +126,10 @@ def known_forces(motion: Mapping[str, Any]) -> dict[str, Any]:
     u, v, r = motion["u"] / U, motion["v"] / U, motion["r"] * L / U
     righting = own.GRAVITY * own.VOLUME / (0.5 * L * L) * own.GM / L / U**2
     return {
-        "u": (own.m + own.my) * v * r,
-        "v": -(own.m + own.mx) * u * r,
+        "u": (own.PUBLISHED.m + own.PUBLISHED.my) * v * r,
+        "v": -(own.PUBLISHED.m + own.PUBLISHED.mx) * u * r,
         "r": 0.0 * r,
-        "p": own.mx * own.lx * u * r - righting * motion["phi"],
+        "p": own.PUBLISHED.mx * own.PUBLISHED.lx * u * r - righting * motion["phi"],
     }
 
 
@@ -134,7 +139,7 @@ def inertia_matrix() -> Floats:
     matrix = np.zeros((4, 4))
     matrix[:3] = inertia(ship) / (0.5 * 1025.0 * L**3) / np.array([1.0, 1.0, L, L])
     matrix[2] /= L
-    matrix[3, :3], matrix[3, 3] = matrix[:3, 3], own.Ix + own.Jx
+    matrix[3, :3], matrix[3, 3] = matrix[:3, 3], own.PUBLISHED.Ix + own.PUBLISHED.Jx
     return matrix
 
 
@@ -212,7 +217,7 @@ def coefficient_rows() -> Iterator[Row]:
             REMARKS.get(name, ""),
         )  # fmt: skip
     X, y = regression(recorded(10, 20), {"v": OWN_SWAY})["v"]
-    found, true = float(tuned(X, y)[-1]), 1.0 + own.a_H
+    found, true = float(tuned(X, y)[-1]), 1.0 + own.PUBLISHED.a_H
     yield Row(
         "Table 4-2", "C_Rv = 1 + a_H, sway on the container ship's own terms", None, None, found,
         f"within 2 % of {true:.4g}", abs(found / true - 1.0) < 0.02,

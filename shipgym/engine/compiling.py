@@ -1,6 +1,6 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
-The machine code of a loop lies in the cache under a name that hashes everything it depends on: the bytecode of
+The machine code of a loop lies in the cache under a name that hashes all that it depends on: the bytecode of
 the loop and of every function put into it, the fields of their records, the versions of Python and Numba, and
 the processor. A file that is there is right, whoever made it and when; so a cache that was filled beforehand
 and may only be read is used as it is.
@@ -9,9 +9,9 @@ and may only be read is used as it is.
 from __future__ import annotations
 
 import os
+import re
 import sys
 import warnings
-from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from pathlib import Path
@@ -19,7 +19,7 @@ from typing import Any
 
 from platformdirs import user_cache_path
 
-from shipgym.engine.specialise import PHYSICS, Part, Parts, Specialisation, fingerprint
+from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
 from shipgym.errors import InputError
 
 CACHE_VARIABLE = "SHIPGYM_CACHE"
@@ -58,7 +58,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     from shipgym.engine.disk_cache import DiskCache
 
     copy = Specialisation(parts, tag, numba.njit).copy(loop)
-    dispatcher = numba.njit(nogil=True, **PHYSICS)(copy)
+    dispatcher = numba.njit(nogil=True, **SEMANTICS)(copy)
     folder = _folder()
     if folder is None:
         _compile(dispatcher, signature, what)
@@ -78,28 +78,33 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
 
     if not quiet:
         _announce(what)
+    from numba.core.compiler_lock import global_compiler_lock
+
+    from shipgym.engine.lean_numba import lean
+
+    name = dispatcher.py_func.__qualname__
     try:
-        dispatcher.compile(signature)
+        with global_compiler_lock, lean(name.rpartition("_")[2], name):
+            dispatcher.compile(signature)
     except numba.core.errors.NumbaError as error:
         raise InputError(explanation(error, what)) from None
 
 
 def explanation(error: Exception, what: str) -> str:
-    """Numba's reason in one sentence, with the function and the line it is about."""
-    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    places = [line for line in lines if line.startswith(("File ", '"'))]
-    where = places[-1].removeprefix("File ").rstrip(":") if places else ""
-    reasons = [
-        line
-        for line in lines
-        if not line.startswith(("File", "During:", "def ", "^", "<source", "Failed in", "- ", "There are"))
-    ]
-    reason = reasons[0] if reasons else "no reason given"
-    return (
-        f"{what}: cannot be compiled at {where}: {reason}"
-        if where
-        else f"{what}: cannot be compiled: {reason}"
-    )
+    """Numba's reason in one sentence, with the function and the line of the innermost call."""
+    text = str(error)
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
+    if reason.endswith("signature:"):
+        reason = reason[: -len(" found for signature:")] + next(
+            (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
+        )
+    place = re.search(r"at (\S+) \((\d+)\)", text)
+    function = re.search(r"^def (\w+)\(|<function (\w+)_[0-9a-f]{24} at", text, re.MULTILINE)
+    where = f" in {function[1] or function[2]}" if function else ""
+    if place and (function is None or function[1]):
+        where += f" ({place[1]}, line {place[2]})"
+    return f"{what}: cannot be compiled{where}: {reason}"
 
 
 def _announce(what: str) -> None:
@@ -140,6 +145,3 @@ def _lock(path: Path) -> AbstractContextManager[Any]:
     from filelock import FileLock
 
     return FileLock(path) if os.access(path.parent, os.W_OK) else nullcontext()
-
-
-__all__ = ["Callable", "Part", "compiled"]

@@ -77,7 +77,7 @@ class DiskCache(FunctionCache):  # type: ignore[misc]
             super().save_overload(sig, data)
         except OSError as error:
             warnings.warn(
-                f"{self._folder}: cannot be written ({error.strerror}), so this is compiled anew in each process",
+                f"{self._folder}: cannot be written ({error.strerror}), so ships are compiled anew each time",
                 stacklevel=2,
             )
 

@@ -114,7 +114,7 @@ def small_sin_cos(x: float) -> tuple[float, float]:
 
 
 def turn_sin_cos(x: float) -> tuple[float, float]:
-    """Sine and cosine of an angle that a ship turns in a part of a step, within a quarter turn to either side.
+    """Sine and cosine of an angle that a ship turns in part of a step, within a quarter turn to either side.
 
     The error is below 2e-16 for |x| < 0.6, 2e-14 for |x| < pi/4, 1e-9 for |x| < pi/2.
     """

@@ -70,7 +70,7 @@ class Rates(NamedTuple):
     n: float
 
 
-# What a ship, her gear and the sea have is known when they are compiled, so that what they lack costs nothing.
+# What ship, gear and sea have is known when they are compiled, so that what they lack costs nothing.
 HAS_ROLL, HAS_SHAFT, HAS_MEMORY, HAS_LAG, HAS_SEA = True, True, True, True, True
 
 

@@ -8,6 +8,7 @@ originals stay what they are, to be called from Python.
 
 from __future__ import annotations
 
+import dis
 import hashlib
 import platform
 from collections.abc import Callable, Iterator, Mapping
@@ -16,38 +17,18 @@ from functools import cache
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
+from shipgym.engine.parts import Part
 from shipgym.engine.records import is_record
 from shipgym.errors import InputError
 
 Parts = Mapping[str, Any]
 
-# Of functions that loops call: without entries for Python and C, which take longer to compile than many of them.
+# Of functions that loops call: without entries for Python and C, which take longer to compile than many a
+# function.
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.
-PHYSICS = {"error_model": "numpy", "fastmath": {"contract"}}
-# What is also stored as it is summed could be contracted in one form of a loop and not in another; so costs and
-# observations, which are, would depend on the batch size.
-EXACT = {"error_model": "numpy"}
-
-
-@dataclass(frozen=True)
-class Part:
-    """How a function that is put in a place is compiled.
-
-    Attributes
-    ----------
-    function : callable
-        A plain Python function on numbers and records.
-    exact : bool
-        Without contraction of products and sums, like all functions that it calls.
-    inline : bool
-        Whether it becomes part of the loop; if not, it is called, as befits what comes seldom.
-    """
-
-    function: Callable[..., Any]
-    exact: bool = False
-    inline: bool = True
+SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
 
 
 @dataclass
@@ -57,31 +38,32 @@ class Specialisation:
     parts: Parts
     tag: str
     jit: Callable[..., Any] | None
-    made: dict[tuple[Any, bool, bool], Any] = field(default_factory=dict)
+    made: dict[tuple[Any, bool], Any] = field(default_factory=dict)
 
     def inner(self, part: Part) -> Any:
         """A function that others call, with all that it calls."""
-        key = (part.function, part.exact, part.inline)
-        if key not in self.made:
-            copy = self.copy(part.function, part.exact)
+        key = (part.function, part.inline)
+        if key not in self.made and part.code is not None:
+            self.made[key] = part.function if self.jit is None else part.code()
+        elif key not in self.made:
+            copy = self.copy(part.function)
             if self.jit is not None:
-                semantics = EXACT if part.exact else PHYSICS
-                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **semantics)(copy)
+                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **SEMANTICS)(copy)
             self.made[key] = copy
         return self.made[key]
 
-    def copy(self, function: Any, exact: bool = False) -> FunctionType:
+    def copy(self, function: Any) -> FunctionType:
         """A function with its globals replaced: parts by their place, plain functions by their copies."""
         namespace: dict[str, Any] = {"__name__": function.__module__, "__builtins__": __builtins__}
         for name, value in named_globals(function, self.parts):
             if isinstance(value, Part):
                 value = self.inner(value)
-            elif isinstance(value, FunctionType):
-                value = self.inner(Part(value, exact))
+            elif _is_plain(value):
+                value = self.inner(Part(value))
             namespace[name] = value
         copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
         copy.__qualname__ = f"{function.__name__}_{self.tag}"  # symbols of all that is compiled differ
-        copy.__module__ = function.__module__
+        copy.__module__ = __name__  # the cache imports it, and could not import a user's file
         return copy
 
 
@@ -92,11 +74,23 @@ def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
             f"{function.__module__}.{function.__name__}: uses variables of the function around it "
             f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
         )
-    for name in function.__code__.co_names:
+    for name in _loaded_names(function.__code__):
         if name in parts:
             yield name, parts[name]
         elif name in function.__globals__:
             yield name, function.__globals__[name]
+
+
+def _is_plain(value: Any) -> bool:
+    """Whether something is a function to be compiled, and not one that Numba knows."""
+    return isinstance(value, FunctionType) and value.__module__.partition(".")[0] not in ("numba", "numpy")
+
+
+@cache
+def _loaded_names(code: CodeType) -> tuple[str, ...]:
+    """Names that a function takes from its globals; attributes are none of them."""
+    loads = (i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME"))
+    return tuple(dict.fromkeys(loads))
 
 
 def fingerprint(function: Any, parts: Parts) -> str:
@@ -109,9 +103,10 @@ def fingerprint(function: Any, parts: Parts) -> str:
 
     def visit(value: Any) -> None:
         if isinstance(value, Part):
-            add((value.exact, value.inline))
-            visit(value.function)
-        elif isinstance(value, FunctionType):
+            add((value.inline, value.key))
+            if value.code is None:
+                visit(value.function)
+        elif _is_plain(value):
             if value not in seen:
                 seen.add(value)
                 visit_code(value.__code__, value.__doc__)

@@ -8,8 +8,9 @@ from functools import cached_property
 from typing import Any
 
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.parts import Part
+from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout, Record, Rows
-from shipgym.engine.specialise import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,6 @@ class Vessel:
         shared : bool
             Whether all lanes have the same ship, so that her numbers are a vector and not a tile.
         """
-        functions = self.layout.functions(1 if shared else LANES)
         return {
             "accelerations": Part(no_accelerations),
             "shaft_acceleration": Part(no_shaft),
@@ -66,10 +66,10 @@ class Vessel:
             "HAS_MEMORY": "q" in self.state_names,
             "HAS_LAG": self.lag,
             "HAS_SEA": False,
-            "load_motion": Part(self.motion.loader(lanes)),
-            "store_motion": Part(self.motion.storer(lanes)),
-            "load_ship": Part(functions["load_ship"]),
-            "load_coefficients": Part(functions["load_coefficients"]),
+            "load_motion": loader(self.motion, lanes),
+            "store_motion": storer(self.motion, lanes),
+            "load_ship": loader(self.layout["ship"], 1 if shared else LANES),
+            "load_coefficients": loader(self.layout["coefficients"], 1 if shared else LANES),
             "common_ship": Part(read_ship if shared else nothing),
             "ship_at": Part(the_common if shared else ship_of_lane),
         }

@@ -1,4 +1,4 @@
-"""Many ships at once under a task, without Gymnasium's clothes."""
+"""Many ships at once under a task, without Gymnasium's interface."""
 
 from __future__ import annotations
 
@@ -10,19 +10,23 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.envs.screen import STEP_OUTCOME, Screen
+from shipgym.engine import episodes
+from shipgym.engine.addresses import addresses
+from shipgym.engine.records import LANES, flat
+from shipgym.engine.voyages import sensors_for, voyages
+from shipgym.envs.outputs import STEP_OUTCOME, Outputs
+from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.stability import refuse_unstable
-from shipgym.envs.task import Task
-from shipgym.envs.tiles import REFUSED, Team, addresses, lanes_of, ship_columns, ship_tiles
-from shipgym.envs.variety import Variety
+from shipgym.envs.tiles import Threads, lanes_of, ship_columns, ship_tiles
 from shipgym.errors import InputError
-from shipgym.kernels import layout, weather_rows
-from shipgym.kernels import voyage_rows as rows
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import Task, course_keeping_task
+from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
-MOST_SCREENS = 4  # that are looked at whether they are free; more are held by users who keep what they get
+#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
+SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 
 
 class Engine:
@@ -34,9 +38,9 @@ class Engine:
         One ship for all, or one for each lane; all of one structure.
     num_envs : int
         Number of lanes.
-    task : Task
-        What is asked.
-    variety : Variety, optional
+    task : Task, optional
+        What is asked; by default course keeping.
+    randomisation : Randomisation, optional
         What differs from episode to episode; only with one ship for all.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
@@ -54,8 +58,8 @@ class Engine:
         self,
         models: ShipModel | Sequence[ShipModel],
         num_envs: int,
-        task: Task,
-        variety: Variety | None = None,
+        task: Task | None = None,
+        randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
         threads: int = 1,
     ) -> None:
@@ -66,66 +70,94 @@ class Engine:
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
         self.model = fleet[0]
         refuse_unstable(fleet, allow_unstable)
-        if any(model.accelerations_source != self.model.accelerations_source for model in fleet):
+        if any(model.vessel is not self.model.vessel for model in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
+        task = task or course_keeping_task()
         task.check_fits(self.model)
         self.num_envs = num_envs
         self.task = task
         self.dt = task.interval(self.model)
-        self.pool = (variety or Variety()).ships(self.model, task.seas)
+        self.pool = (randomisation or Randomisation()).ships(self.model, task.seas)
         drawn = len(self.pool) > 1
         if drawn and len(fleet) > 1:
-            raise InputError("models: several lanes' ships and a variety of ships, expected one of the two")
+            raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
         self.windy = any(not sea.calm for _, sea in self.pool)
-        self._kernel = self.model.kernel("episodes", self.windy, task.kernel)
-        self._settings = task.settings(self.model)
-        self._team = Team(-(-num_envs // layout.LANES), threads)
-        self._allocate(fleet, drawn)
+        sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
+        own = self.pool if drawn else [(model, task.seas[0]) for model in fleet]
+        self._voyages = voyages(self.model.vessel, task.definition, sensors, self.windy, len(own) == 1)
+        self._run = self._voyages.run
+        self._threads = Threads(-(-num_envs // LANES), threads)
+        self._allocate(own, drawn)
         self.reset(np.arange(num_envs))
 
-    def _allocate(self, fleet: list[ShipModel], drawn: bool) -> None:
-        """Arrays that the kernels work on."""
-        tiles = -(-self.num_envs // layout.LANES)
-        own = self.pool if drawn else [(model, self.task.seas[0]) for model in fleet]
+    def _allocate(self, own: Any, drawn: bool) -> None:
+        """Arrays that the loops work on."""
+        tiles = -(-self.num_envs // LANES)
         columns = ship_columns(own, self.windy, self.task, self.model, drawn)
         self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        self._ships = ship_tiles(columns[:1] if drawn else columns, tiles, drawn)
-        self._states = np.zeros((tiles, rows.END + self.task.episode_rows() * layout.LANES))
-        self._keys = np.zeros((tiles, 3, layout.LANES), dtype=np.uint64)
+        self._ships = ship_tiles(columns, tiles, len(own) > 1)
+        plan = int(self.task.definition.plan_length(self.task.settings))
+        self._states = np.zeros((tiles, (self._voyages.state.n_rows + plan) * LANES))
+        self._keys = np.zeros((tiles, 3, LANES), dtype=np.uint64)
+        self._settings = self._numbers_of_settings()
         self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
         self._orders = self._actions.T
-        self.everyone = np.ones(self.num_envs, dtype=np.bool_)
-        self.everyone.flags.writeable = False
-        self._fixed = (
-            self._states, self._keys, self._settings, self._pool, self._ships, self._actions
-        )  # fmt: skip
-        self._fixed_words = addresses(self._fixed)
-        self._screens: list[Screen] = []
+        self._which = np.zeros(self.num_envs, dtype=np.bool_)
+        self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
+        self.all_lanes.flags.writeable = False
+        observed = [quantity.path for quantity in self.task.observed(self.model)]
+        names = self.task.info_names
+        self.flag_names = [name for name in names if name in self.task.flags]
+        self._rows = self._shown_rows(observed)
+        self._sizes = (self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names))
+        words = addresses(
+            [
+                self._states,
+                self._keys,
+                self._settings,
+                self._pool,
+                self._ships,
+                self._rows,
+                self._which,
+                self._actions,
+            ]
+        )
+        self._worlds = [
+            np.array([*words, *[0] * 9, first, end], dtype=np.int64) for first, end in self._threads.shares
+        ]
         self.show_anew()
 
+    def _numbers_of_settings(self) -> Floats:
+        task = self.task
+        rules = episodes.Rules(
+            self.dt, task.substeps(self.model), task.episode_steps, task.max_envelope_distance,
+            task.least_shaft(self.model),
+        )  # fmt: skip
+        sensor = self._voyages.sensors.module.Settings
+        noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
+        own = sensor(**{name: noise[name] for name in sensor._fields if name in noise})
+        return np.array([*rules, *flat(own), *flat(task.settings)], dtype=float)
+
+    def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
+        """How many observations, outcomes and flags there are, and the offsets of their rows."""
+        made = self._voyages
+        outcomes = ["reward", "terminated", "truncated"]
+        first = [made.state["outcome"].row(name) for name in outcomes]
+        rows = [
+            [made.state["observation"].row(path) for path in observed],
+            [*first, *(made.info_row(name) for name in self.task.info_names)],
+            [*first[1:], *(made.info_row(name) for name in self.flag_names)],
+        ]
+        return np.array([*map(len, rows), *(LANES * row for kind in rows for row in kind)], dtype=np.int64)
+
     def show_anew(self) -> None:
-        """Let what comes next be shown where nobody looks, so that what was shown may be kept."""
-        self.shown = self._free_screen()
+        """Let what comes next be written into new arrays, so that those that were given may be kept."""
+        self._write_into(Outputs(*self._sizes))
 
-    def _free_screen(self) -> Screen:
-        for screen in self._screens:
-            if screen.is_free:
-                return screen
-        names = self.task.info_names
-        flags = [name for name in names if name in self.task.flags]
-        screen = Screen(self.everyone, int(self._settings[rows.N_SHOWN]), names, flags)
-        screen.shown_by(self._advance_on(screen))
-        self._screens = [screen, *self._screens[: MOST_SCREENS - 1]]
-        return screen
-
-    def _advance_on(self, screen: Screen) -> Callable[[bool], int]:
-        shown = (screen.observations, screen.outcomes, screen.flags)
-        if not hasattr(self._kernel.step_at, "signatures"):  # run as plain Python
-            return self._team.shared(partial(partial, self._kernel.step, *self._fixed, *shown))
-        words = [*self._fixed_words, *addresses(shown)]
-        return self._team.shared(
-            lambda *tiles: partial(self._kernel.step_at, np.array([*words, *tiles], dtype=np.int64))
-        )
+    def _write_into(self, outputs: Outputs) -> None:
+        self.shown = outputs
+        for world in self._worlds:
+            world[-11:-2] = outputs.words
 
     def advance(self, next_ones: bool = False, anew: bool = False) -> int:
         """One control interval with the commands as they stand.
@@ -135,7 +167,7 @@ class Engine:
         next_ones : bool
             Whether lanes whose episode was over begin the next one, or stay.
         anew : bool
-            Whether it is shown where nobody looks, so that what was shown may be kept.
+            Whether it is written into new arrays, so that those that were given may be kept.
 
         Returns
         -------
@@ -145,17 +177,24 @@ class Engine:
         Raises
         ------
         InputError
-            If a command is not a number; nothing is changed then.
+            If a command is not finite; nothing is changed then.
         """
-        screen = self._free_screen() if anew else self.shown
-        ended = screen.advance(next_ones)
-        if ended == REFUSED:
+        before = self.shown
+        if anew:
+            self.show_anew()
+        asked = episodes.STEP_AND_BEGIN if next_ones else episodes.STEP
+        counts = self._threads.run(self._run, self._worlds, asked)
+        if episodes.REFUSED in counts:
+            self._write_into(before)
             lane, which = np.argwhere(~np.isfinite(self._orders))[0]
             raise InputError(
                 f"actions: {self._orders[lane, which]} found in lane {lane}, expected numbers in [-1, 1]"
             )
-        self.shown = screen
-        return ended
+        return sum(counts)
+
+    def step_of_one(self) -> Callable[[], int]:
+        """The step of an engine of one lane, whose arrays stay the same, without looking at them again."""
+        return partial(self._run, self._worlds[0], episodes.STEP)
 
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
@@ -193,7 +232,7 @@ class Engine:
         lanes = np.flatnonzero(which)
         for row, words in enumerate((keys, episodes)):
             all_words = np.broadcast_to(np.asarray(words).astype(np.uint64), (self.num_envs,))
-            self._keys[lanes // layout.LANES, row, lanes % layout.LANES] = all_words[lanes]
+            self._keys[lanes // LANES, row, lanes % LANES] = all_words[lanes]
         self._begin(which, next_one=False)
         return self.observations
 
@@ -208,10 +247,8 @@ class Engine:
         self._begin(which, next_one=True)
 
     def _begin(self, which: NDArray[np.bool_], next_one: bool) -> None:
-        self._kernel.reset(
-            self._states, self._keys, self._settings, self._pool, self._ships, which,
-            self.shown.observations, self.shown.outcomes, self.shown.flags, next_one,
-        )  # fmt: skip
+        self._which[:] = which
+        self._run(self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN)
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
@@ -221,7 +258,7 @@ class Engine:
     @property
     def steps(self) -> Floats:
         """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
-        return self.outcome(rows.STEPS)
+        return self.read("steps")
 
     def copy_lanes(self, source: Engine, lanes: ArrayLike) -> None:
         """Make each lane the copy of one of another engine: same ship, same episode, same future.
@@ -251,11 +288,11 @@ class Engine:
                 f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
             )
         self._check_alike(source)
-        there, here = divmod(which, layout.LANES), divmod(np.arange(self.num_envs), layout.LANES)
+        there, here = divmod(which, LANES), divmod(np.arange(self.num_envs), LANES)
         pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
             (self._states, source._states), (self._keys, source._keys),
         ]  # fmt: skip
-        if len(self._ships) == len(self._states):
+        if not self._voyages.shared:
             pairs.append((self._ships, source._ships))
         for own, other in pairs:
             lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
@@ -266,19 +303,21 @@ class Engine:
     def _check_alike(self, source: Engine) -> None:
         """Refuse an engine whose lanes cannot be taken over."""
         same_task = (
-            self._kernel is source._kernel
+            self._voyages is source._voyages
             and self._states.shape[1] == source._states.shape[1]
             and np.array_equal(self._settings, source._settings, equal_nan=True)
         )
         if not same_task:
             raise InputError("source: an engine of another task found, expected one of the same")
-        shared = len(self._ships) < len(self._states)
-        if shared and not all(np.array_equal(tile, self._ships[0], equal_nan=True) for tile in source._ships):
+        if self._voyages.shared and not np.array_equal(source._ships, self._ships, equal_nan=True):
             raise InputError("source: an engine with other ships found, expected one with the same")
 
-    def write(self, row: int, value: float) -> None:
-        """Write one row of the kernel's state in all lanes: for trials of what might be, see `outcome`."""
-        self._states[:, row : row + layout.LANES] = value
+    def write(self, name: str, values: ArrayLike) -> None:
+        """Write one number of the state in all lanes: for trials of what might be, see `read`."""
+        row = self._voyages.row(name) * LANES
+        lanes = self._states[:, row : row + LANES].copy().reshape(-1)
+        lanes[: self.num_envs] = values
+        self._states[:, row : row + LANES] = lanes.reshape(-1, LANES)
 
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses those that are no numbers.
@@ -341,9 +380,10 @@ class Engine:
         """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
         return self.shown.observations.copy()
 
-    def outcome(self, row: int) -> Floats:
-        """One row of the kernel's state for each lane, shape (num_envs,), a copy."""
-        return self._states[:, row : row + layout.LANES].reshape(-1)[: self.num_envs].copy()
+    def read(self, name: str) -> Floats:
+        """One number of the state for each lane by its name (`u`, `delta`, `course`, `steps`), a copy."""
+        row = self._voyages.row(name) * LANES
+        return self._states[:, row : row + LANES].reshape(-1)[: self.num_envs].copy()
 
     def info(self, name: str) -> Floats:
         """One entry of `info` for each lane, shape (num_envs,), a view of the last step."""
@@ -361,40 +401,38 @@ class Engine:
         Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
         the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
         """
-        offsets = dict(zip(layout.STATE_NAMES, layout.offsets(0, layout.N_STATE), strict=True))
-        state = {
-            name: self.outcome(offsets[row])
-            for name, row in zip(self.model.state_names, self.model.kernel_names, strict=True)
-        }
-        state["set_point"] = self.outcome(rows.COURSE)
-        state["delta_command"] = self.outcome(rows.RUDDER_COMMAND) * self._ship_row(layout.RUDDER_LIMIT)
+        state = {name: self.read(name) for name in self.model.state_names}
+        if "course" in self._voyages.state["state"].present:
+            state["set_point"] = self.read("course")
+        state["delta_command"] = self.read("rudder_command") * self._ship_row("rudder_limit")
         if "n" in self.model.command_names:
-            state["n_command"] = self.outcome(rows.SHAFT_COMMAND) * self._ship_row(layout.SERVICE_SHAFT)
+            state["n_command"] = self.read("shaft_command") * self._ship_row("shaft")
         return {**state, **self._weather_now()} if self.windy else state
 
     def _weather_now(self) -> dict[str, Floats]:
         """What the weather is in each lane, by the names of the channels of trials."""
-        waves = {"psi_wave": weather_rows.PSI_WAVE, "r_wave": weather_rows.R_WAVE}
-        if "phi" in self.model.state_names:
-            waves |= {"phi_wave": weather_rows.PHI_WAVE, "p_wave": weather_rows.P_WAVE}
-        currents = {"current_north": weather_rows.CURRENT_NORTH, "current_east": weather_rows.CURRENT_EAST}
-        now = {name: self.outcome(row) for name, row in (waves | currents).items()}
-        now["wind_speed"] = self._ship_row(weather_rows.WIND_SPEED) + self.outcome(weather_rows.GUST)
-        east, north = self.outcome(weather_rows.WIND_EAST), self.outcome(weather_rows.WIND_NORTH)
-        return {**now, "wind_from": np.arctan2(east, north)}
+        roll = ["phi_wave", "p_wave"] if "phi" in self.model.state_names else []
+        names = ["psi_wave", "r_wave", *roll, "current_north", "current_east"]
+        now = {name: self.read(name) for name in names}
+        now["wind_speed"] = self._ship_row("wind_speed") + self.read("gust")
+        return {**now, "wind_from": np.arctan2(self.read("wind_east"), self.read("wind_north"))}
 
-    def _ship_row(self, row: int) -> Floats:
-        """One row of the ships for each lane, shape (num_envs,)."""
-        lanes = self._ships[:, row : row + layout.LANES]
-        return np.broadcast_to(lanes, (len(self._states), layout.LANES)).reshape(-1)[: self.num_envs]
+    def _ship_row(self, name: str) -> Floats:
+        """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
+        layout = self._voyages.ship
+        rows = layout["ship"] if name in layout["ship"].present else layout["sea"]
+        if self._voyages.shared:
+            return np.full(self.num_envs, self._ships[0, rows.row(name)])
+        first = rows.row(name) * LANES
+        return self._ships[:, first : first + LANES].reshape(-1)[: self.num_envs].copy()
 
     def waypoints(self, lane: int = 0) -> Floats | None:
         """North and east of the path of a lane's episode, m, shape (n, 2); None where there is none."""
-        count = self.task.episode_rows()
-        if count == 0:
+        plan = lanes_of(self._states)[:, self._voyages.state.n_rows :]
+        if plan.shape[1] == 0 or "waypoints" not in self.task.definition.settings:
             return None
-        tile, lane = divmod(lane, layout.LANES)
-        return self._states[tile, rows.END :].reshape(count // 2, 2, layout.LANES)[:, :, lane].copy()
+        tile, lane = divmod(lane, LANES)
+        return plan[tile, :, lane].reshape(-1, 2).copy()
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:

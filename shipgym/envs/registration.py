@@ -1,10 +1,13 @@
-"""The environments' ids."""
+"""The environments' ids, and tasks of your own."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import gymnasium
+
+from shipgym.errors import InputError
 
 #: Keywords of the variants by id, without the version.
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -13,19 +16,60 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
 }
-TASKS = {"CourseKeeping": "course_keeping", "PathFollowing": "path_following"}
+TASKS = ("CourseKeeping", "PathFollowing")
 
 
 def register_environments() -> None:
     """Register the environments with Gymnasium; a second call changes nothing."""
-    for task, module in TASKS.items():
+    for task in TASKS:
         for variant, options in VARIANTS.items():
             name = f"shipgym/{task}{variant}-v0"
             if name not in gymnasium.registry:
-                gymnasium.register(
-                    id=name,
-                    entry_point=f"shipgym.envs.{module}:{task}Env",
-                    vector_entry_point=f"shipgym.envs.{module}:{task}VectorEnv",
-                    disable_env_checker=True,  # it checks its actions itself; the tests run check_env
-                    kwargs=dict(options),
-                )
+                _register(name, {"task": task, **options})
+
+
+def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
+    """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
+
+    Parameters
+    ----------
+    env_id : str
+        Such as "harbour/TurningBasin-v0".
+    task : str, Path or module
+        The file of the task (`shipgym.tasks.contract`). Give its path, and worker processes find it too.
+    **options
+        Keywords of the environment that differ from their defaults.
+
+    Raises
+    ------
+    InputError
+        If the task is not what the contract asks, or the id belongs to another task; nothing is registered then.
+    """
+    from shipgym.tasks.definition import read_definition
+
+    definition = read_definition(task, options.get("reward"))
+    given = {"task": str(task) if isinstance(task, Path) else task, **options}
+    if env_id in gymnasium.registry:
+        if gymnasium.registry[env_id].kwargs == given:
+            return
+        raise InputError(
+            f"{env_id}: registered already, for {gymnasium.registry[env_id].kwargs.get('task')!r}, expected "
+            "an id of its own; give another name or version"
+        )
+    try:
+        gymnasium.envs.registration.parse_env_id(env_id)
+    except gymnasium.error.Error as error:
+        raise InputError(
+            f"{env_id!r} found, expected an id such as 'harbour/{definition.name}-v0': {error}"
+        ) from None
+    _register(env_id, given)
+
+
+def _register(env_id: str, options: dict[str, Any]) -> None:
+    gymnasium.register(
+        id=env_id,
+        entry_point="shipgym.envs.ship_env:ShipEnv",
+        vector_entry_point="shipgym.envs.ship_vector_env:ShipVectorEnv",
+        disable_env_checker=True,  # it checks its actions itself; the tests run check_env
+        kwargs=options,
+    )

@@ -1,49 +1,53 @@
-"""What the environments have in common: one ship under a task, in Gymnasium's clothes."""
+"""One ship under a task as one of Gymnasium's environments."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import Any, ClassVar, SupportsFloat
+from typing import Any, SupportsFloat
 
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys
+from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, episode_key
-from shipgym.envs.screen import STEP_OUTCOME
-from shipgym.envs.task import RUDDER_ORDERS, Task
-from shipgym.envs.tiles import REFUSED
-from shipgym.envs.variety import Variety
+from shipgym.envs.outputs import STEP_OUTCOME
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
+from shipgym.tasks.definition import read_definition
+from shipgym.tasks.task import RUDDER_ORDERS, Task
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
 Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
-ENV_OPTIONS = ("model", "render_mode", "allow_unstable")
+DEFAULT_TASK = "CourseKeeping"
+ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
 
 
 def read_options(
-    task_type: type[Task], model: str | Path | ShipModel, options: Mapping[str, Any]
-) -> tuple[ShipModel, Task, Variety]:
-    """The ship, the task and the variety that an environment's keywords name.
+    task: Any, model: str | Path | ShipModel, options: Mapping[str, Any]
+) -> tuple[ShipModel, Task, Randomisation]:
+    """The ship, the task and what is randomised, by an environment's keywords.
 
     Raises
     ------
     InputError
         For an unknown model or keyword, or a value out of its range.
     """
-    known = [*ENV_OPTIONS, *task_type.__dataclass_fields__, *Variety.names()]
+    definition = read_definition(task, options.get("reward"))
+    known = [*ENV_OPTIONS, *Task.option_names(definition), *Randomisation.names()]
     check_keys(options, known, "environment options")
-    variety, rest = Variety.take_from(options)
+    randomisation, rest = Randomisation.take_from(options)
+    rest.pop("reward", None)
     if not isinstance(model, str | Path | ShipModel):
         raise InputError(f"model: {model!r} found, expected a name, the path of a model file, or a ShipModel")
     ship = model if isinstance(model, ShipModel) else load_model(model)
-    return ship, task_type.from_options(rest), variety
+    return ship, Task.of(definition, **rest), randomisation
 
 
 def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
@@ -60,18 +64,26 @@ def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
 
 
 class ShipEnv(gymnasium.Env[Observation, Any]):
-    """One ship under a task; the environments differ by `task_type` alone.
+    """One ship under a task; the environments differ by their task alone.
+
+    The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The observation holds the
+    quantities of `observation_names`, each divided by its entry of `observation_scales`. The reward is the sum of
+    its parts, which `info` has by name. What is asked, observed and paid is told by the task's file
+    (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of your own).
 
     Parameters
     ----------
     model : str, Path or ShipModel
         A shipped model's name, the path of a model file, or a model.
+    task : str, Path or module
+        The name of a registered task, or the file of one (`shipgym.tasks.contract`).
     render_mode : {None, "human", "rgb_array"}
         As Gymnasium has it.
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     **options
-        Fields of the environment's task and of `shipgym.envs.variety.Variety`.
+        Settings of the task, fields of `Task` and of `Randomisation`; `reward`, a file with a `Reward` and a
+        `step` that take the place of the task's.
 
     Raises
     ------
@@ -80,26 +92,26 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
-    task_type: ClassVar[type[Task]]
 
     def __init__(
         self,
         model: str | Path | ShipModel = DEFAULT_MODEL,
+        task: Any = DEFAULT_TASK,
         render_mode: str | None = None,
         allow_unstable: bool = False,
         **options: Any,
     ) -> None:
         self.render_mode = render_mode
         self._artist = _artist(render_mode)
-        self.model, self.task, variety = read_options(self.task_type, model, options)
+        self.model, self.task, randomisation = read_options(task, model, options)
         seen, commands = spaces(self.task, self.model)
         self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
-        self._engine = Engine(self.model, 1, self.task, variety, allow_unstable)
+        self._engine = Engine(self.model, 1, self.task, randomisation, allow_unstable)
         self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
-        self._advance = self._engine.shown.advance
+        self._advance = self._engine.step_of_one()
         self._command = self._engine.command[:, 0]
         self._discrete = self.task.action == "rudder-discrete"
         self._names = self.task.info_names
@@ -184,7 +196,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
             If the action is not a finite number for each command.
         """
         self._order(action)
-        if self._advance(False) == REFUSED:
+        if self._advance() == REFUSED:
             wrong = next(number for number in self._command.tolist() if not isfinite(number))
             raise InputError(f"action: {wrong} found, expected numbers in [-1, 1]: parts of the limit")
         values = self._outcomes.tolist()

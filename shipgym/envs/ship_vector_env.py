@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import Engine, episode_key, episode_keys
-from shipgym.envs.screen import named_rows
-from shipgym.envs.ship_env import DEFAULT_MODEL, read_options, spaces
-from shipgym.envs.task import RUDDER_ORDERS, Task
+from shipgym.envs.outputs import named_rows
+from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, read_options, spaces
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import RUDDER_ORDERS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -53,12 +53,11 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         For an unknown model or keyword, or an argument out of its range.
     """
 
-    task_type: ClassVar[type[Task]]
-
     def __init__(
         self,
         num_envs: int = 1,
         model: str | Path | ShipModel = DEFAULT_MODEL,
+        task: Any = DEFAULT_TASK,
         render_mode: str | None = None,
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
@@ -66,8 +65,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         **options: Any,
     ) -> None:
         mode = _mode(autoreset_mode)
-        self.model, self.task, variety = read_options(self.task_type, model, options)
-        self._engine = Engine(self.model, num_envs, self.task, variety, allow_unstable, threads)
+        self.model, self.task, randomisation = read_options(task, model, options)
+        self._engine = Engine(self.model, num_envs, self.task, randomisation, allow_unstable, threads)
         self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
         self.render_mode = render_mode
         self._artists = _artists(render_mode, num_envs)
@@ -78,6 +77,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
+        self._names, self._flags = self.task.info_names, self._engine.flag_names
+        self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._mode = mode
         self._discrete = self.task.action == "rudder-discrete"
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
@@ -121,21 +122,33 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         for row in np.flatnonzero(mask).tolist():
             if (number := seeded[row]) is not None:
                 self._keys[row], episodes[row] = episode_keys(number), 0
-        self._engine.show_anew()
+        self._keep_shown()
         self._engine.begin(self._keys, episodes, mask)
         for artist, begun in zip(self._artists, mask, strict=False):
             if begun:
                 artist.begin(self._engine)
+        shown, infos = self._engine.shown, self._infos()
+        infos.update({name: mask.copy() for name in self._masks})
+        return shown.observations, infos
+
+    def _keep_shown(self) -> None:
+        """Rows that are not begun anew keep what they show, in arrays of their own."""
+        before = self._engine.shown
+        self._engine.show_anew()
+        if self._keys is not None:
+            self._engine.shown.take(before)
+
+    def _infos(self) -> Infos:
+        """Rows of the last step's arrays by name, with their masks."""
         shown = self._engine.shown
-        masks = {name: mask.copy() for name in shown.infos if name.startswith("_")}
-        return shown.observations, {**shown.infos, **masks}
+        return named_rows(shown.outcomes, shown.flags, self._names, self._flags) | self._masks
 
     def _drawn_keys(self) -> NDArray[np.uint64]:
         return np.array([episode_key(self.np_random) for _ in range(self.num_envs)], dtype=np.uint64)
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         check_keys(options or {}, ["reset_mask"], "options")
-        mask = (options or {}).get("reset_mask", self._engine.everyone)
+        mask = (options or {}).get("reset_mask", self._engine.all_lanes)
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise InputError(f"options: reset_mask {mask!r} found, expected a bool array of {self.num_envs}")
         if not mask.any():
@@ -179,7 +192,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         engine.order(self._commands(actions) if self._discrete else actions)
         ended = engine.advance(self._some_over, anew=True)
         shown = engine.shown
-        rewards, infos = shown.outcomes[0].copy(), shown.infos.copy()
+        infos = self._infos()
         if self._mode is AutoresetMode.NEXT_STEP:
             self._some_over = ended > 0
         elif ended and self._mode is AutoresetMode.SAME_STEP:
@@ -187,7 +200,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
             engine.begin_next(shown.terminated | shown.truncated)
         if self._artists:
             self._note()
-        return shown.observations, rewards, shown.terminated, shown.truncated, infos
+        return shown.observations, shown.outcomes[0], shown.terminated, shown.truncated, infos
 
     def _commands(self, actions: Any) -> Any:
         array = np.asarray(actions)
@@ -207,9 +220,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         final_obs = np.full(self.num_envs, None, dtype=object)
         for row in np.flatnonzero(ended).tolist():
             final_obs[row] = shown.observations[row].copy()
-        flags = [name for name in self.task.info_names if name in self.task.flags]
         kept = np.where(ended, shown.outcomes, 0.0), shown.flags & ended
-        final_info = named_rows(*kept, self.task.info_names, flags)
+        final_info = named_rows(*kept, self._names, self._flags)
         return {
             "final_obs": final_obs, "_final_obs": ended,
             "final_info": final_info | {f"_{name}": ended for name in final_info}, "_final_info": ended,
@@ -220,6 +232,10 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         for row, artist in enumerate(self._artists):
             begun = self._engine.steps[row] == 0
             artist.begin(self._engine) if begun else artist.note(self._engine)
+
+    def write(self, name: str, values: Any) -> None:
+        """Write one number of the state in all rows (see `Engine.write`)."""
+        self._engine.write(name, values)
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""

@@ -12,8 +12,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Conditions, Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.kernels import layout
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
@@ -25,7 +24,7 @@ HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
 HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
 STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
 
-#: Sails on: kernel states of shape (n_steps + 1, n_columns) with the start in row 0 and commands (n_steps, 2)
+#: Sails on: states of shape (n_steps + 1, n_columns) with the start in row 0 and commands (n_steps, 2)
 #: to be filled; returns the last row before the ship ran away.
 Sail = Callable[[Floats, Floats], int]
 
@@ -55,12 +54,12 @@ class Voyage:
         self.water_depth = conditions.water_depth
         self.passage = Passage(model, conditions, self.dt)
         start = model.service_state if state is None else state
-        self._states = [self.passage.states(model.kernel_states(start[None])[0], 0)]
+        self._states = [self.passage.states(start, 0)]
         self._commands: list[Floats] = []
 
     @property
     def state(self) -> Floats:
-        """The state of the kernels now, and what is recorded of the weather, shape (n_columns,)."""
+        """The state now, and what is recorded of the weather, shape (n_columns,)."""
         state: Floats = self._states[-1][-1]
         return state
 
@@ -77,11 +76,11 @@ class Voyage:
 
     def hold(self, rudder: float, shaft: float) -> Sail:
         """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
-        passage, kernel = self.passage, self.passage.kernel("trajectories").simulate
+        passage, loop = self.passage, self.passage.loop("simulate")
 
         def sail(states: Floats, commands: Floats) -> int:
             commands[:] = rudder, shaft
-            reached: int = kernel(states, commands, self.dt, passage.sky, passage.words, passage.ship)
+            reached: int = loop(states, commands, self.dt, *passage.sea, passage.numbers)
             return reached
 
         return sail
@@ -93,7 +92,7 @@ class Voyage:
         carries over from leg to leg.
         """
         model, memory, passage = self.model, np.zeros(1), self.passage
-        steer, shaft = passage.kernel("rate_steering").steer_rate, model.service_shaft_speed
+        steer, shaft = passage.loop("steer_rate"), model.service_shaft_speed
         gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
         reset_time = HELMSMAN_RESET * self.length_time
 
@@ -102,7 +101,7 @@ class Voyage:
                 orders = np.empty(len(commands))
                 reached: int = steer(
                     states, orders, memory, rate, shaft, self.dt, gain, reset_time,
-                    passage.sky, passage.words, passage.ship,
+                    *passage.sea, passage.numbers,
                 )  # fmt: skip
                 commands[:, 0], commands[:, 1] = orders, shaft
                 return reached
@@ -115,7 +114,7 @@ class Voyage:
         """Sail until the motion no longer changes, 300 ship lengths at most."""
         n_steps = max(round(STRETCH * self.length_time / self.dt), 2)
         speed, length = self.model.particulars["speed"], self.model.particulars["length"]
-        columns = [layout.STATE_NAMES.index(name) for name in "uvr"]
+        columns = [self.model.state_names.index(name) for name in "uvr"]
         before: Floats | None = None
         for _ in range(MOST_STRETCHES):
             states, commands = self.go(sail, n_steps)

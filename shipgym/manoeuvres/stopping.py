@@ -14,9 +14,9 @@ from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions
-from shipgym.ships.equations import Equations
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Conditions, Seed
+from shipgym.ships.equations import ShipEquations
+from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
 LONGEST = 300.0  # of a stopping trial, L / U0
@@ -150,7 +150,7 @@ def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) ->
 
 def goes_astern(model: ShipModel) -> bool:
     """Whether the equations of a ship hold for a shaft that turns astern."""
-    return isinstance(model.dynamics, Equations) and model.dynamics.astern
+    return isinstance(model.dynamics, ShipEquations) and model.dynamics.astern
 
 
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:

@@ -13,7 +13,8 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 

@@ -15,8 +15,8 @@ from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.conditions import Conditions, Passage, Seed
+from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
 
@@ -129,11 +129,11 @@ def _sail(
 ) -> tuple[Trial, int]:
     """The trial with a first order and a heading to reverse at, rad, and how often it was reversed."""
     passage = Passage(model, conditions, dt)
-    states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
+    states = passage.states(model.service_state, n_steps)
     commands = np.empty(n_steps + 1)
-    reached, turns = passage.kernel("zigzag").zigzag(
+    reached, turns = passage.loop("zigzag")(
         states, commands, first, threshold, model.service_shaft_speed, dt, inside,
-        passage.sky, passage.words, passage.ship,
+        *passage.sea, passage.numbers,
     )  # fmt: skip
     times = dt * np.arange(n_steps + 1, dtype=float)
     if reached < n_steps:

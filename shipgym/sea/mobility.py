@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from shipgym.errors import InputError
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.ships.inertia import inertia
-from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.term_table import Structure
 
 Floats = NDArray[np.float64]
@@ -20,12 +20,12 @@ _AXES = "uvrp"
 _FORCES = "XYNK"
 
 
-def mobility(model: ShipModel, water_depth: float = np.inf) -> Floats:
+def mobility(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     """Accelerations by unit force and moment, those that are not always 0.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
     water_depth : float
         m; the tanker's added mass grows in shallow water.
 
@@ -44,17 +44,18 @@ def mobility(model: ShipModel, water_depth: float = np.inf) -> Floats:
     return np.array([matrix[_AXES.index(row[0]), _FORCES.index(row[1])] for row in MOBILITY_ROWS])
 
 
-def mobility_matrix(model: ShipModel, water_depth: float = np.inf) -> Floats:
+def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     """Inverse of mass and added mass of surge, sway, yaw and roll.
 
     An identified model divides by the inertia of its particulars, given or estimated, a reference ship by
     that of its own equations. A structure without an equation of surge keeps its speed, one without sway or
     yaw does not drift or turn: their rows and columns are 0. So is roll where the model has none; a
-    structure with an equation of roll has that inertia which the roll period and the metacentric height tell.
+    structure with an equation of roll, or a ship of the user's that rolls, has that inertia which the roll
+    period and the metacentric height tell.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
     water_depth : float
         m.
 
@@ -77,12 +78,15 @@ def mobility_matrix(model: ShipModel, water_depth: float = np.inf) -> Floats:
     elif isinstance(model.dynamics, Structure):
         axes = [_AXES.index(equation) for equation in model.dynamics.equations if equation in _AXES]
         mass[3, 3] = roll_inertia(model) if 3 in axes else 0.0
+    elif "phi" in model.state_names:
+        axes = [0, 1, 2, 3]
+        mass[3, 3] = roll_inertia(model)
     matrix = np.zeros((4, 4))
     matrix[np.ix_(axes, axes)] = np.linalg.inv(mass[np.ix_(axes, axes)])
     return matrix
 
 
-def _inertia(model: ShipModel, water_depth: float) -> Floats:
+def _inertia(model: ManoeuvringModel, water_depth: float) -> Floats:
     if isinstance(model.dynamics, Structure):
         weather_particulars(model.particulars)  # says what is missing
     try:
@@ -91,14 +95,14 @@ def _inertia(model: ShipModel, water_depth: float) -> Floats:
         raise InputError(f"weather without the particulars it needs: {error}") from None
 
 
-def roll_inertia(model: ShipModel) -> float:
+def roll_inertia(model: ManoeuvringModel) -> float:
     """Inertia in roll of the ship and the water that rolls with it, kg m2: m g GM (T / 2 pi)^2."""
     ship = weather_particulars(model.particulars)
     stiffness = ship.require("mass") * GRAVITY * ship.require("metacentric_height")
     return stiffness * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
 
 
-def _container_roll(model: ShipModel, mass: Floats) -> Floats:
+def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
     """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
     numbers, p = model.coefficients, model.particulars
     unit = 0.5 * p.require("water_density") * p.length**5

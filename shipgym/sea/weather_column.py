@@ -1,25 +1,33 @@
-"""Weather as the kernels read it: rows of a ship's tile that tell what current, wind and waves do to her."""
+"""The sea as loops read it: what current, wind and waves do to a ship, as numbers of `SeaParameters`."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.engine.records import flat
 from shipgym.errors import InputError
-from shipgym.kernels import layout
-from shipgym.kernels import weather_rows as rows
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.gusts import GaussMarkov, gust_filter
 from shipgym.sea.harmonics import Harmonics
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.motions import wave_motion
+from shipgym.sea.open_sea import Cosines, Filter, SeaParameters, Sines
 from shipgym.sea.waves import wave_filter
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
-from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
 Floats = NDArray[np.float64]
 GRAVITY = 9.80665
+HARMONICS = len(Sines._fields)
+FLAT, NONE, STEADY = Cosines(*[0.0] * (HARMONICS + 1)), Sines(*[0.0] * HARMONICS), Filter(0.0, 0.0, 0.0)
+CALM = SeaParameters(
+    current_speed=0.0, current_towards=0.0, current=STEADY, wind_speed=0.0, wind_from=0.0, gust=STEADY,
+    waves_from=0.0, wave_frequency=0.0, wave_number=0.0, wave_damping=0.0, wave_ringing=1.0, drift=STEADY,
+    still_air=0.0, wind_surge=FLAT, wind_sway=NONE, wind_yaw=NONE, wind_roll=NONE, drift_surge=FLAT,
+    drift_sway=NONE, drift_yaw=NONE, drift_roll=NONE, heading_variance=FLAT, roll_variance=FLAT,
+)  # fmt: skip
 
 
 def as_weather(weather: Weather | str | None, where: str, from_deg: float | None = 45.0) -> Weather:
@@ -45,17 +53,19 @@ def as_weather(weather: Weather | str | None, where: str, from_deg: float | None
         raise InputError(f"{where}: {reason}") from None
 
 
-def weather_column(model: ShipModel, weather: Weather, step: float, water_depth: float = np.inf) -> Floats:
-    """Rows that tell a ship's weather, in the order of `shipgym.kernels.weather_rows`.
+def weather_column(
+    model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf
+) -> Floats:
+    """What a weather does to a ship, in the order of `SeaParameters`.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
         The ship; forces become accelerations by her inertia.
     weather : Weather
         Parts that are calm do nothing.
     step : float
-        Between two states of the weather, s.
+        Between two states of the sea, s.
     water_depth : float
         m; where the added mass depends on it.
 
@@ -68,21 +78,14 @@ def weather_column(model: ShipModel, weather: Weather, step: float, water_depth:
     InputError
         If the ship's particulars are not enough.
     """
-    column = np.zeros(layout.row(layout.COEFFICIENTS - layout.WEATHER))
-    current, wind, waves = weather.current, weather.wind, weather.waves
+    sea, current, wind, waves = CALM, weather.current, weather.wind, weather.waves
     if current is not None and not current.calm:
-        _current(column, current, step)
+        sea = _with_current(sea, current, step)
     if wind is not None and not wind.calm:
-        _wind(column, model, wind, step, mobility_matrix(model, water_depth))
-    column[_at(rows.WAVE_RINGING)] = 1.0
+        sea = _with_wind(sea, model, wind, step, mobility_matrix(model, water_depth))
     if waves is not None and not waves.calm:
-        _waves(column, model, waves, step, mobility_matrix(model, water_depth))
-    return column
-
-
-def _at(offset: int) -> int:
-    """Place in the column of a row of the tile."""
-    return layout.row(offset - layout.WEATHER)
+        sea = _with_waves(sea, model, waves, step, mobility_matrix(model, water_depth))
+    return np.array(flat(sea))
 
 
 def _direction(degrees: float | None) -> float:
@@ -90,44 +93,58 @@ def _direction(degrees: float | None) -> float:
     return float("nan") if degrees is None else float(np.radians(degrees))
 
 
-def _filter(column: Floats, kept: int, process: GaussMarkov, step: float) -> None:
-    """Three rows of a first-order process: part kept over a step, deviation of what is added, and its own."""
-    decay = float(np.exp(-step / process.time_constant))
+def _filter(process: GaussMarkov, step: float) -> Filter:
+    """A first-order process in steps."""
     shock = process.standard_deviation * float(np.sqrt(-np.expm1(-2.0 * step / process.time_constant)))
-    column[_at(kept) : _at(kept) + 3] = decay, shock, process.standard_deviation
+    return Filter(float(np.exp(-step / process.time_constant)), shock, process.standard_deviation)
 
 
-def _current(column: Floats, current: Current, step: float) -> None:
-    column[_at(rows.CURRENT_SPEED)] = current.speed
-    column[_at(rows.CURRENT_TOWARDS)] = _direction(current.towards_deg)
-    _filter(column, rows.CURRENT_KEPT, GaussMarkov(current.time_constant, current.variation), step)
+def _with_current(sea: SeaParameters, current: Current, step: float) -> SeaParameters:
+    return sea._replace(
+        current_speed=current.speed,
+        current_towards=_direction(current.towards_deg),
+        current=_filter(GaussMarkov(current.time_constant, current.variation), step),
+    )
 
 
-def _wind(column: Floats, model: ShipModel, wind: Wind, step: float, mobility: Floats) -> None:
-    column[_at(rows.WIND_SPEED)] = wind.speed
-    column[_at(rows.WIND_FROM)] = _direction(wind.from_deg)
-    _filter(column, rows.GUST_KEPT, gust_filter(wind), step)
-    forces = wind_curves(model.particulars, wind.coefficients).harmonics(rows.HARMONICS)
+def _with_wind(
+    sea: SeaParameters, model: ManoeuvringModel, wind: Wind, step: float, mobility: Floats
+) -> SeaParameters:
+    forces = wind_curves(model.particulars, wind.coefficients).harmonics(HARMONICS)
     X, Y, N, K = (0.5 * AIR_DENSITY * series for series in forces)
     surge, sway, yaw, roll = _accelerations(mobility, Harmonics(X, Y, N, K))
-    column[_at(rows.WIND_SURGE) : _at(rows.DRIFT_SURGE)] = np.concatenate([surge, sway, yaw, roll])
-    column[_at(rows.STILL_AIR)] = -surge.sum()  # of the wind she makes herself, at angle 0
+    return sea._replace(
+        wind_speed=wind.speed,
+        wind_from=_direction(wind.from_deg),
+        gust=_filter(gust_filter(wind), step),
+        wind_surge=Cosines(*surge),
+        wind_sway=Sines(*sway),
+        wind_yaw=Sines(*yaw),
+        wind_roll=Sines(*roll),
+        still_air=-float(surge.sum()),  # of the wind she makes herself, at angle 0
+    )
 
 
-def _waves(column: Floats, model: ShipModel, waves: Waves, step: float, mobility: Floats) -> None:
+def _with_waves(
+    sea: SeaParameters, model: ManoeuvringModel, waves: Waves, step: float, mobility: Floats
+) -> SeaParameters:
     spectrum = wave_filter(waves)
-    column[_at(rows.WAVES_FROM)] = _direction(waves.from_deg)
-    column[_at(rows.WAVE_FREQUENCY)] = spectrum.peak_frequency
-    column[_at(rows.WAVE_NUMBER)] = spectrum.peak_frequency**2 / GRAVITY
-    column[_at(rows.WAVE_DAMPING)] = spectrum.damping
-    column[_at(rows.WAVE_RINGING)] = np.sqrt(1.0 - spectrum.damping**2)
-    drift = wave_drift(waves, model.particulars)
-    _filter(column, rows.DRIFT_KEPT, GaussMarkov(drift.time_constant, drift.standard_deviation), step)
-    surge, sway, yaw, heel = _accelerations(mobility, drift.harmonics(rows.HARMONICS))
-    motion = wave_motion(waves, model.particulars)
-    heading = motion.heading_variance_harmonics(rows.HARMONICS)
-    roll = motion.roll_variance_harmonics(rows.HARMONICS)
-    column[_at(rows.DRIFT_SURGE) :] = np.concatenate([surge, sway, yaw, heel, heading, roll])
+    drift, motion = wave_drift(waves, model.particulars), wave_motion(waves, model.particulars)
+    surge, sway, yaw, heel = _accelerations(mobility, drift.harmonics(HARMONICS))
+    return sea._replace(
+        waves_from=_direction(waves.from_deg),
+        wave_frequency=spectrum.peak_frequency,
+        wave_number=spectrum.peak_frequency**2 / GRAVITY,
+        wave_damping=spectrum.damping,
+        wave_ringing=float(np.sqrt(1.0 - spectrum.damping**2)),
+        drift=_filter(GaussMarkov(drift.time_constant, drift.standard_deviation), step),
+        drift_surge=Cosines(*surge),
+        drift_sway=Sines(*sway),
+        drift_yaw=Sines(*yaw),
+        drift_roll=Sines(*heel),
+        heading_variance=Cosines(*motion.heading_variance_harmonics(HARMONICS)),
+        roll_variance=Cosines(*motion.roll_variance_harmonics(HARMONICS)),
+    )
 
 
 def _accelerations(mobility: Floats, forces: Harmonics) -> tuple[Floats, Floats, Floats, Floats]:

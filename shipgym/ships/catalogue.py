@@ -2,17 +2,82 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from shipgym.checks import check_choice
-from shipgym.ships.container import container
-from shipgym.ships.kvlcc2 import kvlcc2, kvlcc2_l7
+from shipgym.errors import InputError
+from shipgym.ships import container as container_file
+from shipgym.ships import kvlcc2 as kvlcc2_file
+from shipgym.ships import tanker as tanker_file
+from shipgym.ships.equations import ShipEquations, read_ship_equations
 from shipgym.ships.mariner import mariner
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.tanker import tanker
+from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, list_structures
 
 LIBRARY = Path(__file__).parent / "library"
+
+Form = Literal["published", "shipmmg"]
+
+
+def model_of(ship: ShipEquations, coefficients: Mapping[str, float] | None = None) -> ShipModel:
+    """A ship with equations of her own as a model, some coefficients changed or none."""
+    return ShipModel(
+        name=ship.name,
+        structure=ship.name,
+        particulars=ship.particulars,
+        steering=ship.steering,
+        coefficients={**ship.coefficients, **(coefficients or {})},
+        provenance={"source": ship.source},
+        own_table=None if ship.name in SHIPPED_EQUATIONS else ship,
+        service_shaft_speed=ship.service_shaft_speed,
+    )
+
+
+def container(rudder_limit_deg: float = 35.0) -> ShipModel:
+    """The container ship S175 (SR108), 4 degrees of freedom; the MSS toolbox has a limit of 10 degrees."""
+    model = model_of(container_file.SHIP)
+    return replace(model, steering=replace(model.steering, rudder_limit_deg=rudder_limit_deg))
+
+
+def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
+    """The Esso 190 000 dwt tanker, deep and shallow water; the MSS toolbox has a limit of 10 degrees."""
+    model = model_of(tanker_file.SHIP)
+    return replace(model, steering=replace(model.steering, rudder_limit_deg=rudder_limit_deg))
+
+
+def kvlcc2(form: Form = "published") -> ShipModel:
+    """KVLCC2 at full scale, 320 m.
+
+    Parameters
+    ----------
+    form : {"published", "shipmmg"}
+        The standard method as published, or the variant of the package shipmmg 0.0.11.
+
+    Returns
+    -------
+    ShipModel
+    """
+    model = kvlcc2_l7(form)
+    scale = kvlcc2_file.FULL_SCALE
+    return replace(
+        model,
+        name="kvlcc2",
+        particulars=kvlcc2_file.particulars("KVLCC2", kvlcc2_file.Coefficients(**scale), 58.0, 7.973889),
+        steering=replace(model.steering, rudder_rate_deg_s=2.34),
+        coefficients={**model.coefficients, **scale},
+        service_shaft_speed=1.77851,
+    )
+
+
+def kvlcc2_l7(form: Form = "published") -> ShipModel:
+    """KVLCC2 as a model of 7 m; `form` as in `kvlcc2`."""
+    model = model_of(kvlcc2_file.SHIP, {"PACKAGE_FORM": float(form == "shipmmg")})
+    return replace(model, name="kvlcc2-l7", provenance={"source": kvlcc2_file.SHIP.source, "form": form})
+
+
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
     "mariner": mariner,
     "container": container,
@@ -23,17 +88,50 @@ REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
 
 
 def list_models() -> list[str]:
-    """Names of the shipped models: reference ships first, then identified ones."""
-    return [*REFERENCE_SHIPS, *sorted(path.stem for path in LIBRARY.glob("*.json"))]
+    """Names of the known models: reference ships, identified ones, then ships that were registered."""
+    registered = [name for name in EQUATIONS if name not in SHIPPED_EQUATIONS]
+    return [*REFERENCE_SHIPS, *sorted(path.stem for path in LIBRARY.glob("*.json")), *registered]
+
+
+def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
+    """Make a ship with equations of her own known by her name, so that `load_model` finds her.
+
+    Parameters
+    ----------
+    ship : ShipEquations, str or Path
+        The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
+        from a file, or from one that cannot be imported, stays in this process.
+
+    Returns
+    -------
+    ShipEquations
+
+    Raises
+    ------
+    InputError
+        For a file that does not define a ship, or a name that another ship or structure has.
+    """
+    found = ship if isinstance(ship, ShipEquations) else read_ship_equations(ship)
+    name = found.name
+    registered = EQUATIONS.get(name)
+    again = registered is not None and registered.path == found.path and name not in SHIPPED_EQUATIONS
+    if not again and name in (*list_models(), *list_structures()):
+        raise InputError(
+            f"register_ship_equations: name {name!r} found, which is another ship's or structure's; expected "
+            "a new name"
+        )
+    EQUATIONS[name] = found
+    return found
 
 
 def load_model(name: str | Path) -> ShipModel:
-    """A shipped model by name, or a model from a file.
+    """A model by name, or from a file.
 
     Parameters
     ----------
     name : str or Path
-        A name of `list_models`, or the path of a model file.
+        A name of `list_models`, the path of a model file, or that of a Python file with the equations of a
+        ship (`register_ship_equations`), which is run.
 
     Returns
     -------
@@ -45,7 +143,11 @@ def load_model(name: str | Path) -> ShipModel:
         If there is no such model or file, or the file is not a valid model.
     """
     path = Path(name)
+    if path.suffix == ".py":
+        return model_of(register_ship_equations(path))
     if name not in list_models() and (path.suffix == ".json" or path.exists() or isinstance(name, Path)):
         return ShipModel.load(path)
     known = check_choice(name, list_models(), "model (a name, or the path of a model file)")
-    return REFERENCE_SHIPS[known]() if known in REFERENCE_SHIPS else ShipModel.load(LIBRARY / f"{known}.json")
+    if known in REFERENCE_SHIPS:
+        return REFERENCE_SHIPS[known]()
+    return model_of(EQUATIONS[known]) if known in EQUATIONS else ShipModel.load(LIBRARY / f"{known}.json")

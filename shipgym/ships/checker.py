@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
-from shipgym.ships.grey_box import GreyBox
+from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.term_table import Structure
 
@@ -95,10 +95,13 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         except InputError as error:
             return ModelCheck(str(model), (str(error),), (), float("nan"))
     try:
-        model.ship_column()
+        model.ship_numbers()
     except InputError as error:
         return ModelCheck(model.name, (str(error),), (), float("nan"))
-    problems = list(_wrong_accelerations(model))
+    try:
+        problems = list(_wrong_accelerations(model))
+    except InputError as error:  # equations that cannot be compiled
+        return ModelCheck(model.name, (str(error),), (), float("nan"))
     remarks: list[str] = []
     asymmetry = float("nan")
     if not problems:
@@ -168,7 +171,8 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
     """Accelerations as sums of the table's terms, shape (n, n_rates)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     shaft = model.service_shaft_speed
-    theta = table.kernel_coefficients(model.coefficients, model.particulars, shaft)
+    n_terms = sum(map(len, table.equations.values()))
+    theta = table.numbers(model.coefficients, model.particulars, shaft)[-n_terms:]  # those of the terms
     rates = _rates(model)
     accelerations = np.zeros((SAMPLES, len(rates)))
     accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
@@ -177,13 +181,13 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
         features = table.features(equation, channels, model.particulars, shaft)
         accelerations[:, rates.index(equation)] = features @ theta[row : row + len(terms)]
         row += len(terms)
-    if "q" in rates:
-        accelerations[:, rates.index("r")] += channels["q"]
     if isinstance(table, GreyBox):
-        known = table.converted_accelerations(channels, model.particulars, shaft)
-        for axis, equation in enumerate("uvr"):
+        for equation, known in table.converted_accelerations(channels, model.particulars, shaft).items():
+            axis = rates.index(equation)
             own = accelerations[:, axis] if equation in table.equations else 0.0
-            accelerations[:, axis] = known[equation] + own
+            accelerations[:, axis] = known + own
+    elif "q" in rates:
+        accelerations[:, rates.index("r")] += channels["q"]
     return accelerations
 
 

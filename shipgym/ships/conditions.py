@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import ModuleType
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.engine.loops import compile_loop, ship_loop
+from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.engine.records import leaves
+from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
-from shipgym.kernels import layout, weather_rows
 from shipgym.sea.conditions import Weather
+from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, Sea, sea_parts
 from shipgym.sea.weather_column import as_weather, weather_column
-from shipgym.ships.ship_model import Seed, ShipModel
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
 Floats = NDArray[np.float64]
+Seed = int | np.random.Generator
 CALM = Weather(name="calm")
 
 
@@ -38,11 +44,11 @@ class Conditions:
 
 
 class Passage:
-    """One ship on her way through given conditions: the kernels for them and the arrays they work on.
+    """One ship on her way through given conditions: the loops for them and the arrays they work on.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
         The ship.
     conditions : Conditions
         Where she sails.
@@ -51,42 +57,49 @@ class Passage:
 
     Attributes
     ----------
-    ship, sky, words : array
-        Tiles of the ship, of the state of the weather and of its random numbers.
+    windy : bool
+        Whether there is any weather.
+    numbers : array of shape (n_rows,)
+        The ship's numbers.
+    sea : tuple of array
+        State of the sea, that of its random numbers and its parameters, as loops take them.
     """
 
-    def __init__(self, model: ShipModel, conditions: Conditions, dt: float) -> None:
-        self.model = model
+    def __init__(self, model: ManoeuvringModel, conditions: Conditions, dt: float) -> None:
+        self.vessel = model.vessel
+        self.numbers = model.ship_numbers(conditions.water_depth)
         weather = as_weather(conditions.weather, "weather")
         self.windy = not weather.calm
-        self.sky, self.words = np.zeros(0), np.zeros(0, dtype=np.uint64)
-        column = None
+        self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:
-            column = weather_column(model, weather, dt, conditions.water_depth)
-            self.sky = np.zeros(weather_rows.SKY_END)
-            self.words = np.zeros(layout.LANES, dtype=np.uint64)
-            self.words[0] = _first_word(conditions.seed)
-        self.ship = model.ship_tile(conditions.water_depth, column)
+            parameters = weather_column(model, weather, dt, conditions.water_depth)
+            self.sea = np.zeros(len(leaves(Sea))), np.array([_first_word(conditions.seed)]), parameters
 
-    def kernel(self, name: str) -> ModuleType:
-        """One file of kernels, compiled for the ship and for calm water or weather."""
-        return self.model.kernel(name, self.windy)
+    def loop(self, name: str) -> Any:
+        """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
+        return _windy_loop(self.vessel, name) if self.windy else ship_loop(self.vessel, name)
 
     def states(self, first: Floats, n_steps: int) -> Floats:
-        """Rows for n_steps + 1 states of the kernels, and the weather behind each, with the first filled in.
+        """Rows for n_steps + 1 states, and the weather behind each, with the first filled in.
 
         Parameters
         ----------
         first : array of shape (n_columns,)
-            A state of the kernels; the weather begins with it, unless it comes with one.
+            A state; the weather begins with it, unless it comes with one.
         n_steps : int
         """
-        width = layout.N_STATE + (len(weather_rows.CHANNEL_NAMES) if self.windy else 0)
+        width = len(self.vessel.state_names) + (len(SEA_CHANNELS) if self.windy else 0)
         states = np.empty((n_steps + 1, width))
         states[0, : len(first)] = first
         if len(first) < width:
-            self.kernel("trajectories").meet(states, self.sky, self.words, self.ship)
+            self.loop("meet")(states, *self.sea)
         return states
+
+
+@cache
+def _windy_loop(vessel: Vessel, name: str) -> Any:
+    words = {"BEGIN_WORDS": BEGIN_WORDS, "EVOLVE_WORDS": EVOLVE_WORDS}
+    return compile_loop(vessel, name, {**sea_parts(True, lanes=1), **words})
 
 
 def _first_word(seed: Seed) -> np.uint64:

@@ -1,11 +1,20 @@
-"""Hand-written equations of reference ships: a file of kernels, with the numbers it holds."""
+"""Ships with equations of their own: a record of coefficients and functions that read like the publication.
+
+A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with their published values,
+`accelerations(motion, c, ship)`, where the speed of the shaft is a state `shaft_acceleration(n, command, c,
+ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgym.engine` compiles them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
-from importlib import import_module
+import importlib
+import importlib.util
+import math
+import sys
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -13,92 +22,222 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.checks import check_number, check_text
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.parts import Part
+from shipgym.engine.records import Record, field_types, is_record
+from shipgym.engine.vessel import Vessel
+from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
 
 Floats = NDArray[np.float64]
-
-KERNELS = Path(__file__).parents[1] / "kernels"
+RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
+Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
 
 @dataclass(frozen=True)
-class Equations:
-    """The accelerations of one reference ship, as a file of `shipgym/kernels`.
+class ShipEquations:
+    """The equations of motion of one ship, with her numbers.
 
     Attributes
     ----------
     name : str
-        Name of the structure, and of the file.
+        By which `load_model` and model files know the ship.
     source : str
-        Where it was published.
-    command_names : tuple of str
-        Rudder, and shaft speed where the ship has a propeller.
+        Where the equations were published.
+    coefficients_record : type
+        A `NamedTuple` of floats, each with its published value as the default.
+    accelerations : callable
+        From (motion, coefficients, ship) to udot, vdot in m/s^2, rdot, pdot in rad/s^2, and the rate of the
+        memory of yaw, 0 as a rule; body frame, origin midship. See `Motion` and `Ship` of
+        `shipgym.engine.motion`.
+    particulars : Particulars
+        With length and service speed.
+    steering : SteeringGear
+        Her steering gear.
+    shaft_acceleration : callable, optional
+        From (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2: then its speed is a
+        state. Without it the shaft turns as commanded.
+    service_shaft_speed : float
+        1/s; 0 for a ship without a propeller of her own, whose only command is the rudder.
+    rolls : bool
+        Whether roll rate and heel are among her states.
     shallow_water : bool
-        Whether the depth of the water is known to them.
+        Whether the equations know the depth of the water.
     astern : bool
-        Whether their propeller holds for a shaft that turns astern.
+        Whether the propeller holds for a shaft that turns astern.
+    switches : tuple of str
+        Coefficients that choose between forms of the equations: the functions read them as constants of the
+        same name in their file, which are compiled in.
     """
 
     name: str
     source: str
-    command_names: tuple[str, ...]
+    coefficients_record: Record
+    accelerations: Accelerations
+    particulars: Particulars
+    steering: SteeringGear
+    _: KW_ONLY
+    shaft_acceleration: Callable[[float, float, Any, Any], float] | None = None
+    service_shaft_speed: float = 0.0
+    rolls: bool = False
     shallow_water: bool = False
     astern: bool = False
+    switches: tuple[str, ...] = ()
+    path: Path | None = field(default=None, repr=False)
 
-    @cached_property
-    def module(self) -> ModuleType:
-        """The file, imported as plain Python."""
-        return import_module(f"shipgym.kernels.{self.name}")
+    def __post_init__(self) -> None:
+        check_text(self.name, "ship equations: name")
+        where = f"equations of {self.name!r}"
+        check_text(self.source, f"{where}: source")
+        record = self.coefficients_record
+        if not is_record(record) or any(kind is not float for kind in field_types(record).values()):
+            raise InputError(
+                f"{where}: coefficients_record {record!r} found, expected a NamedTuple of floats"
+            )
+        valued = record._field_defaults  # type: ignore[attr-defined]
+        for name in self.coefficient_names:
+            if name not in valued:
+                raise InputError(f"{where}: coefficient {name!r} has no value, expected a default")
+            check_number(valued[name], f"{where}: coefficient {name!r}")
+        for function in (self.accelerations, self.shaft_acceleration):
+            if function is not None and not callable(function):
+                raise InputError(f"{where}: {function!r} found, expected a function")
+        if self.shaft_acceleration is not None or self.service_shaft_speed:
+            check_number(self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0)
+        self.particulars.require("speed")
+        self._try(where)
+
+    def _try(self, where: str) -> None:
+        """Work out the accelerations of one state as plain Python, whose messages are the clearest."""
+        L, U = self.particulars["length"], self.particulars["speed"]
+        n, limit, rate = self.service_shaft_speed, self.steering.limit, self.steering.rate
+        ship = Ship(L, U, limit, rate, 0.0, n, math.inf, U)
+        motion = Motion(0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n)
+        coefficients = self.coefficients_record()
+        try:
+            found = self.accelerations(motion, coefficients, ship)
+            shaft = self.shaft_acceleration and self.shaft_acceleration(n, 0.9 * n, coefficients, ship)
+        except Exception as error:
+            at = traceback.extract_tb(error.__traceback__)[-1]
+            reason = f"{type(error).__name__}: {error}"
+            raise InputError(f"{where}: {at.name} ({at.filename}, line {at.lineno}): {reason}") from error
+        if not isinstance(found, tuple) or len(found) != len(RATES):
+            raise InputError(
+                f"{where}: accelerations returns {found!r}, expected five numbers: udot, vdot, rdot, pdot, "
+                "qdot, 0 for those that the ship does not have"
+            )
+        for name, value in zip((*RATES, "shaft_acceleration"), (*found, shaft or 0.0), strict=True):
+            if not isinstance(value, (int, float)):
+                raise InputError(f"{where}: {name} is {value!r}, expected a number")
+
+    def __reduce__(self) -> Any:
+        """Another process finds a ship of this package by her name, another by her file."""
+        if self.path is not None:
+            return read_ship_equations, (self.path,)
+        return _named, (self.accelerations.__module__,)
 
     @property
     def coefficient_names(self) -> tuple[str, ...]:
-        """Names of the numbers in the file that are coefficients."""
-        names: tuple[str, ...] = self.module.COEFFICIENTS
+        """Names in the order of the record."""
+        names: tuple[str, ...] = self.coefficients_record._fields  # type: ignore[attr-defined]
         return names
 
     @property
     def coefficients(self) -> dict[str, float]:
         """The published coefficients."""
-        return {name: float(getattr(self.module, name)) for name in self.coefficient_names}
+        return {name: float(value) for name, value in self.coefficients_record()._asdict().items()}  # type: ignore[attr-defined]
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Rudder, and shaft speed where the ship has a propeller."""
+        return ("delta", "n") if self.service_shaft_speed else ("delta",)
 
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the state."""
-        roll = ("p", "phi") if self.module.ROLL else ()
-        shaft = ("n",) if self.module.SHAFT else ()
+        roll = ("p", "phi") if self.rolls else ()
+        shaft = ("n",) if self.shaft_acceleration is not None else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
 
-    def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
-        """The file, with the coefficients that differ from the published ones put in their place."""
-        text = (KERNELS / f"{self.name}.py").read_text(encoding="utf-8")
-        changed = {name: value for name, value in coefficients.items() if value != self.coefficients[name]}
-        return text + "".join(f"{name} = {value!r}\n" for name, value in changed.items())
+    @property
+    def normalisation(self) -> str:
+        """As a model file has it: the units of its coefficients are the publication's."""
+        return "own"
 
-    def kernel_coefficients(
+    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+        """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
+        chosen = tuple((name, bool(coefficients[name])) for name in self.switches)
+        functions = (self.accelerations, self.shaft_acceleration)
+        return _vessel(self.name, self.state_names, self.coefficients_record, functions, chosen, lag)
+
+    def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """None: they are compiled into the kernels."""
-        return np.empty(0)
+        """Numbers of the coefficients' record."""
+        return np.array([coefficients[name] for name in self.coefficient_names])
 
     def to_dict(self) -> dict[str, Any]:
-        """As it stands in a model file."""
+        """As they stand in a model file."""
         return {"name": self.name, "source": self.source}
 
 
-SON_NOMOTO = Equations(
-    "container",
-    "Son & Nomoto 1981, On the coupled motion of steering and rolling of a high speed container ship",
-    ("delta", "n"),
-)
-VAN_BERLEKOM = Equations(
-    "tanker",
-    "van Berlekom & Goddard 1972, Maneuvering of large tankers",
-    ("delta", "n"),
-    shallow_water=True,
-    astern=True,
-)
-MMG_KVLCC2 = Equations(
-    "kvlcc2",
-    "Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions",
-    ("delta", "n"),
-)
-EQUATIONS = {equations.name: equations for equations in (SON_NOMOTO, VAN_BERLEKOM, MMG_KVLCC2)}
+@cache
+def _vessel(
+    name: str,
+    state_names: tuple[str, ...],
+    record: Record,
+    functions: tuple[Callable[..., Any], Callable[..., Any] | None],
+    switches: tuple[tuple[str, bool], ...],
+    lag: bool,
+) -> Vessel:
+    accelerations, shaft = functions
+    parts: dict[str, Any] = {"accelerations": Part(accelerations), **dict(switches)}
+    if shaft is not None:
+        parts["shaft_acceleration"] = Part(shaft)
+    return Vessel(name, state_names, record, parts, lag)
+
+
+def read_ship_equations(path: str | Path) -> ShipEquations:
+    """The ship that a Python file defines as `SHIP`; the file is run.
+
+    Raises
+    ------
+    InputError
+        For a file that is not there, cannot be run, or defines no `SHIP`.
+    """
+    path = Path(path).resolve()
+    if not path.is_file():
+        raise InputError(
+            f"{path}: no such file, expected a Python file that defines SHIP = ShipEquations(...)"
+        )
+    return _read(path, path.stat().st_mtime_ns)
+
+
+@cache
+def _read(path: Path, changed: int) -> ShipEquations:
+    """Read once as long as the file does not change, so that models of one ship share what is compiled."""
+    name = f"shipgym_ship_{path.stem}_{abs(hash((path, changed))):x}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module: ModuleType = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+    except Exception as error:
+        raise InputError(f"{path}: cannot be run: {type(error).__name__}: {error}") from error
+    ship = getattr(module, "SHIP", None)
+    if not isinstance(ship, ShipEquations):
+        raise InputError(f"{path}: SHIP = {ship!r} found, expected SHIP = ShipEquations(...)")
+    object.__setattr__(ship, "path", path)
+    return ship
+
+
+def _named(module: str) -> ShipEquations:
+    """The ship of an importable file."""
+    ship: ShipEquations = importlib.import_module(module).SHIP
+    return ship

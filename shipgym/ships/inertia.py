@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.shared_structure import SharedStructure
-from shipgym.ships.ship_model import ShipModel
 
 Floats = NDArray[np.float64]
 
 
-def inertia(model: ShipModel, water_depth: float = np.inf) -> Floats:
+def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     """Mass and added mass, those with which the model's equations divide its forces.
 
     Parameters
@@ -39,7 +39,7 @@ def inertia(model: ShipModel, water_depth: float = np.inf) -> Floats:
     return own.get(model.structure, _particulars)(model)
 
 
-def rigid_inertia(model: ShipModel) -> tuple[float, float, float]:
+def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
     """Mass, kg, static moment, kg m, and yaw inertia, kg m2, of the ship alone, about midship."""
     numbers = model.coefficients
     if model.structure == "container":
@@ -54,13 +54,13 @@ def rigid_inertia(model: ShipModel) -> tuple[float, float, float]:
     return mass, mass * xg, mass * (p.require("yaw_gyradius") ** 2 + xg**2)
 
 
-def _prime_mass(model: ShipModel) -> float:
+def _prime_mass(model: ManoeuvringModel) -> float:
     """Unit of mass in the prime system, kg."""
     p = model.particulars.completed()
     return float(0.5 * p.require("water_density") * p.length**3)
 
 
-def _particulars(model: ShipModel) -> Floats:
+def _particulars(model: ManoeuvringModel) -> Floats:
     p = model.particulars.completed()
     unit, L = _prime_mass(model), p.length
     if isinstance(model.dynamics, SharedStructure):
@@ -76,7 +76,7 @@ def _particulars(model: ShipModel) -> Floats:
     return unit * prime
 
 
-def _container(model: ShipModel) -> Floats:
+def _container(model: ManoeuvringModel) -> Floats:
     """Son & Nomoto 1981; the added mass in sway acts above the centre, so that roll couples to sway."""
     c, L = model.coefficients, model.particulars["length"]
     prime = np.zeros((3, 4))
@@ -91,7 +91,7 @@ def _container(model: ShipModel) -> Floats:
     return _prime_mass(model) * prime
 
 
-def _kvlcc2(model: ShipModel) -> Floats:
+def _kvlcc2(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015, equations 6 and 7."""
     c, density = model.coefficients, model.particulars["water_density"]
     added = 0.5 * density * c["L"] ** 2 * c["d"]
@@ -103,7 +103,7 @@ def _kvlcc2(model: ShipModel) -> Floats:
     return matrix
 
 
-def _tanker(model: ShipModel, water_depth: float) -> Floats:
+def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
     """Van Berlekom & Goddard 1972, bis system: by the ship's mass, its yaw inertia by mass and length^2."""
     c, p = model.coefficients, model.particulars
     shallow = 0.0 if np.isposinf(water_depth) else p["draught"] / (water_depth - p["draught"])

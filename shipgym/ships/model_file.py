@@ -23,25 +23,26 @@ Format 1:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
-from shipgym.ships.equations import EQUATIONS, Equations
-from shipgym.ships.grey_box import GreyBox
+from shipgym.ships.equations import ShipEquations
+from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import EQUATION_NAMES, SYMBOLS, Structure
+from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
 
-FORMAT = 1
+Model = TypeVar("Model", bound=ManoeuvringModel)
+
 FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
     "steering", "service_shaft_speed", "envelope", "provenance",
@@ -49,40 +50,27 @@ FIELDS = (
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 
 
-def save(model: ShipModel, path: Path) -> None:
-    """Write a model file: to a temporary name, then renamed."""
-    write_json(model_fields(model), path)
-
-
-def model_fields(model: ShipModel) -> dict[str, Any]:
-    """What a model file holds, ready for JSON."""
-    return {
-        "format": FORMAT,
-        "name": model.name,
-        "structure": model.dynamics.to_dict(),
-        "normalisation": _normalisation(model.dynamics),
-        "coefficients": model.coefficients,
-        "covariance": None if model.covariance is None else model.covariance.tolist(),
-        "particulars": model.particulars.to_dict(),
-        "steering": model.steering.to_dict(),
-        "service_shaft_speed": model.service_shaft_speed,
-        "envelope": None if model.envelope is None else model.envelope.to_dict(),
-        "provenance": model.provenance,
-    }
-
-
-def load(path: Path) -> ShipModel:
+def load(path: Path, make: Callable[..., Model]) -> Model:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
     try:
-        return read_model(fields, str(path))
+        return read_model(fields, str(path), make)
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
-def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
-    """The model that `model_fields` wrote.
+def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
+    """The model that `ManoeuvringModel.to_dict` wrote.
+
+    Parameters
+    ----------
+    fields : mapping
+        Content of a model file.
+    where : str
+        Start of each message.
+    make : type
+        `ShipModel`.
 
     Raises
     ------
@@ -97,8 +85,8 @@ def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
     for name in REQUIRED:
         if name not in fields:
             raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
-    dynamics = _dynamics(fields["structure"], f"{where}: structure")
-    normalisation = _normalisation(dynamics)
+    dynamics = _dynamics(fields["structure"], f"{where}: structure", make)
+    normalisation = dynamics.normalisation
     if fields.get("normalisation", normalisation) != normalisation:
         raise InputError(
             f"{where}: normalisation {fields['normalisation']!r} found, expected {normalisation!r}"
@@ -106,7 +94,7 @@ def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
     coefficients = _coefficients(fields["coefficients"], dynamics, f"{where}: coefficients")
     covariance = fields.get("covariance")
     provenance = fields.get("provenance")
-    model = ShipModel(
+    model = make(
         name=check_text(fields["name"], f"{where}: name"),
         structure=dynamics.name,
         particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
@@ -115,23 +103,19 @@ def read_model(fields: Mapping[str, Any], where: str) -> ShipModel:
         covariance=None if covariance is None else _matrix(covariance, len(coefficients), where),
         envelope=read_envelope(fields.get("envelope"), f"{where}: envelope"),
         provenance=None if provenance is None else dict(check_table(provenance, f"{where}: provenance")),
-        own_table=dynamics if isinstance(dynamics, Structure) else None,
+        own_table=None if dynamics.name in SHIPPED_EQUATIONS else dynamics,
         service_shaft_speed=check_number(
             fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
         ),
     )
     if model.particulars.speed is None:
         raise InputError(f"{where}: particulars.speed: missing, expected the service speed in m/s")
-    model.ship_column()  # refuses particulars that the structure cannot do with
+    model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model
 
 
-def _normalisation(dynamics: Structure | Equations) -> str:
-    return dynamics.normalisation if isinstance(dynamics, Structure) else "own"
-
-
-def _dynamics(value: Any, where: str) -> Structure | Equations:
-    """A table of terms, or the name of a reference ship's equations."""
+def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:
+    """A table of terms, or the equations of a ship that has her own, by name."""
     table = check_table(value, where)
     keys = ("name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares")
     check_keys(table, keys, where)
@@ -139,11 +123,21 @@ def _dynamics(value: Any, where: str) -> Structure | Equations:
         return _shared(table, where)
     if "equations" in table:
         structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
-        return _grey_box(structure, table, where) if {"reference", "shaft"} & table.keys() else structure
-    return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
+        if {"reference", "shaft"} & table.keys():
+            return _grey_box(structure, table, where, make)
+        return structure
+    try:
+        return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
+    except InputError as error:
+        raise InputError(
+            f"{error} A ship with equations of her own is made known by "
+            "shipgym.register_ship_equations(file)."
+        ) from None
 
 
-def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> GreyBox:
+def _grey_box(
+    structure: Structure, table: Mapping[str, Any], where: str, make: Callable[..., ManoeuvringModel]
+) -> GreyBox:
     """A table of terms that is added to a reference ship, which is held whole."""
     reference = check_table(table.get("reference"), f"{where}.reference")
     shaft = table.get("shaft", False)
@@ -155,7 +149,7 @@ def _grey_box(structure: Structure, table: Mapping[str, Any], where: str) -> Gre
         structure.equations,
         structure.normalisation,
         structure.quantity,
-        read_model(reference, f"{where}.reference"),
+        read_model(reference, f"{where}.reference", make),
         shaft,
     )
 
@@ -199,7 +193,7 @@ def _shared(table: Mapping[str, Any], where: str) -> Structure:
     return SharedStructure.from_dict(table)
 
 
-def _coefficients(value: Any, structure: Structure | Equations, where: str) -> dict[str, float]:
+def _coefficients(value: Any, structure: Structure | ShipEquations, where: str) -> dict[str, float]:
     table = check_table(value, where)
     names = structure.coefficient_names
     if len(table) != len(names):

@@ -2,19 +2,39 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
-from shipgym.ships.equations import Equations
-from shipgym.ships.ship_model import ShipModel
 
 Floats = NDArray[np.float64]
 
 FASTEST_SHAFT = 5.0  # times the shaft speed at service speed; beyond it stands in other units
 
 
-def checked_orders(model: ShipModel, commands: ArrayLike) -> Floats:
+class Ordered(Protocol):
+    """What a ship has to say about the orders she can be given."""
+
+    @property
+    def name(self) -> str:
+        """Name of the ship."""
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Rudder, and shaft speed where there is one."""
+
+    @property
+    def service_shaft_speed(self) -> float:
+        """1/s."""
+
+    @property
+    def turns_astern(self) -> bool:
+        """Whether her shaft may turn astern."""
+
+
+def checked_orders(model: Ordered, commands: ArrayLike) -> Floats:
     """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
 
     A rudder ordered beyond its limit is brought to the limit, as its gear would do; beyond a right angle
@@ -33,13 +53,13 @@ def checked_orders(model: ShipModel, commands: ArrayLike) -> Floats:
             "with at least 2 steps"
         )
     check_units(model, orders)
-    if "n" in names and not turns_astern(model):
+    if "n" in names and not model.turns_astern:
         expected = f"a number >= 0: the equations of {model.name!r} hold for a shaft turning ahead only"
         _within(orders[:, names.index("n")], 0.0, np.inf, "shaft speed", expected, "commands")
     return orders
 
 
-def check_units(model: ShipModel, orders: Floats, where: str = "commands") -> None:
+def check_units(model: Ordered, orders: Floats, where: str = "commands") -> None:
     """Refuse orders of shape (n, n_command) that are no numbers, or in other units than rad and 1/s.
 
     Raises
@@ -56,19 +76,10 @@ def check_units(model: ShipModel, orders: Floats, where: str = "commands") -> No
     if "n" in names:
         most = FASTEST_SHAFT * model.service_shaft_speed
         expected = (
-            f"1/s (not rpm) between {-most if turns_astern(model) else 0.0:.4g} and {most:.4g}; "
+            f"1/s (not rpm) between {-most if model.turns_astern else 0.0:.4g} and {most:.4g}; "
             f"{model.service_shaft_speed:.4g} at service speed"
         )
         _within(orders[:, names.index("n")], -most, most, "shaft speed", expected, where)
-
-
-def turns_astern(model: ShipModel) -> bool:
-    """Whether the shaft may turn astern: a table of terms is taken at its word."""
-    dynamics = model.dynamics
-    if isinstance(dynamics, Equations):
-        return dynamics.astern
-    reference = getattr(dynamics, "reference", None)
-    return reference is None or turns_astern(reference)
 
 
 def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:

@@ -18,13 +18,7 @@ How the damaged print is read
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from shipgym.ships.shared_structure import read_shares, shared_structure
-
-if TYPE_CHECKING:
-    from shipgym.ships.particulars import Particulars
-    from shipgym.ships.ship_model import ShipModel
 
 XU = (
     "Xu, Hassani & Guedes Soares 2020, Truncated least square support vector machine for parameter "
@@ -68,24 +62,3 @@ TABLE_11 = {
     "N_rdot": -1.20e-3, "N_vdot": 1.87e-3, "N_uur": -8.41e-3, "N_r|r|": -1.00e-3, "N_uuv": 2.14e-2,
     "N_v|r|": -1.69e-2, "N_r|v|": 1.11e-2,
 }  # fmt: skip
-
-
-def xu_ship(particulars: Particulars) -> ShipModel:
-    """The ship of Table 11, which has neither rudder nor propeller.
-
-    Parameters
-    ----------
-    particulars : Particulars
-        Length, service speed and mass, which the paper does not print.
-
-    Returns
-    -------
-    ShipModel
-        Of structure `pmm18`.
-    """
-    from shipgym.ships.ship_model import ShipModel
-    from shipgym.ships.steering import SteeringGear
-
-    return ShipModel(
-        "xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance={"source": f"{XU}, Table 11"}
-    )

@@ -129,10 +129,10 @@ class SharedStructure(Structure):
             )
         return total
 
-    def kernel_coefficients(
+    def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Coefficients of the SI features of the accelerations: the forces by mass and added mass."""
+        """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
         p = particulars.completed()
         forces = {axis: self._velocity_forces(axis, coefficients, p) for axis in AXES}
         mobility = np.linalg.inv(self.inertia(coefficients, p))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.kernels import layout, weather_rows
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.conditions import Conditions, Passage, Seed
+from shipgym.ships.manoeuvring_model import ManoeuvringModel, two_commands
 from shipgym.ships.orders import checked_orders
-from shipgym.ships.ship_model import Seed, ShipModel, two_commands
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -19,7 +20,7 @@ LONGEST_STEP = 0.025  # of the time to travel one ship length
 
 
 def simulate(
-    model: ShipModel,
+    model: ManoeuvringModel,
     commands: ArrayLike,
     dt: float,
     state: ArrayLike | None = None,
@@ -33,24 +34,22 @@ def simulate(
     if not (np.isfinite(dt) and dt > 0.0):
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states = passage.states(model.kernel_states(initial_state(model, state)[None])[0], len(held))
-    reached = passage.kernel("trajectories").simulate(
-        states, two_commands(held), dt, passage.sky, passage.words, passage.ship
-    )
+    states = passage.states(initial_state(model, state), len(held))
+    reached = passage.loop("simulate")(states, two_commands(held), dt, *passage.sea, passage.numbers)
     times = dt * np.arange(len(states), dtype=float)
     if reached < len(held):
         raise unstable(model, times[reached], states[reached])
     return as_trial(model, times, states, np.vstack([held, held[-1:]]), kind)
 
 
-def open_loop(model: ShipModel, trial: Trial) -> Trial:
+def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
 
     The rudder is taken straight between the samples, as measured: no steering gear stands between.
 
     Parameters
     ----------
-    model : ShipModel
+    model : ManoeuvringModel
         The ship.
     trial : Trial
         With the channels u, v, r, psi, delta (x and y where recorded; n where the model has a shaft).
@@ -74,14 +73,13 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
             f"trial {trial.name!r}: channel {missing[0]!r} is missing, it is needed to predict the trial"
         )
     t = np.array(trial.t)
-    states = np.empty((len(t), layout.N_STATE))
+    states = np.empty((len(t), len(model.state_names)))
     first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
-    states[0] = model.kernel_states(_settled(model, np.array([first]), n[:1]))[0]
+    states[0] = _settled(model, np.array([first]), n[:1])[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
-    reached = model.kernel("open_loop").open_loop(
-        states, t, np.array(trial["delta"]), n, longest_step, model.ship_tile()
-    )
+    loop = ship_loop(model.vessel, "open_loop")
+    reached = loop(states, t, np.array(trial["delta"]), n, longest_step, model.ship_numbers())
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
     return Trial(
@@ -94,7 +92,7 @@ def open_loop(model: ShipModel, trial: Trial) -> Trial:
     )
 
 
-def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
+def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
     """A given state, checked, or straight ahead at service speed."""
     if state is None:
         return model.service_state
@@ -107,10 +105,12 @@ def initial_state(model: ShipModel, state: ArrayLike | None) -> Floats:
     return start
 
 
-def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None) -> Trial:
-    """States of the kernels, the weather behind them and the commands held from each sample on as a Trial."""
+def as_trial(
+    model: ManoeuvringModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None
+) -> Trial:
+    """States, the weather behind them and the commands held from each sample on as a Trial."""
     channels = _channels(model, states)
-    for name, values in zip(weather_rows.CHANNEL_NAMES, states[:, layout.N_STATE :].T, strict=False):
+    for name, values in zip(SEA_CHANNELS, states[:, len(model.state_names) :].T, strict=False):
         if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
             channels[name] = values
     for name, command in zip(model.command_names, commands.T, strict=True):
@@ -122,13 +122,13 @@ def as_trial(model: ShipModel, t: Floats, states: Floats, commands: Floats, kind
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
 
 
-def _channels(model: ShipModel, states: Floats) -> dict[str, Floats]:
-    """What can be recorded of the kernels' states; a memory of yaw cannot."""
-    columns = zip(model.state_names, model.own_states(states).T, strict=True)
+def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
+    """What can be recorded of states; a memory of yaw cannot."""
+    columns = zip(model.state_names, states.T, strict=False)
     return {name: column for name, column in columns if name in CHANNELS}
 
 
-def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
+def _settled(model: ManoeuvringModel, states: Floats, shaft: Floats) -> Floats:
     """States whose memory of yaw, which no trial records, is that of a steady yaw rate."""
     if "q" in model.state_names:
         commands = np.stack([states[:, -1], shaft], axis=-1)[:, : len(model.command_names)]
@@ -137,9 +137,9 @@ def _settled(model: ShipModel, states: Floats, shaft: Floats) -> Floats:
     return states
 
 
-def unstable(model: ShipModel, time_s: float, state: Floats) -> UnstableModelError:
+def unstable(model: ManoeuvringModel, time_s: float, state: Floats) -> UnstableModelError:
     """The error for a ship that ran away after a given time and physical state."""
-    last = dict(zip(model.state_names, model.own_states(state[None])[0].tolist(), strict=True))
+    last = dict(zip(model.state_names, state.tolist(), strict=False))
     heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
     long = "" if time_s > 0.0 else ", or the step is far too long for it"
     return UnstableModelError(

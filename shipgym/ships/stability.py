@@ -7,16 +7,14 @@ Principles of Naval Architecture III, chapter IX, section 4 (the criterion C).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+from shipgym.ships.inertia import inertia
 from shipgym.ships.linear import linearise, straight_running
-
-if TYPE_CHECKING:
-    from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.ship_model import ShipModel
 
 Floats = NDArray[np.float64]
 SIDES = {"starboard": 1, "port": -1}
@@ -88,8 +86,6 @@ def straight_line_stability(model: ShipModel) -> StraightLineStability:
 
 def _criterion(model: ShipModel, matrices: dict[str, Floats]) -> dict[str, float] | None:
     """Determinant of the force derivatives of sway and yaw, prime system; None without sway or mass."""
-    from shipgym.ships.inertia import inertia
-
     if "q" in model.state_names:
         return None
     try:

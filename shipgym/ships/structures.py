@@ -7,14 +7,16 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
-from shipgym.ships.equations import EQUATIONS
+from shipgym.ships import container, kvlcc2, tanker
+from shipgym.ships.equations import ShipEquations
 from shipgym.ships.pmm import PMM18, PMM38
 from shipgym.ships.term_table import EQUATION_NAMES, FORCE_OF_EQUATION, Structure
 from shipgym.ships.terms import SYMBOLS, Term, prime_terms, read_terms
 
 __all__ = [
-    "ABKOWITZ", "EQUATION_NAMES", "FORCE_OF_EQUATION", "STRUCTURES", "SYMBOLS", "Structure", "Term",
-    "get_structure", "list_structures", "prime_terms", "read_terms", "register_structure",
+    "ABKOWITZ", "EQUATIONS", "EQUATION_NAMES", "FORCE_OF_EQUATION", "SHIPPED_EQUATIONS", "STRUCTURES",
+    "SYMBOLS", "Structure", "Term", "get_dynamics", "get_structure", "list_structures", "prime_terms",
+    "read_terms", "register_structure",
 ]  # fmt: skip
 
 ZHU = "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship dynamics"
@@ -134,6 +136,13 @@ PRINTED = frozenset(STRUCTURES)
 WITH_REFERENCE = "grey-box"  # a table that stands on a reference ship, which only a user can name
 
 
+SHIPPED_EQUATIONS: dict[str, ShipEquations] = {
+    ship.name: ship for ship in (container.SHIP, tanker.SHIP, kvlcc2.SHIP)
+}
+#: Ships with equations of their own by name, registered ones included.
+EQUATIONS = dict(SHIPPED_EQUATIONS)
+
+
 def list_structures() -> list[str]:
     """Names of the structures that can be identified, registered ones and the grey box included."""
     return [*STRUCTURES, WITH_REFERENCE]
@@ -153,6 +162,17 @@ def get_structure(name: str) -> Structure:
             "ship: identify(..., structure='grey-box', reference_model='tanker'), or shipgym.ships.grey_box"
         )
     return STRUCTURES[check_choice(name, list_structures(), "structure")]
+
+
+def get_dynamics(name: str) -> Structure | ShipEquations:
+    """A structure, or the equations of a ship that has her own, by name.
+
+    Raises
+    ------
+    InputError
+        If there is none of that name.
+    """
+    return EQUATIONS[name] if name in EQUATIONS else get_structure(name)
 
 
 def register_structure(

@@ -1,42 +1,136 @@
-"""The Esso 190 000 dwt tanker as a model (equations and coefficients: `shipgym/kernels/tanker.py`)."""
+"""Esso 190 000 dwt tanker, 3 degrees of freedom with shaft, in deep and shallow water.
+
+Source: van Berlekom & Goddard 1972, Maneuvering of large tankers, Trans. SNAME 80, appendix A; in the
+form of the function `tanker` of the MSS toolbox (Fossen 1994). Bis system: per unit mass, dimensional.
+The source's rudder is positive to port; here it is turned.
+"""
 
 from __future__ import annotations
 
-from shipgym.ships.equations import VAN_BERLEKOM
+from math import copysign, fabs
+from typing import NamedTuple
+
+from shipgym.engine.mathematics import arctan2
+from shipgym.engine.motion import Motion, Ship
+from shipgym.ships.equations import ShipEquations
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 
+LENGTH, DRAUGHT = 304.8, 18.46  # m
+SHAFT_LIMIT, SHAFT_LAG = 80.0 / 60.0, 50.0  # 1/s, s
+VERY_SHALLOW = 0.8  # T / (h - T) from which Y_uvz acts
 
-def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
-    """The Esso 190 000 dwt tanker, 3 degrees of freedom, deep and shallow water.
 
-    Parameters
-    ----------
-    rudder_limit_deg : float
-        The MSS toolbox has 10 degrees.
+class Coefficients(NamedTuple):
+    """As published; the index z is by draught over water below the keel, c by the speed of the race."""
 
-    Returns
-    -------
-    ShipModel
-    """
-    from shipgym.kernels import tanker as numbers
+    # thrust
+    t: float = 0.22
+    c_un: float = 0.605
+    c_nn: float = 38.2
+    T_uu: float = -0.00695
+    T_un: float = -0.00063
+    T_nn: float = 0.0000354
+    # hull and rudder
+    X_uu: float = -0.0377
+    X_vv: float = 0.3
+    X_ccdd: float = -0.093
+    X_ccbd: float = 0.152
+    Y_uv: float = -1.205
+    Y_vv: float = -2.400
+    Y_ccd: float = 0.208
+    Y_ccbbd: float = -2.16
+    Y_T: float = 0.04
+    N_uv: float = -0.451
+    N_vr: float = -0.300
+    N_ccd: float = -0.098
+    N_ccbbd: float = 0.688
+    N_T: float = -0.02
+    d11: float = 2.020
+    d22: float = -0.752
+    d33: float = -0.231
+    # mass and added mass by mass
+    m11: float = 1.050
+    m22: float = 2.020
+    m33: float = 0.1232
+    # shallow water
+    X_udotz: float = -0.05
+    Y_vdotz: float = -0.387
+    N_rdotz: float = -0.0045
+    X_uuz: float = -0.0061
+    X_vrz: float = 0.387
+    X_vvzz: float = 0.0125
+    Y_urz: float = 0.182
+    Y_vvz: float = -1.5
+    Y_uvz: float = -0.85
+    Y_ccbbdz: float = -0.191
+    N_urz: float = -0.047
+    N_vrz: float = -0.120
+    N_uvz: float = -0.241
+    N_ccbbdz: float = 0.344
 
-    return ShipModel(
-        name="tanker",
-        structure="tanker",
-        particulars=Particulars(
-            name="Esso 190 000 dwt tanker",
-            length=numbers.LENGTH,
-            beam=47.17,
-            draught=numbers.DRAUGHT,
-            mass=220_000.0 * 1025.0,
-            block_coefficient=0.83,
-            speed=8.225749013527,
-            water_density=1025.0,
-        ),
-        steering=SteeringGear(rudder_limit_deg, rudder_rate_deg_s=2.33, time_constant=1.0),
-        coefficients=VAN_BERLEKOM.coefficients,
-        service_shaft_speed=80.0 / 60.0,
-        provenance={"source": VAN_BERLEKOM.source},
+
+def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
+    """Accelerations in surge, sway and yaw, body frame, origin midship."""
+    u, v, r, n, L = motion.u, motion.v, motion.r, motion.n, LENGTH
+    d = -motion.delta
+    z = DRAUGHT / (ship.water_depth - DRAUGHT)
+    beta = arctan2(copysign(1.0, u) * v, fabs(u))
+    gT = (c.T_uu / L) * u * u + c.T_un * u * n + L * c.T_nn * fabs(n) * n
+    cc = max(c.c_un * u * n + c.c_nn * n * n, 0.0)
+    drift = cc * fabs(beta) * beta * fabs(d)
+    uvz = c.Y_uvz * (1.0 - VERY_SHALLOW / z) if z >= VERY_SHALLOW else 0.0
+
+    X = (
+        (c.X_uu * u * u + c.X_vv * v * v + c.X_ccdd * cc * d * d + c.X_ccbd * cc * beta * d
+         + c.X_uuz * u * u * z + c.X_vvzz * v * v * z * z) * (1.0 / L)
+        + (c.d11 + c.X_vrz * z) * v * r + (1.0 - c.t) * gT
+    )  # fmt: skip
+    Y = (
+        (c.Y_uv * u * v + c.Y_vv * fabs(v) * v + c.Y_ccd * cc * d + c.Y_ccbbd * drift
+         + uvz * u * v * z + c.Y_vvz * fabs(v) * v * z + c.Y_ccbbdz * drift * z) * (1.0 / L)
+        + (c.d22 + c.Y_urz * z) * u * r + c.Y_T * gT
+    )  # fmt: skip
+    N = (
+        (c.N_uv * u * v + c.N_ccd * cc * d + c.N_ccbbd * drift + c.N_uvz * u * v * z + c.N_ccbbdz * drift * z)
+        * (1.0 / (L * L))
+        + (c.N_vr * fabs(v) * r + c.d33 * u * r + c.N_urz * u * r * z + c.N_vrz * fabs(v) * r * z
+           + c.N_T * gT)
+        * (1.0 / L)
+    )  # fmt: skip
+    # as products, because the masses are the same in all stages of a step
+    return (
+        X * (1.0 / (c.m11 - c.X_udotz * z)),
+        Y * (1.0 / (c.m22 - c.Y_vdotz * z)),
+        N * (1.0 / (c.m33 - c.N_rdotz * z)),
+        0.0,
+        0.0,
     )
+
+
+def shaft_acceleration(n: float, command: float, c: Coefficients, ship: Ship) -> float:
+    """Lag of the shaft."""
+    return (min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT) - n) * (1.0 / SHAFT_LAG)
+
+
+SHIP = ShipEquations(
+    "tanker",
+    "van Berlekom & Goddard 1972, Maneuvering of large tankers",
+    Coefficients,
+    accelerations,
+    Particulars(
+        name="Esso 190 000 dwt tanker",
+        length=LENGTH,
+        beam=47.17,
+        draught=DRAUGHT,
+        mass=220_000.0 * 1025.0,
+        block_coefficient=0.83,
+        speed=8.225749013527,
+        water_density=1025.0,
+    ),
+    SteeringGear(rudder_rate_deg_s=2.33, time_constant=1.0),
+    shaft_acceleration=shaft_acceleration,
+    service_shaft_speed=80.0 / 60.0,
+    shallow_water=True,
+    astern=True,
+)

@@ -8,15 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_text, quoted
+from shipgym.engine.parts import Part
+from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
+from shipgym.ships.term_functions import (
+    Sum,
+    accelerations_function,
+    accelerations_source,
+    coefficients_record,
+)
 from shipgym.ships.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
 
 Floats = NDArray[np.float64]
@@ -185,21 +193,36 @@ class Structure:
         """Whether the depth of the water is known to it."""
         return False
 
-    def accelerations_source(self, coefficients: Mapping[str, float]) -> str:
-        """Source of the compiled accelerations; the coefficients are read at run time."""
-        return self._source
+    @property
+    def astern(self) -> bool:
+        """Whether the shaft may turn astern: a table is taken at its word."""
+        return True
+
+    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+        """What is compiled of a ship with this table; the coefficients are read at run time."""
+        return _vessel(self._source, len(self._terms), self.state_names, lag)
 
     @cached_property
     def _source(self) -> str:
         """Written once, however many models share the table."""
-        from shipgym.engine.generator import accelerations_source
+        return accelerations_source(self._sums)
 
-        return accelerations_source(self)
+    @property
+    def _sums(self) -> dict[str, Sum]:
+        return {
+            q: Sum(terms, tuple(self.speed_power(q, term) for term in terms), self.unit_speeds(q))
+            for q, terms in self.equations.items()
+        }
 
-    def kernel_coefficients(
+    @property
+    def _terms(self) -> tuple[Term, ...]:
+        """Those of all equations, one after the other."""
+        return tuple(term for terms in self.equations.values() for term in terms)
+
+    def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Coefficients of the SI features, in the order of the kernel's rows."""
+        """Numbers of the vessel's coefficients: those of the SI features of the accelerations, in order."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
         values: Floats = matrix @ np.array(list(coefficients.values()))
         return values
@@ -361,6 +384,12 @@ class Structure:
             table.get("normalisation", "prime"),
             table.get("quantity", "force"),
         )
+
+
+@cache
+def _vessel(source: str, n_terms: int, state_names: tuple[str, ...], lag: bool) -> Vessel:
+    parts = {"accelerations": Part(accelerations_function(source))}
+    return Vessel("a ship with a table of terms", state_names, coefficients_record(n_terms), parts, lag)
 
 
 def inertia(particulars: Particulars) -> Floats:

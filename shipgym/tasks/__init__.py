@@ -1,1 +1,5 @@
-"""Tasks: what is asked of an autopilot."""
+"""Tasks: what is asked of an autopilot, each in one file."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

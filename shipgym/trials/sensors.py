@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_number, check_whole
+from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
-from shipgym.kernels.weather_rows import CHANNEL_NAMES
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS, check_channel
 
@@ -221,7 +221,7 @@ class Sensors:
 
 PERFECT = Sensor()
 ORDERS = ("delta_command", "n_command")
-WEATHER = CHANNEL_NAMES  # known of a simulation, to no instrument
+WEATHER = SEA_CHANNELS  # known of a simulation, to no instrument
 
 
 def on_board(trial: Trial) -> dict[str, Floats]:

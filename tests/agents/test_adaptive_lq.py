@@ -11,16 +11,15 @@ from agents.controllers.adaptive_lq import GAINS
 from agents.controllers.batched_lq import lq_rows
 from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
 from agents.controllers.lq import lq_gain
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.task import control_interval
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.linear import linearise, straight_running
+from shipgym.tasks.task import control_interval, course_keeping_task
 
 MARINER = load_model("mariner")
-GENTLE = CourseKeepingTask(course_change_deg=10.0, episode_steps=2000)
+GENTLE = course_keeping_task(course_change_deg=10.0, episode_steps=2000)
 
 
 @pytest.mark.parametrize("name", ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"])
@@ -48,7 +47,7 @@ UNSTABLE = changed(N_v=1.7, N_uv=1.7)
 
 def state_after(controller, model, steps, task=GENTLE, state=None):
     """State after so many steps of two episodes, shape (2, memory_size)."""
-    engine = CourseKeepingEngine(model, 2, task)
+    engine = Engine(model, 2, task)
     seen = engine.reset(np.arange(2))
     for _ in range(steps):
         action, state = controller.predict(seen, state)
@@ -89,7 +88,7 @@ def test_on_its_own_ship_it_stays_near_its_design_at_no_more_cost():
 
 def test_in_noise_it_keeps_what_it_gained():
     """A model wrong by half in the rudder's effect; noise of a sea trial's sensors."""
-    task = CourseKeepingTask(course_change_deg=30.0, episode_steps=1500, noise=1.0)
+    task = course_keeping_task(course_change_deg=30.0, episode_steps=1500, noise=1.0)
     ours, theirs = (
         sail(kind.from_model(WEAK_RUDDER), MARINER, task, np.arange(12)) for kind in (AdaptiveLQ, LQ)
     )
@@ -143,7 +142,7 @@ def test_a_ship_without_sway_is_refused():
 
 def test_waves_teach_it_little_that_is_wrong():
     """First-order yawing is not steering: without a guard the gains run away (cost 700 in place of 27)."""
-    task, seeds = CourseKeepingTask(sea="moderate", noise=1.0), np.arange(16)
+    task, seeds = course_keeping_task(sea="moderate", noise=1.0), np.arange(16)
     ours, theirs = (sail(kind.from_model(MARINER), MARINER, task, seeds) for kind in (AdaptiveLQ, LQ))
     assert not ours.terminated.any()
     assert ours.cost.mean() < 1.2 * theirs.cost.mean()

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, PID, check_controller
-from shipgym.envs.course_keeping_task import OBSERVATION_NAMES
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import load_model
+from shipgym.tasks.task import OBSERVATION_NAMES, path_following_task
 
 MARINER = load_model("mariner")
 
@@ -16,7 +15,7 @@ MARINER = load_model("mariner")
 def test_our_controllers_pass_in_both_tasks(kind):
     controller = kind.from_model(MARINER)
     check_controller(controller, n_steps=20)
-    check_controller(controller, MARINER, PathFollowingTask(), n_steps=20)
+    check_controller(controller, MARINER, path_following_task(), n_steps=20)
 
 
 class Helmsman:

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, sail, step_response
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.mariner import mariner
+from shipgym.tasks.task import course_keeping_task
 
 MARINER = load_model("mariner")
 PILOT = PID.from_model(MARINER)
@@ -17,7 +17,7 @@ TURNED = replace(
     MARINER,
     coefficients={n: -value if n in ("N_d", "Y_d") else value for n, value in MARINER.coefficients.items()},
 )
-SHORT = CourseKeepingTask(episode_steps=150)
+SHORT = course_keeping_task(episode_steps=150)
 
 
 class Helmsman:
@@ -101,7 +101,7 @@ def test_a_lost_ship_is_counted_and_pays_for_the_rest_of_the_episode():
 
 
 def test_a_ship_without_a_helmsman_costs_its_heading_error():
-    task = CourseKeepingTask(episode_steps=100, course_change_deg=0.0)
+    task = course_keeping_task(episode_steps=100, course_change_deg=0.0)
     episodes = sail(AMIDSHIPS, MARINER, task, seeds=[0])
     assert episodes.rudder_travel_deg_min[0] == 0.0
     assert episodes.cost[0] == episodes.heading_cost[0] > 0.0
@@ -121,9 +121,9 @@ def test_step_responses_of_many_ships_are_those_of_each():
 
 def test_a_step_response_is_the_environments_own_turn():
     """Without noise the ship cannot tell a set-point of the task from the one shown to it here."""
-    from shipgym.envs.course_keeping import CourseKeepingEngine
+    from shipgym.envs.engine import Engine
 
-    engine = CourseKeepingEngine(MARINER, 1)
+    engine = Engine(MARINER, 1)
     observations = engine.reset([3])
     first = engine.physical_state()
     step_deg = float(np.degrees(first["set_point"][0] - first["psi"][0]))

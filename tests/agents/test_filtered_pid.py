@@ -5,9 +5,9 @@ import pytest
 
 from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
 from agents.controllers.filtered_pid import LEAD, TURN, notch_band
-from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task, observation_scales
 
 MARINER = load_model("mariner")
 INFINITE = float("inf")
@@ -86,7 +86,7 @@ def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
 
 def test_the_wave_filter_spares_the_rudder(filtered):
     deaf = FilteredPID.from_model(MARINER, wave_period=9.0)
-    task = CourseKeepingTask(sea="moderate")
+    task = course_keeping_task(sea="moderate")
     ours, theirs = (sail(pilot, MARINER, task, np.arange(16)) for pilot in (deaf, filtered))
     assert ours.rudder_travel_deg_min.mean() < 0.7 * theirs.rudder_travel_deg_min.mean()
     assert ours.cost.mean() < theirs.cost.mean()
@@ -101,7 +101,7 @@ def test_a_steady_course_is_reached_without_error(filtered):
 @pytest.mark.parametrize("period", [None, 9.0])
 def test_it_is_a_controller_and_a_file(period, tmp_path):
     pid = FilteredPID.from_model(MARINER, wave_period=period)
-    check_controller(pid, MARINER, CourseKeepingTask(noise=1.0), n_steps=20)
+    check_controller(pid, MARINER, course_keeping_task(noise=1.0), n_steps=20)
     pid.save(tmp_path / "pid.json")
     again = load_agent(tmp_path / "pid.json", MARINER)
     shown = np.random.default_rng(0).uniform(-0.3, 0.3, (4, 8))

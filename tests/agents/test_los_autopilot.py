@@ -13,16 +13,16 @@ from agents import (
     check_controller,
     load_agent,
 )
-from shipgym.envs.path_following import PathFollowingEngine
-from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Weather
 from shipgym.ships import load_model
+from shipgym.tasks.task import path_following_task
 
 MARINER = load_model("mariner")
 LENGTH, SPEED = MARINER.particulars["length"], MARINER.particulars["speed"]
 CURRENT = 1.5
-STRAIGHT = PathFollowingTask(
+STRAIGHT = path_following_task(
     waypoints=[(0.0, 0.0), (300.0 * LENGTH, 0.0)],
     sea=Weather(current=Current(CURRENT, 90.0)),
     episode_steps=2600,
@@ -31,7 +31,7 @@ STRAIGHT = PathFollowingTask(
 
 def cross_track(controller, task, n=1):
     """Cross-track errors, m, shape (n_steps, n), and rewards summed, shape (n,)."""
-    engine = PathFollowingEngine(MARINER, n, task)
+    engine = Engine(MARINER, n, task)
     seen, state, errors, total = engine.reset(np.arange(n)), None, [], np.zeros(n)
     for step in range(task.episode_steps):
         action, state = controller.predict(seen, state, np.full(n, step == 0))
@@ -63,7 +63,7 @@ def test_any_heading_autopilot_is_led(pilot):
 
 
 def test_paths_with_turns_in_a_current_cost_less_with_the_integral():
-    task = PathFollowingTask(sea=Weather(current=Current(CURRENT)))
+    task = path_following_task(sea=Weather(current=Current(CURRENT)))
     integral, plain = (
         cross_track(law.from_model(MARINER), task, 16)[1] for law in (IntegralLineOfSight, LineOfSight)
     )
@@ -71,7 +71,7 @@ def test_paths_with_turns_in_a_current_cost_less_with_the_integral():
 
 
 def test_with_the_task_s_own_lookahead_plain_line_of_sight_is_the_autopilot_itself():
-    task = PathFollowingTask(episode_steps=300)
+    task = path_following_task(episode_steps=300)
     ours, theirs = (
         cross_track(pilot, task, 4)[0] for pilot in (LineOfSight.from_model(MARINER), LQ.from_model(MARINER))
     )
@@ -82,12 +82,12 @@ def test_with_the_task_s_own_lookahead_plain_line_of_sight_is_the_autopilot_itse
 @pytest.mark.parametrize("pilot", [LQ, LQG])
 def test_it_is_a_controller_and_a_file(law, pilot, tmp_path):
     guided = law.from_model(MARINER, autopilot=pilot.from_model(MARINER))
-    check_controller(guided, MARINER, PathFollowingTask(noise=1.0), n_steps=20)
+    check_controller(guided, MARINER, path_following_task(noise=1.0), n_steps=20)
     guided.save(tmp_path / "guided.json")
     again = load_agent(tmp_path / "guided.json", MARINER)
     assert type(again) is law
     assert type(again.autopilot) is pilot
-    task = PathFollowingTask(episode_steps=50)
+    task = path_following_task(episode_steps=50)
     assert np.array_equal(*(cross_track(one, task, 2)[0] for one in (guided, again)))
     assert guided.margins_on(MARINER) == guided.autopilot.margins
 
@@ -101,7 +101,7 @@ class Learned:
 
 def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
     guided = IntegralLineOfSight.from_model(MARINER, autopilot=Learned())
-    check_controller(guided, MARINER, PathFollowingTask(), n_steps=5)
+    check_controller(guided, MARINER, path_following_task(), n_steps=5)
     with pytest.raises(InputError, match="autopilot: Learned found, expected a controller of shipgym"):
         guided.save(tmp_path / "guided.json")
 
@@ -111,6 +111,6 @@ def test_course_keeping_and_another_corridor_are_refused():
     with pytest.raises(InputError, match="in one and not in the other: cross_track"):
         check_controller(guided, MARINER)
     with pytest.raises(InputError, match=r"scale 160\.93 of 'cross_track', which is 80\.465"):
-        check_controller(guided, MARINER, PathFollowingTask(corridor=0.5))
+        check_controller(guided, MARINER, path_following_task(corridor=0.5))
     with pytest.raises(InputError, match=r"observation: shape \(8,\) found, expected \(9,\)"):
         guided.predict(np.zeros(8))

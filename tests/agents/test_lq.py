@@ -11,11 +11,12 @@ from stable_baselines3.common.monitor import Monitor
 from agents import LQ, sail, step_response
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
-from shipgym.envs.task import RUDDER_WEIGHT, control_interval
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.steering import RUDDER_WEIGHT
+from shipgym.tasks.task import control_interval
 
 MARINER = load_model("mariner")
 LENGTH_TIME = 160.93 / 7.7175

@@ -9,13 +9,12 @@ import pytest
 from agents import LQ, LQG, load_agent, sail, step_response
 from agents.controllers.linear_loop import sample_ship
 from agents.controllers.lqg import kalman_gain, rudder_response, wave_model
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.linear import straight_running
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.task import control_interval, course_keeping_task
 
 MARINER = load_model("mariner")
 
@@ -77,7 +76,7 @@ def test_first_order_motion_is_not_answered_where_it_is_modelled():
     plain, notched = LQG.from_model(MARINER), LQG.from_model(MARINER, wave_period=9.0)
     assert gain_at(notched, 9.0) < 0.2 * gain_at(plain, 9.0)
     assert notched.margins.gain_margin > 2.0
-    task = CourseKeepingTask(sea="moderate", noise=1.0)
+    task = course_keeping_task(sea="moderate", noise=1.0)
     quiet, lively = (sail(one, MARINER, task, np.arange(16)) for one in (notched, plain))
     assert quiet.rudder_travel_deg_min.mean() < 0.8 * lively.rudder_travel_deg_min.mean()
 
@@ -85,8 +84,8 @@ def test_first_order_motion_is_not_answered_where_it_is_modelled():
 def test_noise_and_sea_move_the_rudder_less_than_with_lq_at_no_higher_cost():
     lq, lqg = LQ.from_model(MARINER), LQG.from_model(MARINER)
     for task, saved in (
-        (CourseKeepingTask(noise=3.0), 0.75),
-        (CourseKeepingTask(sea="rough", noise=1.0), 0.75),
+        (course_keeping_task(noise=3.0), 0.75),
+        (course_keeping_task(sea="rough", noise=1.0), 0.75),
     ):
         one, other = (sail(pilot, MARINER, task, np.arange(16)) for pilot in (lqg, lq))
         assert one.cost.mean() < other.cost.mean()

@@ -10,10 +10,10 @@ from scipy.optimize import minimize
 
 from agents import LQ, MPC, check_controller, load_agent, sail
 from agents.controllers.linear_loop import SIGNALS, rate_weight
-from shipgym.envs.course_keeping_task import CourseKeepingTask, observation_scales
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.task import course_keeping_task, observation_scales
 
 pytest.importorskip("osqp", reason="extra mpc is not installed")
 MARINER = load_model("mariner")
@@ -102,7 +102,7 @@ def test_corrections_cost_their_squares_beside_lq(rudder_weight):
 
 
 def test_a_slow_gear_costs_less_than_with_lq():
-    task, seeds = CourseKeepingTask(episode_steps=120, change_interval_steps=60), np.arange(6)
+    task, seeds = course_keeping_task(episode_steps=120, change_interval_steps=60), np.arange(6)
     ours, theirs = (sail(kind.from_model(SLOW), SLOW, task, seeds).cost.mean() for kind in (MPC, LQ))
     assert ours < theirs
 

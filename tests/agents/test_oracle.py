@@ -10,27 +10,30 @@ from oracle import OracleSettings, run_oracle
 from agents import LQ, PID
 from agents.suites import reference
 from agents.suites.suite import BenchmarkTask
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
-from shipgym.envs.path_following_task import PathFollowingTask
-from shipgym.envs.variety import Variety
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task, path_following_task
 
 MARINER = load_model("mariner")
 QUICK = OracleSettings(
     candidates=24, elites=4, iterations=2, passes=1, horizon_steps=90, plan_steps=60, knot_steps=10
 )
 SEEDS = np.arange(3)
-ONE_TURN = PathFollowingTask(
+ONE_TURN = path_following_task(
     waypoints=[(0.0, 0.0), (1000.0, 0.0), (1000.0, 1000.0)], episode_steps=260, ground=8.0
 )
 
 
-@pytest.mark.parametrize("variety", [None, Variety(speed_range=(0.6, 1.0))], ids=["one ship", "drawn ships"])
-def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(variety: Variety | None) -> None:
-    task = CourseKeepingTask(sea="rough", noise=2.0, change_interval_steps=10)
+@pytest.mark.parametrize(
+    "variety", [None, Randomisation(speed_range=(0.6, 1.0))], ids=["one ship", "drawn ships"]
+)
+def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(
+    variety: Randomisation | None,
+) -> None:
+    task = course_keeping_task(sea="rough", noise=2.0, change_interval_steps=10)
     ships, copies = Engine(MARINER, 3, task, variety), Engine(MARINER, 70, task, variety)
     rudder = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 3, 1))
     ships.reset(SEEDS)
@@ -47,13 +50,13 @@ def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(variety:
 
 
 def test_lanes_of_another_task_or_that_are_not_there_are_refused() -> None:
-    ships = Engine(MARINER, 2, CourseKeepingTask())
+    ships = Engine(MARINER, 2, course_keeping_task())
     with pytest.raises(InputError, match="another task"):
-        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask(episode_steps=10)), [0, 1])
+        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task(episode_steps=10)), [0, 1])
     with pytest.raises(InputError, match="0 to 2 found, expected 0 to 1"):
-        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask()), [0, 2])
+        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task()), [0, 2])
     with pytest.raises(InputError, match="expected 2 whole numbers"):
-        ships.copy_lanes(Engine(MARINER, 2, CourseKeepingTask()), [0])
+        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task()), [0])
 
 
 def test_it_prepares_a_turn_of_the_path_and_saves_more_than_a_quarter() -> None:
@@ -76,7 +79,7 @@ def test_its_costs_are_those_of_its_rudder_and_of_its_start() -> None:
 
 
 def test_it_never_costs_more_than_its_start_and_knows_the_state_behind_the_noise() -> None:
-    task = CourseKeepingTask(sea="rough", noise=5.0, course_change_deg=5.0, episode_steps=120)
+    task = course_keeping_task(sea="rough", noise=5.0, course_change_deg=5.0, episode_steps=120)
     found = run_oracle(MARINER, task, SEEDS, LQ.from_model(MARINER), QUICK)
     assert np.all(found.costs < found.start_costs)
     coarse = OracleSettings(candidates=4, elites=2, iterations=1, passes=1, deviation=3.0)
@@ -85,7 +88,7 @@ def test_it_never_costs_more_than_its_start_and_knows_the_state_behind_the_noise
 
 
 def test_an_episode_is_the_same_again_and_in_any_company() -> None:
-    task = CourseKeepingTask(course_change_deg=60.0, episode_steps=100, change_interval_steps=40)
+    task = course_keeping_task(course_change_deg=60.0, episode_steps=100, change_interval_steps=40)
     together, alone = (
         run_oracle(MARINER, task, SEEDS, settings=QUICK),
         run_oracle(MARINER, task, [1], settings=QUICK),
@@ -95,8 +98,8 @@ def test_an_episode_is_the_same_again_and_in_any_company() -> None:
 
 
 def test_it_does_not_know_a_course_change_before_it_is_ordered() -> None:
-    short = CourseKeepingTask(course_changes_deg=[0.0, 40.0], change_interval_steps=60, episode_steps=120)
-    none = CourseKeepingTask(course_changes_deg=[0.0], change_interval_steps=60, episode_steps=120)
+    short = course_keeping_task(course_changes_deg=[0.0, 40.0], change_interval_steps=60, episode_steps=120)
+    none = course_keeping_task(course_changes_deg=[0.0], change_interval_steps=60, episode_steps=120)
     quick = OracleSettings(candidates=16, elites=4, iterations=2, passes=1)
     turned, straight = (run_oracle(MARINER, task, [0], settings=quick).actions[0] for task in (short, none))
     assert np.array_equal(turned[:60], straight[:60])
@@ -105,7 +108,7 @@ def test_it_does_not_know_a_course_change_before_it_is_ordered() -> None:
 
 def test_it_steers_by_the_rudder_alone() -> None:
     with pytest.raises(InputError, match="expected 'rudder'"):
-        run_oracle(MARINER, CourseKeepingTask(action="rudder-discrete"), SEEDS)
+        run_oracle(MARINER, course_keeping_task(action="rudder-discrete"), SEEDS)
 
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 30})

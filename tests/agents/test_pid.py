@@ -11,12 +11,11 @@ from stable_baselines3.common.monitor import Monitor
 from agents import PID, sail, step_response
 from agents.controllers.linear_loop import rate_weight, sample_ship
 from agents.controllers.pid import optimal_poles, place_poles
-from shipgym.envs.course_keeping_task import observation_scales
-from shipgym.envs.task import control_interval
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.linear import Nomoto, nomoto
 from shipgym.ships.steering import SteeringGear
+from shipgym.tasks.task import control_interval, observation_scales
 
 MARINER = load_model("mariner")
 

@@ -7,11 +7,10 @@ import pytest
 
 from agents import LQ, LQG, LearnedPolicy, check_controller, sail
 from agents.policies.policy import ORDERS, Memory, order_numbers
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.mariner import mariner
+from shipgym.tasks.task import course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 
 RNG = np.random.default_rng(1)
@@ -127,11 +126,11 @@ def test_the_network_adds_its_part_to_the_base():
 def test_learned_policies_pass_the_conformance_suite(more):
     policy = random_policy(**more)
     check_controller(policy, n_steps=8)
-    check_controller(policy, MARINER, PathFollowingTask(), n_steps=3)
+    check_controller(policy, MARINER, path_following_task(), n_steps=3)
 
 
 def path_policy():
-    shown = PathFollowingTask(corridor=0.5).observed(MARINER)
+    shown = path_following_task(corridor=0.5).observed(MARINER)
     return random_policy(
         network=random_network(len(shown), 16, 1),
         observation_names=tuple(one.name for one in shown),
@@ -144,7 +143,7 @@ def path_policy():
 def test_a_policy_fits_what_it_learned_with():
     random_policy().check_fits_model(MARINER)
     path_policy().check_fits_model(MARINER)
-    assert sail(random_policy(), MARINER, CourseKeepingTask(episode_steps=5)).cost > 0.0
+    assert sail(random_policy(), MARINER, course_keeping_task(episode_steps=5)).cost > 0.0
 
 
 def test_another_environment_is_refused_with_the_difference():
@@ -159,7 +158,7 @@ def test_another_environment_is_refused_with_the_difference():
         InputError, match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last"
     ):
         path_policy().predict(SEEN)
-    wider = PathFollowingTask().observed(MARINER)
+    wider = path_following_task().observed(MARINER)
     with pytest.raises(InputError, match=r"scale of 'cross_track' is 160.9.*learned with 80.4"):
         path_policy().check_fits([one.name for one in wider], [one.scale for one in wider])
 

@@ -21,7 +21,7 @@ MINE = """
 from dataclasses import dataclass
 from agents import Controller, register_controller
 from agents.controllers.linear_loop import sample_ship
-from shipgym.envs.task import control_interval
+from shipgym.tasks.task import control_interval
 
 
 @register_controller

@@ -5,15 +5,14 @@ import pytest
 
 from agents import LQ, PID, Shielded, check_controller, interventions
 from agents.policies.shield import Limits
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.envs.engine import Engine
-from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.errors import InputError
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_policy
 
 IDENTIFIED = load_model("mariner-tls-svm")
-STRAIGHT = CourseKeepingTask(course_change_deg=0.0)
+STRAIGHT = course_keeping_task(course_change_deg=0.0)
 GOOD = LQ.from_model(MARINER)
 N = 16
 
@@ -69,7 +68,7 @@ def test_a_policy_hard_over_is_caught_and_the_ship_keeps_her_course(name, side):
 @pytest.mark.parametrize("course_change_deg", [30.0, 90.0])
 @pytest.mark.parametrize("model", [MARINER, IDENTIFIED, load_model("kvlcc2")], ids=lambda model: model.name)
 def test_a_good_controller_is_never_interrupted_in_calm_water(model, course_change_deg):
-    task = CourseKeepingTask(course_change_deg=course_change_deg, max_heading_error_deg=180.0)
+    task = course_keeping_task(course_change_deg=course_change_deg, max_heading_error_deg=180.0)
     for good in (LQ.from_model(model), PID.from_model(model)):
         shield = Shielded.from_model(model, good)
         _, _, states = sailed(shield, model, task, steps=300)
@@ -77,7 +76,7 @@ def test_a_good_controller_is_never_interrupted_in_calm_water(model, course_chan
 
 
 def test_noisy_instruments_in_a_sea_do_not_call_it():
-    task = CourseKeepingTask(sea="moderate", noise=1.0)
+    task = course_keeping_task(sea="moderate", noise=1.0)
     _, _, states = sailed(Shielded.from_model(IDENTIFIED, LQ.from_model(IDENTIFIED)), IDENTIFIED, task)
     assert interventions(states[-1]).count.sum() == 0
 
@@ -153,7 +152,7 @@ def test_counts_begin_anew_with_an_episode():
 @pytest.mark.parametrize("seed", range(3))
 def test_random_policies_never_lose_the_ship_under_it(seed):
     shield = Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED, seed=seed))
-    errors, lost, _ = sailed(shield, IDENTIFIED, CourseKeepingTask(course_change_deg=30.0), steps=300)
+    errors, lost, _ = sailed(shield, IDENTIFIED, course_keeping_task(course_change_deg=30.0), steps=300)
     assert not lost.any()
     assert np.abs(errors).max() < 80.0
 
@@ -161,7 +160,7 @@ def test_random_policies_never_lose_the_ship_under_it(seed):
 def test_it_keeps_the_promises_of_a_controller():
     check_controller(Shielded.from_model(MARINER, random_policy(frame_stack=2)), n_steps=30)
     shield = Shielded.from_model(MARINER, LQ.from_model(MARINER))
-    check_controller(shield, MARINER, PathFollowingTask(), n_steps=5)
+    check_controller(shield, MARINER, path_following_task(), n_steps=5)
     assert shield.name == "lq-shielded"
 
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import minimize
 
 from agents import LQ, PID, sail
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.ships import load_model
+from shipgym.tasks.task import course_keeping_task
 
 SEEDS = np.arange(64)
 MARINER = load_model("mariner")
@@ -37,7 +37,7 @@ def best_cost(controller, model, task):
     ids=["mariner", "mariner small changes", "mariner one course", "tanker"],
 )
 def test_designs_are_near_the_best_of_their_kind(design, model, change_deg):
-    task = CourseKeepingTask(course_change_deg=change_deg)
+    task = course_keeping_task(course_change_deg=change_deg)
     controller = design.from_model(model)
     cost = sail(controller, model, task, seeds=SEEDS).cost.mean()
     best = best_cost(controller, model, task)

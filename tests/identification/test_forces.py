@@ -12,8 +12,9 @@ from identification import identify
 from identification.regression.forces import force_regression, identify_forces
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
-from shipgym.ships.pmm import PMM18, PMM38, TABLE_11, xu_ship
+from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
 from shipgym.ships.structures import get_structure
+from shipgym.ships.xu import xu_ship
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(
@@ -142,4 +143,4 @@ def test_trials_of_the_other_kind_are_refused() -> None:
     with pytest.raises(InputError, match="'abkowitz' found, which is identified from free-running trials"):
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
     with pytest.raises(InputError, match="mass of the ship and the added mass"):
-        ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_column()
+        ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_numbers()

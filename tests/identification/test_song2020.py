@@ -3,7 +3,7 @@ import pytest
 from papers import get_paper, song2020, song2020_container
 from papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded, regressors
 
-from shipgym.kernels import container as own
+from shipgym.ships import container as own
 from shipgym.ships import load_model
 from shipgym.ships.structures import MMG_4DOF
 
@@ -105,10 +105,14 @@ def test_thrust_rudder_and_known_forces_are_the_container_ship_s():
     for equation, letter in zip("uvrp", "XYNK", strict=True):
         if letter == "X":
             hull = (
-                own.X_uu * u * u + own.X_vr * v * r + own.X_vv * v * v + own.X_rr * r * r + own.X_ff * f * f
+                own.PUBLISHED.X_uu * u * u
+                + own.PUBLISHED.X_vr * v * r
+                + own.PUBLISHED.X_vv * v * v
+                + own.PUBLISHED.X_rr * r * r
+                + own.PUBLISHED.X_ff * f * f
             )
         else:
-            hull = basis @ [getattr(own, f"{letter}_{label}") for label in labels]
+            hull = basis @ [getattr(own.PUBLISHED, f"{letter}_{label}") for label in labels]
         pushed = np.dot(columns[equation][-len(numbers[equation]) :], numbers[equation])
         forces.append(hull + pushed + known[equation])
     scale = speed**2 / L / np.array([1.0, 1.0, L, L])

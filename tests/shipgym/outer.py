@@ -1,11 +1,15 @@
-"""Functions that kernels call, as ones that Python can call."""
+"""Functions that loops call, as ones that Python can call, compiled."""
 
 from collections.abc import Callable
 from typing import Any
 
 from numba import njit
 
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import Specialisation
 
-def outer(inner: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of `shipgym.kernels` with an entry for Python."""
+
+def outer(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A plain function of the engine, compiled, with an entry for Python."""
+    inner = Specialisation({}, "tests", njit).inner(Part(function))
     return njit(lambda *numbers: inner(*numbers))

@@ -13,14 +13,9 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import (
-    OBSERVATION_NAMES,
-    CourseKeepingTask,
-    observation_scales,
-)
-from shipgym.envs.task import control_interval
+from shipgym.envs.engine import Engine
 from shipgym.ships import Envelope
+from shipgym.tasks.task import OBSERVATION_NAMES, control_interval, course_keeping_task, observation_scales
 
 ID = "shipgym/CourseKeeping-v0"
 
@@ -196,7 +191,7 @@ def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
 
 
 def test_each_lane_of_a_batch_is_the_single_environment(mariner):
-    engine = CourseKeepingEngine(mariner, 70)
+    engine = Engine(mariner, 70)
     observations = engine.reset(np.arange(70))
     lane, env = 66, make()
     single, _ = env.reset(seed=66)
@@ -213,13 +208,13 @@ def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
     with pytest.raises(InputError, match=r"'mariner' was found unstable.*allow_unstable=True"):
         make(model=marked)
     with pytest.raises(InputError, match="was found unstable"):
-        CourseKeepingEngine([mariner, marked], 2)
+        Engine([mariner, marked], 2)
     with pytest.warns(UserWarning, match="found unstable when it was identified"):
         make(model=marked, allow_unstable=True)
 
 
 def test_a_finished_lane_stays_and_earns_nothing(mariner):
-    engine = CourseKeepingEngine(mariner, 3, CourseKeepingTask(episode_steps=5))
+    engine = Engine(mariner, 3, course_keeping_task(episode_steps=5))
     for _ in range(5):
         *_, truncated = engine.step(np.zeros((3, 1)))
     assert truncated.all()
@@ -231,7 +226,7 @@ def test_a_finished_lane_stays_and_earns_nothing(mariner):
 
 def test_each_lane_may_have_a_ship_of_its_own(mariner):
     slow = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0007})
-    engine = CourseKeepingEngine([mariner, slow], 2)
+    engine = Engine([mariner, slow], 2)
     engine.reset([1, 1])
     for _ in range(20):
         engine.step(np.full((2, 1), 0.5))
@@ -283,12 +278,12 @@ def test_wrong_actions(action, message):
 
 
 def test_wrong_batches(mariner):
-    engine = CourseKeepingEngine(mariner, 2)
+    engine = Engine(mariner, 2)
     with pytest.raises(InputError, match=r"actions: shape \(3, 1\)"):
         engine.step(np.zeros((3, 1)))
     with pytest.raises(InputError, match="nan found in lane 1"):
         engine.step([[0.0], [np.nan]])
     with pytest.raises(InputError, match="num_envs: 0"):
-        CourseKeepingEngine(mariner, 0)
+        Engine(mariner, 0)
     with pytest.raises(InputError, match="3 found, expected 1 or one for each of 2"):
-        CourseKeepingEngine([mariner] * 3, 2)
+        Engine([mariner] * 3, 2)

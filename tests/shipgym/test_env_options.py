@@ -8,10 +8,11 @@ import pytest
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.task import ROLL_SCALE, RUDDER_ORDERS
-from shipgym.envs.variety import N_SPEEDS, POOL_SIZE
+from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
 from shipgym.sea import Waves, Weather, Wind
 from shipgym.ships import Envelope
+from shipgym.tasks.steering import ROLL_SCALE
+from shipgym.tasks.task import RUDDER_ORDERS
 from shipgym.trials.sensors import SEA_TRIAL
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"

@@ -7,9 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ShipModel, manoeuvres
-from shipgym.ships.container import container
-from shipgym.ships.kvlcc2 import kvlcc2, kvlcc2_l7
-from shipgym.ships.tanker import tanker
+from shipgym.ships.catalogue import container, kvlcc2, kvlcc2_l7, tanker
 from tests.shipgym.reference import table
 
 

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shipgym.kernels import layout, path_following
+from shipgym.kernels import voyage_rows as rows
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.path_following import PathFollowingEngine
-from shipgym.envs.path_following_task import TURN_HORIZON, PathFollowingTask
-from shipgym.kernels import layout, path_following
-from shipgym.kernels import voyage_rows as rows
+from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.tasks.guidance import Path, line_of_sight, wrapped
+from shipgym.tasks.path_following import TURN_HORIZON
+from shipgym.tasks.task import path_following_task
 
 ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
@@ -100,7 +101,7 @@ def test_given_waypoints_are_sailed_in_every_episode():
 
 def test_drawn_paths_follow_from_the_seed_and_keep_to_their_bounds():
     options = {"n_legs": 6, "leg_lengths": (5.0, 9.0), "max_turn_deg": 40.0}
-    engine = PathFollowingEngine(shipgym.load_model("mariner"), 200, PathFollowingTask(**options))
+    engine = Engine(shipgym.load_model("mariner"), 200, path_following_task(**options))
     engine.reset(np.arange(200))
     paths = [Path(engine.waypoints(lane)) for lane in range(200)]
     lengths = np.concatenate([path.lengths for path in paths]) / LENGTH
@@ -263,8 +264,8 @@ def test_the_mirrored_voyage_earns_the_same():
     mariner = shipgym.load_model("mariner")
     even = {name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"}
     symmetric = replace(mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)})
-    task = PathFollowingTask(n_legs=3, leg_lengths=(3.0, 5.0))
-    engine = PathFollowingEngine(symmetric, 2, task)
+    task = path_following_task(n_legs=3, leg_lengths=(3.0, 5.0))
+    engine = Engine(symmetric, 2, task)
     engine.reset([4, 4])
     tile = engine._states[0]
     odd = (*MIRRORED, *(rows.END + (2 * k + 1) * layout.LANES for k in range(task.legs + 1)))

@@ -73,7 +73,7 @@ def test_there_and_back_is_the_ship_itself():
     model = scale_model(ship, 7.0)
     again = scale_model(model, 160.93)
     np.testing.assert_allclose(again.covariance, ship.covariance, rtol=1e-12)
-    np.testing.assert_allclose(again.ship_column(), ship.ship_column(), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(again.ship_numbers(), ship.ship_numbers(), rtol=1e-9, atol=1e-15)
     state = np.array([7.0, 0.3, 0.01, 0.2])
     scale = [np.sqrt(7.0 / 160.93)] * 2 + [np.sqrt(160.93 / 7.0), 1.0]
     assert model.envelope.distance(*state * scale) == pytest.approx(ship.envelope.distance(*state))

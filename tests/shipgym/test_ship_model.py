@@ -104,7 +104,7 @@ def test_the_file_gives_the_model_back(identified, tmp_path):
     assert again.steering == identified.steering
     assert again.provenance == identified.provenance
     np.testing.assert_array_equal(again.covariance, identified.covariance)
-    np.testing.assert_array_equal(again.ship_tile(), identified.ship_tile())
+    np.testing.assert_array_equal(again.ship_numbers(), identified.ship_numbers())
     assert list(tmp_path.iterdir()) == [tmp_path / "model.json"]
 
 

@@ -2,7 +2,6 @@
 
 import pickle
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +10,7 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
+from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
 
@@ -84,7 +84,7 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     table = get_structure(name)
     random = np.random.default_rng(0)
     model = virtual_ship(name, **{c: random.normal() for c in table.coefficient_names})
-    theta = table.kernel_coefficients(model.coefficients, model.particulars, model.service_shaft_speed)
+    theta = table.numbers(model.coefficients, model.particulars, model.service_shaft_speed)
     state = {"u": 6.0, "v": -0.9, "r": -0.01, "p": 0.02, "phi": -0.1, "q": 1e-3, "delta": 0.2, "n": 1.1}
     channels = {symbol: [value] for symbol, value in state.items()}
     expected, row = {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93}, 0
@@ -93,14 +93,12 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
         expected[equation] = features @ theta[row : row + len(terms)]
         row += len(terms)
     u, v, r, delta = (float(channels[symbol][0]) for symbol in ("u", "v", "r", "delta"))
-    source = model.accelerations_source.replace("from .", "from shipgym.kernels.")
-    namespace: dict[str, Any] = {}
-    exec(source, namespace)
-    plain = getattr(namespace["accelerations"], "py_func", namespace["accelerations"])
-    fourth = "q" if "q" in table.equations else "p"
-    expected["r"] += state["q"] if fourth == "q" else 0.0
-    found = plain(u, v, r, state[fourth], state["phi"], delta, 1.1, np.inf, model.ship_tile(), 0)
-    np.testing.assert_allclose(found, [*map(expected.get, "uvr"), expected.get(fourth, 0.0)], rtol=1e-12)
+    expected["r"] += state["q"] if "q" in table.equations else 0.0
+    motion = Motion(0.0, 0.0, 0.0, u, v, r, state["p"], state["phi"], state["q"], delta, 1.1)
+    ship = Ship(160.93, 7.7175, 0.6, 0.1, 1.0, model.service_shaft_speed, np.inf, 7.7175)
+    plain = model.vessel.functions["accelerations"].function
+    found = plain(motion, model.vessel.coefficients(*theta), ship)
+    np.testing.assert_allclose(found, [expected.get(q, 0.0) for q in "uvrpq"], rtol=1e-12)
 
 
 def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
@@ -186,7 +184,7 @@ def test_every_table_survives_its_model_file(name, tmp_path):
     model.save(tmp_path / "model.json")
     again = ShipModel.load(tmp_path / "model.json")
     assert again.table == table
-    assert again.accelerations_source == model.accelerations_source
+    assert again.vessel is model.vessel
 
 
 def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():

@@ -172,10 +172,20 @@ def test_mobility_is_the_inverse_of_inertia(ship):
 
 
 def test_the_container_ship_rolls_by_son_and_nomotos_inertia():
-    from shipgym.kernels import container as c
+    from shipgym.ships import container as c
 
-    a, b, e = c.m + c.my, -c.my * c.ly, c.Iz + c.Jz
-    prime = np.array([[a, c.my * c.alpha_y, b], [c.my * c.alpha_y, e, 0.0], [b, 0.0, c.Ix + c.Jx]])
+    a, b, e = (
+        c.PUBLISHED.m + c.PUBLISHED.my,
+        -c.PUBLISHED.my * c.PUBLISHED.ly,
+        c.PUBLISHED.Iz + c.PUBLISHED.Jz,
+    )
+    prime = np.array(
+        [
+            [a, c.PUBLISHED.my * c.PUBLISHED.alpha_y, b],
+            [c.PUBLISHED.my * c.PUBLISHED.alpha_y, e, 0.0],
+            [b, 0.0, c.PUBLISHED.Ix + c.PUBLISHED.Jx],
+        ]
+    )
     L, mass = c.LENGTH, 0.5 * 1025.0 * c.LENGTH**3
     expected = np.linalg.inv(mass * prime * np.array([[1, L, L], [L, L * L, L * L], [L, L * L, L * L]]))
     np.testing.assert_allclose(mobility_matrix(load_model("container"))[1:, 1:], expected, rtol=1e-9)
@@ -206,9 +216,9 @@ def test_a_structure_without_surge_and_sway_only_turns():
 
 
 def test_roll_inertia_from_period_and_stability_is_that_of_the_container_ship():
-    from shipgym.kernels import container as c
+    from shipgym.ships import container as c
 
-    own = (c.Ix + c.Jx) * 0.5 * 1025.0 * c.LENGTH**5
+    own = (c.PUBLISHED.Ix + c.PUBLISHED.Jx) * 0.5 * 1025.0 * c.LENGTH**5
     assert roll_inertia(load_model("container")) == pytest.approx(own, rel=0.1)
 
 

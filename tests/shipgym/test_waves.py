@@ -139,9 +139,9 @@ def test_roll_resonates_with_its_natural_period():
 
 
 def test_estimated_roll_period_is_that_of_the_container_ships_equations():
-    from shipgym.kernels import container as numbers
+    from shipgym.ships import container as numbers
 
-    inertia = (numbers.Ix + numbers.Jx) * 0.5 * 1025.0 * numbers.LENGTH**5
+    inertia = (numbers.PUBLISHED.Ix + numbers.PUBLISHED.Jx) * 0.5 * 1025.0 * numbers.LENGTH**5
     stiffness = 1025.0 * 9.81 * numbers.VOLUME * numbers.GM
     own = 2.0 * np.pi * np.sqrt(inertia / stiffness)
     estimated = weather_particulars(load_model("container").particulars)

@@ -8,12 +8,12 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from shipgym.envs.course_keeping import CourseKeepingEngine
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 
 import shipgym
 from shipgym import InputError, manoeuvres
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-from shipgym.kernels import random
+from shipgym.engine import random
 from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
@@ -103,11 +103,9 @@ def test_waves_push_by_the_mean_drift_force_times_one_plus_its_variation(mariner
     waves = Waves(3.0, 9.0, 60.0)
     passage, pushes = Passage(body, Conditions(weather=Weather(waves=waves)), 1e-3), []
     for word in range(300):
-        passage.words[0] = word
-        states = passage.states(body.kernel_states(at_rest[None])[0], 2)
-        passage.kernel("trajectories").simulate(
-            states, np.zeros((2, 2)), 1e-3, passage.sky, passage.words, passage.ship
-        )
+        passage.sea[1][0] = word
+        states = passage.states(at_rest, 2)
+        passage.loop("simulate")(states, np.zeros((2, 2)), 1e-3, *passage.sea, passage.numbers)
         pushes.append(states[1, 4])
     drift = wave_drift(waves, mariner.particulars)
     at = np.argmin(np.abs(drift.chi - np.radians(60.0)))

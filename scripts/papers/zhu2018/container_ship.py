@@ -33,7 +33,7 @@ from papers.zhu2018.fits import (
 )
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
-from shipgym.ships.container import container
+from shipgym.ships.catalogue import container
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,68 @@
+"""How far a state lies outside the data its model was identified from."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import NamedTuple
+
+from shipgym.engine.motion import Motion
+
+
+class Four(NamedTuple):
+    """Surge and sway speed, yaw rate and rudder angle, SI units."""
+
+    u: float
+    v: float
+    r: float
+    delta: float
+
+
+class Triangle(NamedTuple):
+    """Upper triangle W, row by row: inside is |W (z - centre)| <= 1."""
+
+    uu: float
+    uv: float
+    ur: float
+    ud: float
+    vv: float
+    vr: float
+    vd: float
+    rr: float
+    rd: float
+    dd: float
+
+
+class Envelope(NamedTuple):
+    """The data's least and largest values, and the ellipsoid around them."""
+
+    low: Four
+    high: Four
+    centre: Four
+    shape: Triangle
+
+
+def envelope_distance(motion: Motion, data: Envelope) -> float:
+    """Size of the ellipsoid through the state relative to the one around the data."""
+    w = data.shape
+    a, b = motion.u - data.centre.u, motion.v - data.centre.v
+    c, d = motion.r - data.centre.r, motion.delta - data.centre.delta
+    p = w.uu * a + w.uv * b + w.ur * c + w.ud * d
+    q = w.vv * b + w.vr * c + w.vd * d
+    s = w.rr * c + w.rd * d
+    t = w.dd * d
+    return sqrt(p * p + q * q + s * s + t * t)
+
+
+def outside_range(motion: Motion, data: Envelope) -> bool:
+    """Whether one of u, v, r, delta is outside its range in the data."""
+    low, high = data.low, data.high
+    return (
+        (motion.u < low.u)
+        | (motion.u > high.u)
+        | (motion.v < low.v)
+        | (motion.v > high.v)
+        | (motion.r < low.r)
+        | (motion.r > high.r)
+        | (motion.delta < low.delta)
+        | (motion.delta > high.delta)
+    )

@@ -1,0 +1,453 @@
+"""Episodes of many ships at once: begin them, take a control interval.
+
+Ships lie in tiles of 64 lanes. What every step needs is one loop over lanes, which is vectorised; what comes
+seldom (a new set-point, the next leg, the end of an episode) is done lane by lane afterwards. The task, the
+sensor set, the sea and the ship are parts (`shipgym.engine.voyages`): this file knows none of them.
+
+Arrays that are not tiles are indexed by unsigned numbers: an index that could be negative, and would count
+from the end, keeps a loop from being vectorised.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shipgym.engine.envelope import envelope_distance, outside_range
+from shipgym.engine.mathematics import clip, pick
+from shipgym.engine.motion import HAS_SEA, lost, sail
+from shipgym.engine.places import (
+    begin_sea,
+    choose_memory,
+    choose_motion,
+    choose_reward,
+    choose_sea,
+    choose_state,
+    common_sea,
+    common_ship,
+    common_view,
+    due,
+    encounter_frequency,
+    evolve,
+    flag_table_at,
+    flags_at,
+    load_course,
+    load_memory,
+    load_motion,
+    load_outcome,
+    load_sea,
+    load_state,
+    measure,
+    no_reward,
+    numbers_at,
+    observe,
+    on_event,
+    plan_of,
+    push,
+    read_rules,
+    read_sensor,
+    read_settings,
+    readings,
+    rows_at,
+    sea_at,
+    ship_at,
+    single_table_at,
+    store_course,
+    store_ended,
+    store_memory,
+    store_motion,
+    store_observation,
+    store_outcome,
+    store_ran_away,
+    store_reward,
+    store_sea,
+    store_state,
+    table_at,
+    task_begin,
+    task_step,
+    total_reward,
+    view_at,
+    words_at,
+    worst_cost,
+)
+from shipgym.engine.random import DRAW, stream, uniform
+from shipgym.engine.records import LANES
+from shipgym.tasks.contract import Interval, Random
+
+REFUSED = -1  # what `step` answers to commands that are not finite
+N_STEP, N_STEP_FLAGS = 3, 2  # of outcomes and flags, what `step` answers: reward, terminated, truncated
+SHIP_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
+# NumPy's numbers, since a function is compiled anew for each literal that it is called with
+FIRST_LANE: Any = np.int64(0)
+WHOLE: Any = np.bool_(True)
+ANSWERED: Any = np.bool_(False)  # all rows but what `step` answers
+# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than that of a single lane,
+# so that results do not depend on the number of ships.
+GROUP = 16
+BEGIN_WORDS, EVOLVE_WORDS = DRAW[15], DRAW[8]  # by which the random numbers of the sea go on
+
+
+class Course(NamedTuple):
+    """What the engine keeps of a lane's episode."""
+
+    rudder_command: float  # part of the limit
+    shaft_command: float  # part of the shaft speed at service speed
+    rudder_before: float  # rad, rudder at the beginning of the interval
+    steps: float  # control intervals so far
+    ended: float  # 1 once the episode is over
+    ran_away: float  # 1 if the ship left every physical range in the interval
+
+
+class Outcome(NamedTuple):
+    """What comes of an interval beside the task's own."""
+
+    reward: float
+    terminated: float  # 1 or 0
+    truncated: float
+    envelope_distance: float
+    extrapolating: float  # 1 or 0
+    end: float  # part of the reward: the rest of an episode that failed
+
+
+class Rules(NamedTuple):
+    """Settings of the engine."""
+
+    dt: float  # s, control interval
+    substeps: float  # of the integration in it
+    time_limit: float  # control intervals
+    largest_distance: float  # from the data of the model at which an episode ends
+    least_shaft: float  # least command of the shaft, part of service speed
+
+
+def take_commands(state: Any, actions: Any, rules: Rules, first: int, lanes: int) -> None:
+    """Take the commands of ships whose episode is not over."""
+    two = actions.shape[0] > 1
+    for lane in range(lanes):
+        motion, course = load_motion(state, lane), load_course(state, lane)
+        over = course.ended != 0.0
+        rudder = clip(float(actions[0, np.uintp(first + lane)]), -1.0, 1.0)
+        course = Course(
+            pick(over, course.rudder_command, rudder), course.shaft_command, motion.delta,
+            course.steps + (1.0 - course.ended), course.ended, 0.0,
+        )  # fmt: skip
+        store_course(state, lane, course)
+    if two:
+        for lane in range(lanes):
+            course = load_course(state, lane)
+            shaft = clip(float(actions[1, np.uintp(first + lane)]), rules.least_shaft, 1.0)
+            course = Course(
+                course.rudder_command, pick(course.ended != 0.0, course.shaft_command, shaft),
+                course.rudder_before, course.steps, course.ended, course.ran_away,
+            )  # fmt: skip
+            store_course(state, lane, course)
+
+
+def sail_lanes(state: Any, words: Any, h: float, ships: Any, lanes: int) -> None:
+    """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
+    common, sea_common = common_ship(ships), common_sea(ships)
+    for lane in range(lanes):
+        ship, coefficients = ship_at(common, ships, lane)
+        p = sea_at(sea_common, ships, lane)
+        before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
+        rudder, shaft = course.rudder_command * ship.rudder_limit, course.shaft_command * ship.shaft
+        after = sail(before, rudder, shaft, h, push(before, sea, p), coefficients, ship)
+        away = lost(after, ship)
+        over = course.ended != 0.0
+        motion = choose_motion(away | over, before, after)
+        store_motion(state, lane, motion)
+        store_ran_away(state, lane, pick(away, 1.0, course.ran_away))
+        if HAS_SEA:
+            word = words[lane]
+            words[lane] = word + EVOLVE_WORDS
+            store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
+
+
+def conclude_lanes(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
+    """Reward, readings and observations of an interval that is over."""
+    rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
+    common, view = common_ship(ships), common_view(ships)
+    sea_common = common_sea(ships)
+    worst = worst_cost(asked)
+    for lane in range(lanes):
+        ship, _ = ship_at(common, ships, lane)
+        data, scale = view_at(view, ships, lane)
+        motion, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
+        before, memory = load_state(state, lane), load_memory(state, lane)
+        distance = envelope_distance(motion, data)
+        beyond = outside_range(motion, data) | (distance > 1.0)
+        interval = Interval(
+            rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command, distance,
+            pick(beyond, 1.0, 0.0),
+        )  # fmt: skip
+        after, parts, failed, arrived = task_step(motion, before, interval, ship, asked)
+
+        going = 1.0 - course.ended
+        over = course.ended != 0.0
+        wrecked = going * pick(failed | (distance > rules.largest_distance), 1.0, course.ran_away)
+        terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
+        late = pick(course.steps >= rules.time_limit, going, 0.0)
+        end = -(wrecked * worst * (rules.time_limit - course.steps))
+        ended = max(course.ended, max(terminated, late))
+        earned = choose_reward(over, no_reward(), parts)
+        reward = total_reward(earned) + end
+        after = choose_state(over, before, after)
+        p = sea_at(sea_common, ships, lane)
+        random = Random(keys[0, lane], keys[1, lane])
+        frequency = encounter_frequency(motion, sea, p)
+        memory = choose_memory(
+            over, memory, measure(motion, sea, memory, frequency, interval, sensor, random)
+        )
+
+        store_ended(state, lane, ended)
+        store_outcome(
+            state, lane,
+            Outcome(reward, terminated, late * (1.0 - terminated), distance, interval.extrapolating, end),
+        )  # fmt: skip
+        store_reward(state, lane, earned)
+        store_state(state, lane, after)
+        store_memory(state, lane, memory)
+        seen = readings(motion, sea, memory)
+        store_observation(state, lane, observe(seen, after, interval, ship, asked), scale)
+
+
+def interval_of(state: Any, rules: Rules, lane: int) -> Interval:
+    """The interval of a lane, as it was concluded."""
+    course, outcome = load_course(state, lane), load_outcome(state, lane)
+    return Interval(
+        rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command,
+        outcome.envelope_distance, outcome.extrapolating,
+    )  # fmt: skip
+
+
+def observe_lane(state: Any, settings: Any, ships: Any, lane: int) -> None:
+    """What an autopilot sees now."""
+    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
+    ship, _ = ship_at(common_ship(ships), ships, lane)
+    _, scale = view_at(common_view(ships), ships, lane)
+    seen = readings(load_motion(state, lane), load_sea(state, lane), load_memory(state, lane))
+    interval = interval_of(state, rules, lane)
+    store_observation(state, lane, observe(seen, load_state(state, lane), interval, ship, asked), scale)
+
+
+def let_events_come(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
+    """What comes seldom, for the lanes for which it is time."""
+    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
+    common = common_ship(ships)
+    for lane in range(lanes):
+        course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
+        ship, _ = ship_at(common, ships, lane)
+        interval = interval_of(state, rules, lane)
+        if course.ended == 0.0 and due(motion, before, interval, ship, asked):
+            random, plan = Random(keys[0, lane], keys[1, lane]), plan_of(state, lane)
+            store_state(state, lane, on_event(motion, before, interval, ship, asked, random, plan))
+            observe_lane(state, settings, ships, lane)
+
+
+def count_events(state: Any, settings: Any, ships: Any, lanes: int) -> tuple[int, int]:
+    """In how many lanes something is due, and how many episodes have just ended."""
+    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
+    common = common_ship(ships)
+    n_due, n_ended = 0, 0
+    for lane in range(lanes):
+        ship, _ = ship_at(common, ships, lane)
+        course, outcome = load_course(state, lane), load_outcome(state, lane)
+        interval = interval_of(state, rules, lane)
+        is_due = due(load_motion(state, lane), load_state(state, lane), interval, ship, asked)
+        n_due += 1 if is_due & (course.ended == 0.0) else 0
+        n_ended += 1 if outcome.terminated + outcome.truncated > 0.0 else 0
+    return n_due, n_ended
+
+
+def show(
+    state: Any, rows: Any, observations: Any, outcomes: Any, flags: Any, whole: bool, first: int, begin: int,
+    end: int,
+) -> None:  # fmt: skip
+    """Hand observations, outcomes and flags of some lanes over, or all but what `step` answers."""
+    for k in range(rows[0]):
+        row = rows[3 + k]
+        for lane in range(begin, end):
+            observations[np.uintp(first + lane), k] = state[np.uintp(row + lane)]
+    for k in range(0 if whole else N_STEP, rows[1]):
+        row = rows[3 + rows[0] + k]
+        for lane in range(begin, end):
+            outcomes[k, np.uintp(first + lane)] = state[np.uintp(row + lane)]
+    for k in range(0 if whole else N_STEP_FLAGS, rows[2]):
+        row = rows[3 + rows[0] + rows[1] + k]
+        for lane in range(begin, end):
+            flags[k, np.uintp(first + lane)] = state[np.uintp(row + lane)] > 0.0
+
+
+def begin_lane(state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any) -> None:
+    """Begin an episode in a lane, with a ship of the pool, if there is one."""
+    if pool.shape[0] > 0:
+        number = int(uniform(keys[0, lane], keys[1, lane], SHIP_DRAW, 0.0, float(pool.shape[0])))
+        for row in range(pool.shape[1]):
+            ships[row * LANES + lane] = pool[number, row]
+    for row in range(0, len(state) // LANES):
+        state[row * LANES + lane] = 0.0
+    rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
+    ship, _ = ship_at(common_ship(ships), ships, lane)
+    p = sea_at(common_sea(ships), ships, lane)
+    random = Random(keys[0, lane], keys[1, lane])
+    motion, begun = task_begin(ship, asked, random, plan_of(state, lane))
+    store_motion(state, lane, motion)
+    store_state(state, lane, begun)
+    store_course(state, lane, Course(0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
+    if HAS_SEA:
+        word = stream(keys[0, lane], keys[1, lane])
+        keys[2, lane] = word + BEGIN_WORDS
+        store_sea(state, lane, begin_sea(motion, word, p))
+    sea, interval = load_sea(state, lane), interval_of(state, rules, lane)
+    frequency = encounter_frequency(motion, sea, p)
+    memory = measure(motion, sea, load_memory(state, lane), frequency, interval, sensor, random)
+    store_memory(state, lane, memory)
+    observe_lane(state, settings, ships, lane)
+
+
+def begin_next(
+    state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, observations: Any,
+    outcomes: Any, flags: Any, first: int,
+) -> None:  # fmt: skip
+    """Begin the next episode of a lane and show it; reward and flags stay those of the last step."""
+    keys[1, lane] += np.uint64(1)
+    begin_lane(state, lane, keys, settings, pool, ships)
+    show(state, rows, observations, outcomes, flags, ANSWERED, first, lane, lane + 1)
+
+
+def are_finite(actions: Any) -> bool:
+    """Whether all commands are finite."""
+    wrong = 0
+    for row in range(actions.shape[0]):
+        for lane in range(actions.shape[1]):
+            wrong += 0 if abs(actions[row, lane]) < np.inf else 1
+    return wrong == 0
+
+
+def reset(
+    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, which: Any, observations: Any,
+    outcomes: Any, flags: Any, next_one: bool,
+) -> None:  # fmt: skip
+    """Begin an episode in the lanes of `which`.
+
+    Parameters
+    ----------
+    states : float64 array of shape (n_tiles, n_rows * 64)
+        Of the ships, tile by tile.
+    keys : uint64 array of shape (n_tiles, 3, 64)
+        Seed and number of each episode, and the state of its sea's random numbers.
+    settings : float64 array
+        `Rules`, settings of the sensor set, settings of the task.
+    pool : float64 array of shape (n_pool, n_ship_rows)
+        Ships of which each episode draws one; none for those of `ships`.
+    ships : float64 array of shape (n_tiles or 1, n_ship_rows * 64), or (1, n_ship_rows) where all share one
+        Numbers of the ships.
+    rows : int64 array
+        How many observations, outcomes and flags there are, then the offsets of their rows.
+    which : bool array of shape (n,)
+        Lanes to begin anew.
+    observations : float32 array of shape (n, n_observations)
+        Taken by what autopilots see.
+    outcomes : float64 array of shape (n_outcomes, n)
+        Taken by reward, flags and info.
+    flags : bool array of shape (n_flags, n)
+        Taken by those of the outcomes that are flags: terminated, truncated, then those of info.
+    next_one : bool
+        Whether the next episode begins under the key, and is shown in its lane alone, where rewards and
+        flags stay those of the last step; or the one of `keys`, and everything is shown.
+    """
+    n = which.shape[0]
+    for tile in range(states.shape[0]):
+        state, key, ship, first = states[tile], keys[tile], ships[tile % ships.shape[0]], tile * LANES
+        lanes = min(n - first, LANES)
+        for lane in range(lanes):
+            if which[first + lane]:
+                if next_one:
+                    begin_next(
+                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
+                    )
+                else:
+                    begin_lane(state, lane, key, settings, pool, ship)
+        if not next_one:
+            show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+
+
+def step(
+    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, actions: Any, observations: Any,
+    outcomes: Any, flags: Any, first_tile: int, end_tile: int, next_ones: bool,
+) -> int:  # fmt: skip
+    """One control interval of the tiles from `first_tile` up to `end_tile`.
+
+    `actions` holds rows of commands, of the rudder and, if there is a second, of the shaft; for the others
+    see `reset`. A lane whose episode was over stays as it is and earns nothing, or, with `next_ones`, begins
+    its next episode. Returns the number of episodes that ended, or `REFUSED`, nothing changed, if a command
+    is not finite.
+    """
+    if not are_finite(actions):
+        return REFUSED
+    n, ended, rules = observations.shape[0], 0, read_rules(settings, 0)
+    h = rules.dt / rules.substeps
+    for tile in range(first_tile, end_tile):
+        state, key, ship, first = states[tile], keys[tile], ships[tile % ships.shape[0]], tile * LANES
+        lanes = min(n - first, LANES)
+        whole = (lanes + GROUP - 1) // GROUP * GROUP
+        take_commands(state, actions, rules, first, lanes)
+        for _ in range(int(rules.substeps)):
+            sail_lanes(state, key[2], h, ship, whole)
+        conclude_lanes(state, key, settings, ship, whole)
+        n_due, n_ended = count_events(state, settings, ship, lanes)
+        ended += n_ended
+        if n_due > 0:
+            let_events_come(state, key, settings, ship, lanes)
+        show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+        if next_ones:
+            for lane in range(lanes):
+                outcome = load_outcome(state, lane)
+                if load_course(state, lane).ended != 0.0 and outcome.terminated + outcome.truncated == 0.0:
+                    begin_next(
+                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
+                    )
+    return ended
+
+
+SIGNATURE = "int64(int64[::1], int64)"
+STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked for
+
+
+def run(world: Any, asked: int) -> int:
+    """`step` or `reset` of arrays that are given by their addresses and shapes, by turns.
+
+    To look at eleven arrays takes the interpreter longer than to sail a ship.
+
+    Parameters
+    ----------
+    world : int64 array
+        States, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags, then
+        the first tile of a step and the one behind its last.
+    asked : int
+        `STEP`; `STEP_AND_BEGIN`: episodes that were over begin anew; `BEGIN` or `BEGIN_NEXT` in some lanes.
+    """
+    states, keys = table_at(world, 0), words_at(world, 3)
+    settings, pool, ships = numbers_at(world, 7), table_at(world, 9), table_at(world, 12)
+    rows, which = rows_at(world, 15), flags_at(world, 17)
+    actions, observations = single_table_at(world, 19), single_table_at(world, 22)
+    outcomes, flags = table_at(world, 25), flag_table_at(world, 28)
+    if asked >= BEGIN:
+        reset(
+            states,
+            keys,
+            settings,
+            pool,
+            ships,
+            rows,
+            which,
+            observations,
+            outcomes,
+            flags,
+            asked == BEGIN_NEXT,
+        )
+        return 0
+    return step(
+        states, keys, settings, pool, ships, rows, actions, observations, outcomes, flags, world[31], world[32],
+        asked == STEP_AND_BEGIN,
+    )  # fmt: skip

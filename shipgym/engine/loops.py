@@ -1,0 +1,94 @@
+"""The loops by name, compiled for a ship when they are first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
+
+from shipgym.engine import batches, passages, rate_steering, segments, trajectories, zigzag
+from shipgym.engine.compiling import compiled
+from shipgym.engine.parts import Part
+from shipgym.engine.records import LANES
+from shipgym.engine.vessel import Vessel
+
+SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parameters
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A loop as it is compiled.
+
+    Attributes
+    ----------
+    function : callable
+        A plain Python function on arrays.
+    signature : str
+        Of its arguments, as Numba writes it.
+    lanes : int
+        Of a tile of states: 64, or 1 where states are vectors.
+    shared : bool
+        Whether there is one ship only, so that her numbers are a vector.
+    parts : mapping of str to Part or other global
+        Beside the ship's and the sea's.
+    """
+
+    function: Callable[..., Any]
+    signature: str
+    lanes: int = 1
+    shared: bool = True
+    parts: Mapping[str, Any] = field(default_factory=dict)
+
+
+MEASURED_GEAR = {"HAS_LAG": False}
+LOOPS = {
+    "derivatives": Loop(
+        trajectories.derivatives,
+        "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])",
+    ),
+    "meet": Loop(passages.meet, f"void(float64[:, ::1], {SEA})"),
+    "simulate": Loop(
+        trajectories.simulate,
+        f"int64(float64[:, ::1], float64[:, ::1], float64, {SEA}, float64[::1])",
+    ),
+    "open_loop": Loop(
+        trajectories.open_loop,
+        "int64(float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64[::1])",
+        parts=MEASURED_GEAR,
+    ),
+    "zigzag": Loop(
+        zigzag.zigzag,
+        "UniTuple(int64, 2)(float64[:, ::1], float64[::1], float64, float64, float64, float64, boolean,"
+        f" {SEA}, float64[::1])",
+        parts={"advanced": Part(passages.advanced, inline=False)},
+    ),
+    "steer_rate": Loop(
+        rate_steering.steer_rate,
+        "int64(float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, float64, float64,"
+        f" {SEA}, float64[::1])",
+    ),
+    "segments": Loop(
+        segments.sail_segment,
+        "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1])",
+        LANES,
+        shared=False,
+        parts=MEASURED_GEAR,
+    ),
+    "fleet": Loop(batches.advance_batch, batches.SIGNATURE, LANES, shared=False),
+    "alike": Loop(batches.advance_batch, batches.SIGNATURE, LANES),
+}
+
+
+@cache
+def ship_loop(vessel: Vessel, name: str) -> Any:
+    """A loop of `LOOPS` for a ship in calm water; see `compiled`."""
+    return compile_loop(vessel, name, {})
+
+
+def compile_loop(vessel: Vessel, name: str, sea_parts: Mapping[str, Any]) -> Any:
+    """A loop of `LOOPS` for a ship and a sea, whose parts are vectors (`shipgym.sea.open_sea`)."""
+    loop = LOOPS[name]
+    parts = {**vessel.parts(loop.lanes, loop.shared), **sea_parts, **loop.parts}
+    where = "in the open sea" if sea_parts else "in calm water"
+    return compiled(loop.function, loop.signature, parts, f"{vessel.name} {where}: {name}")

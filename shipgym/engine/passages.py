@@ -1,0 +1,150 @@
+"""What the passages of one ship share: a state in a row of `out`, a step, and the sea meanwhile.
+
+States are vectors in the order of the ship's `state_names`; behind them, in the open sea, stands what is
+recorded of it (`SEA_CHANNELS`). `sea` is the vector of the sea's state and `words` that of its random
+numbers, one word long; both are changed. `parameters` tell of the sea, `numbers` of the ship.
+"""
+
+from __future__ import annotations
+
+from math import atan2
+from typing import Any
+
+from shipgym.engine.motion import HAS_SEA, Motion, Push, Ship, sail
+from shipgym.engine.vessel import load_coefficients, load_ship
+
+#: What is recorded of the sea beside the state: first-order motion, current, wind.
+SEA_CHANNELS = (
+    "psi_wave", "r_wave", "phi_wave", "p_wave", "current_north", "current_east", "wind_speed", "wind_from",
+)  # fmt: skip
+NO_LIMIT = 1e300
+BEGIN_WORDS = EVOLVE_WORDS = 0  # parts: steps of the random numbers' state
+
+
+def load_motion(states: Any, lane: int) -> Any:
+    """A part: a state in a vector or in a lane of a tile."""
+
+
+def store_motion(states: Any, lane: int, motion: Motion) -> None:
+    """A part: write a state."""
+
+
+def load_sea(sea: Any, lane: int) -> Any:
+    """A part: the state of the sea."""
+
+
+def store_sea(vector: Any, lane: int, sea: Any) -> None:
+    """A part: write the state of the sea."""
+
+
+def load_sea_parameters(parameters: Any, lane: int) -> Any:
+    """A part: the parameters of the sea."""
+
+
+def push(motion: Motion, sea: Any, parameters: Any) -> Any:
+    """A part: what the sea does to the ship."""
+
+
+def evolve(motion: Motion, h: float, sea: Any, word: Any, parameters: Any) -> Any:
+    """A part: the sea after a step."""
+
+
+def begin_sea(motion: Motion, word: Any, parameters: Any) -> Any:
+    """A part: the sea as if it had always been there."""
+
+
+def ship_of(numbers: Any) -> Any:
+    """Ship and coefficients from the vector of her numbers."""
+    return load_ship(numbers, 0), load_coefficients(numbers, 0)
+
+
+def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
+    """The ship with another steering gear, without lag."""
+    return Ship(
+        length=ship.length,
+        speed=ship.speed,
+        rudder_limit=limit,
+        rudder_rate=rate,
+        gear_frequency=0.0,
+        shaft=ship.shaft,
+        water_depth=ship.water_depth,
+        scale_speed=ship.scale_speed,
+    )
+
+
+def in_depth(ship: Ship, water_depth: float) -> Ship:
+    """The ship in water of another depth."""
+    return Ship(
+        length=ship.length,
+        speed=ship.speed,
+        rudder_limit=ship.rudder_limit,
+        rudder_rate=ship.rudder_rate,
+        gear_frequency=ship.gear_frequency,
+        shaft=ship.shaft,
+        water_depth=water_depth,
+        scale_speed=ship.scale_speed,
+    )
+
+
+def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
+    """A state with another heading, rudder angle and shaft speed."""
+    return Motion(
+        x=motion.x,
+        y=motion.y,
+        psi=psi,
+        u=motion.u,
+        v=motion.v,
+        r=motion.r,
+        p=motion.p,
+        phi=motion.phi,
+        q=motion.q,
+        delta=delta,
+        n=n,
+    )
+
+
+def advanced(
+    motion: Motion, command: float, n: float, h: float, pushed: Push, coefficients: Any, ship: Ship
+) -> Motion:
+    """State h seconds later, the command held; called, not inlined, where it stands several times."""
+    return sail(motion, command, n, h, pushed, coefficients, ship)
+
+
+def felt(motion: Motion, sea: Any, parameters: Any) -> Push:
+    """What the sea does to the ship now."""
+    if HAS_SEA:
+        pushed: Push = push(motion, load_sea(sea, 0), load_sea_parameters(parameters, 0))
+        return pushed
+    return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def record(out: Any, row: int, columns: int, sea: Any, parameters: Any) -> None:
+    """Write the sea behind the state of one row, in the order of `SEA_CHANNELS`."""
+    now, p = load_sea(sea, 0), load_sea_parameters(parameters, 0)
+    out[row, columns - 8] = now.psi_wave
+    out[row, columns - 7] = now.r_wave
+    out[row, columns - 6] = now.phi_wave
+    out[row, columns - 5] = now.p_wave
+    out[row, columns - 4] = now.current_north
+    out[row, columns - 3] = now.current_east
+    out[row, columns - 2] = p.wind_speed + now.gust
+    out[row, columns - 1] = atan2(now.wind_east, now.wind_north)
+
+
+def follow(out: Any, row: int, motion: Motion, h: float, sea: Any, words: Any, parameters: Any) -> None:
+    """Write down where a step led, and let the sea go on meanwhile."""
+    store_motion(out[row], 0, motion)
+    if HAS_SEA:
+        p = load_sea_parameters(parameters, 0)
+        store_sea(sea, 0, evolve(motion, h, load_sea(sea, 0), words[0], p))
+        words[0] += EVOLVE_WORDS
+        record(out, row, out.shape[1], sea, parameters)
+
+
+def meet(out: Any, sea: Any, words: Any, parameters: Any) -> None:
+    """Begin the sea for the ship in row 0, with `words[0]` as the seed of its random numbers."""
+    if HAS_SEA:
+        begun = begin_sea(load_motion(out[0], 0), words[0], load_sea_parameters(parameters, 0))
+        store_sea(sea, 0, begun)
+        words[0] += BEGIN_WORDS
+        record(out, 0, out.shape[1], sea, parameters)

@@ -1,0 +1,60 @@
+"""A stretch of a measured trial sailed by a tile of ships, each with its own coefficients and start."""
+
+from __future__ import annotations
+
+from math import fabs
+from typing import Any
+
+from shipgym.engine.motion import Push, sail
+from shipgym.engine.passages import NO_LIMIT, load_motion, replaced, store_motion, with_gear
+from shipgym.engine.records import LANES
+from shipgym.engine.vessel import load_coefficients, load_ship
+
+
+def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any, out: Any) -> None:
+    """From the tile's state through a grid of measured inputs, straight between its points.
+
+    A measured rudder is a steering gear without limit or lag that moves at the measured rate; `state` is
+    changed. A ship that runs away leaves numbers that are not finite, or not any ship's.
+
+    Parameters
+    ----------
+    state : float64 array of shape (n_state * 64,)
+        Where each ship starts.
+    ships : float64 array of shape (n_rows * 64,)
+        A tile of ships.
+    offsets : float64 array of shape (64,)
+        Added to the measured rudder, rad.
+    inputs : float64 array of shape (n_points, 3)
+        Time, s, rudder, rad, shaft speed, 1/s.
+    samples : int64 array of shape (n_points,)
+        Row of `out` that takes the state at a point, -1 for none.
+    out : float64 array of shape (n_samples, n_state * 64)
+        The states at the samples.
+    """
+    for lane in range(LANES):
+        motion = load_motion(state, lane)
+        store_motion(state, lane, replaced(motion, motion.psi, inputs[0, 1] + offsets[lane], motion.n))
+    keep(state, samples[0], out)
+    for i in range(inputs.shape[0] - 1):
+        h = inputs[i + 1, 0] - inputs[i, 0]
+        rate = fabs(inputs[i + 1, 1] - inputs[i, 1]) / h
+        order = inputs[i + 1, 1]
+        shaft = 0.5 * (inputs[i, 2] + inputs[i + 1, 2])
+        for lane in range(LANES):
+            ship, coefficients = (
+                with_gear(load_ship(ships, lane), NO_LIMIT, rate),
+                load_coefficients(ships, lane),
+            )
+            delta = order + offsets[lane]
+            calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+            motion = sail(load_motion(state, lane), delta, shaft, h, calm, coefficients, ship)
+            store_motion(state, lane, replaced(motion, motion.psi, delta, motion.n))
+        keep(state, samples[i + 1], out)
+
+
+def keep(state: Any, row: int, out: Any) -> None:
+    """Copy a tile of states into a row, unless its number is negative."""
+    if row >= 0:
+        for k in range(state.shape[0]):
+            out[row, k] = state[k]

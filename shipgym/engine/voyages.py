@@ -1,0 +1,247 @@
+"""Episodes compiled for a ship, a sea, a sensor set and a task: where their numbers stand, and the loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any
+
+import numpy as np
+
+from shipgym.engine import episodes
+from shipgym.engine.addresses import array_at, plan_at
+from shipgym.engine.compiling import compiled
+from shipgym.engine.envelope import Envelope
+from shipgym.engine.motion import Motion
+from shipgym.engine.parts import Part
+from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
+from shipgym.engine.record_code import (
+    bounded_storer,
+    chooser,
+    loader,
+    number_storer,
+    storer,
+    summer,
+    zero,
+)
+from shipgym.engine.records import LANES, Layout, leaves
+from shipgym.engine.vessel import Vessel
+from shipgym.instruments import bridge, perfect
+from shipgym.sea import open_sea
+from shipgym.tasks.definition import TaskDefinition
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """A sensor set as it is compiled.
+
+    Attributes
+    ----------
+    module : module
+        With `Settings`, `Memory`, `measure` and `readings`.
+    noise, filter : bool
+        Whether a bridge's instruments are noisy, and whether they filter.
+    """
+
+    module: Any
+    noise: bool = False
+    filter: bool = False
+
+
+PERFECT = Sensors(perfect)
+
+
+def sensors_for(windy: bool, noise: bool, filtered: bool) -> Sensors:
+    """The sensor set for what is asked: without error in calm water, else a bridge's."""
+    return Sensors(bridge, noise, filtered) if windy or noise or filtered else PERFECT
+
+
+@dataclass(frozen=True, eq=False)
+class Voyages:
+    """Episodes of one task with ships that differ in numbers only.
+
+    Attributes
+    ----------
+    vessel : Vessel
+        The ship.
+    task : TaskDefinition
+        What is asked.
+    sensors : Sensors
+        What she is seen by.
+    windy : bool
+        Whether there is current, wind or waves.
+    shared : bool
+        Whether all lanes have the same ship and sea.
+    """
+
+    vessel: Vessel
+    task: TaskDefinition
+    sensors: Sensors
+    windy: bool
+    shared: bool
+
+    @cached_property
+    def state(self) -> Layout:
+        """Rows of a tile of states; behind them the plan of an episode."""
+        return Layout(
+            motion=(Motion, self.vessel.state_names),
+            sea=open_sea.sea_records(self.windy)[0],
+            course=episodes.Course,
+            memory=self.sensors.module.Memory,
+            state=self.task.State,
+            outcome=episodes.Outcome,
+            reward=self.task.Reward,
+            observation=self.task.Observation,
+        )
+
+    @cached_property
+    def ship(self) -> Layout:
+        """Rows of the numbers of a ship."""
+        return Layout(
+            ship=self.vessel.layout["ship"].record,
+            coefficients=self.vessel.coefficients,
+            envelope=Envelope,
+            sea=open_sea.sea_records(self.windy)[1],
+            scale=self.task.Observation,
+        )
+
+    @cached_property
+    def settings(self) -> Layout:
+        """Places of the settings of engine, sensor set and task."""
+        return Layout(rules=episodes.Rules, sensor=self.sensors.module.Settings, task=self.task.Settings)
+
+    def row(self, name: str) -> int:
+        """Row of a number of the state by its name: `u`, `course`, `steps`, `reward`."""
+        for record in ("motion", "course", "state", "sea", "outcome"):
+            if name in self.state[record].present:
+                return self.state[record].row(name)
+        raise KeyError(name)
+
+    def info_row(self, name: str) -> int:
+        """Row of an entry of `info`."""
+        if name.startswith("reward_"):
+            part = name.removeprefix("reward_")
+            if part == "end":
+                return self.state["outcome"].row("end")
+            paths = {path.rpartition(".")[2]: path for path in leaves(self.task.Reward)}
+            return self.state["reward"].row(paths[part])
+        kept = "outcome" if name in episodes.Outcome._fields else "state"
+        return self.state[kept].row(name)
+
+    @cached_property
+    def parts(self) -> dict[str, Any]:
+        """What takes the place of the globals of `shipgym.engine.episodes`."""
+        return {**self._records(), **self._ships(), **self._functions()}
+
+    def _records(self) -> dict[str, Any]:
+        rows = self.state
+        made: dict[str, Any] = {}
+        for name, place in rows.rows.items():
+            made[f"load_{name}"], made[f"store_{name}"] = loader(place), storer(place)
+        for name in ("motion", "sea", "state", "memory", "reward"):
+            made[f"choose_{name}"] = chooser(rows[name].record)
+        bounds = {path: (seen.low, seen.high) for path, seen in self.task.seen.items()}
+        settings = self.settings
+        return made | {
+            "store_ended": number_storer(rows["course"].row("ended")),
+            "store_ran_away": number_storer(rows["course"].row("ran_away")),
+            "store_observation": bounded_storer(rows["observation"], bounds),
+            "no_reward": zero(self.task.Reward),
+            "total_reward": summer(self.task.Reward),
+            "read_rules": loader(settings["rules"], 1),
+            "read_sensor": loader(settings["sensor"], 1),
+            "read_settings": loader(settings["task"], 1),
+            "plan_of": plan_at(rows.n_rows),
+        }
+
+    def _ships(self) -> dict[str, Any]:
+        lanes = 1 if self.shared else LANES
+        load = {name: loader(place, lanes) for name, place in self.ship.rows.items()}
+        return {
+            **self.vessel.parts(shared=self.shared),
+            "load_ship": load["ship"],
+            "load_coefficients": load["coefficients"],
+            "load_envelope": load["envelope"],
+            "load_sea_parameters": load["sea"],
+            "load_scale": load["scale"],
+            "common_sea": Part(read_sea if self.shared and self.windy else nothing),
+            "sea_at": Part(sea_of_lane if self.windy and not self.shared else the_common),
+            "common_view": Part(read_view if self.shared else nothing),
+            "view_at": Part(the_common if self.shared else view_of_lane),
+        }
+
+    def _functions(self) -> dict[str, Any]:
+        task, sensors = self.task, self.sensors.module
+        seldom = {
+            name: Part(getattr(episodes, name), inline=False)
+            for name in ("begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands",
+                         "sail_lanes", "count_events")
+        }  # fmt: skip
+        return seldom | {
+            "conclude_lanes": Part(episodes.conclude_lanes, inline=False),
+            "step": Part(episodes.step),
+            "reset": Part(episodes.reset),
+            "words_at": array_at(np.uint64, 3),
+            "numbers_at": array_at(np.float64, 1),
+            "table_at": array_at(np.float64, 2),
+            "rows_at": array_at(np.int64, 1),
+            "flags_at": array_at(np.bool_, 1),
+            "flag_table_at": array_at(np.bool_, 2),
+            "single_table_at": array_at(np.float32, 2),
+            **open_sea.sea_functions(self.windy),
+            "HAS_NOISE": self.sensors.noise,
+            "HAS_FILTER": self.sensors.filter,
+            "measure": Part(sensors.measure),
+            "readings": Part(sensors.readings),
+            "task_begin": Part(task.begin, inline=False),
+            "task_step": Part(task.step),
+            "observe": Part(task.observe),
+            "due": Part(task.due),
+            "on_event": Part(task.on_event, inline=False),
+            "worst_cost": Part(task.worst_cost),
+        }
+
+    @cached_property
+    def run(self) -> Any:
+        """The loop `shipgym.engine.episodes.run`."""
+        what = f"{self.task.name} for {self.vessel.name!r}"
+        return compiled(episodes.run, episodes.SIGNATURE, self.parts, what)
+
+
+def nothing(ships: Any) -> int:
+    """Nothing is common to all lanes."""
+    return 0
+
+
+def the_common(common: Any, ships: Any, lane: int) -> Any:
+    """What was read before the loop."""
+    return common
+
+
+def read_sea(ships: Any) -> Any:
+    """The sea of all lanes, read once before a loop."""
+    return load_sea_parameters(ships, 0)
+
+
+def sea_of_lane(common: Any, ships: Any, lane: int) -> Any:
+    """The sea of one lane."""
+    return load_sea_parameters(ships, lane)
+
+
+def read_view(ships: Any) -> Any:
+    """Envelope and scales of observations of all lanes, read once before a loop."""
+    return load_envelope(ships, 0), load_scale(ships, 0)
+
+
+def view_of_lane(common: Any, ships: Any, lane: int) -> Any:
+    """Envelope and scales of observations of one lane."""
+    return load_envelope(ships, lane), load_scale(ships, lane)
+
+
+@cache
+def voyages(vessel: Vessel, task: TaskDefinition, sensors: Sensors, windy: bool, shared: bool) -> Voyages:
+    """Episodes, compiled once in a process."""
+    return Voyages(vessel, task, sensors, windy, shared)
+
+
+__all__ = ["Sensors", "Voyages", "sensors_for", "voyages"]

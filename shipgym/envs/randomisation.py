@@ -1,0 +1,145 @@
+"""Domain randomisation: the ships of which an environment gives each episode one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from shipgym.checks import check_choice, check_number
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel, load_model
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.structures import Structure
+
+POOL_SIZE = 256  # ships drawn from what is continuous
+POOL_SEED = 20260101
+N_SPEEDS = 9  # approach speeds, evenly over their range
+Range = tuple[float, float]
+Pool = list[tuple[ShipModel, Weather]]
+
+
+@dataclass(frozen=True)
+class Randomisation:
+    """What differs from episode to episode beside task and sea.
+
+    Attributes
+    ----------
+    model_uncertainty : {None, "covariance"}
+        Whether each episode's ship is drawn from the identified covariance ("posterior" is taken too).
+    ensemble : sequence of str, Path or ShipModel
+        Further models of the same structure, of which each episode has one.
+    speed_range : tuple of float or None
+        Least and largest approach speed, parts of the service speed; the shaft turns in proportion.
+    loading_range : tuple of float or None
+        Least and largest displacement, parts of that of the model: accelerations are divided by it.
+    """
+
+    model_uncertainty: str | None = None
+    ensemble: Sequence[str | Path | ShipModel] = ()
+    speed_range: Range | None = None
+    loading_range: Range | None = None
+
+    def __post_init__(self) -> None:
+        if self.model_uncertainty is not None:
+            check_choice(self.model_uncertainty, ("covariance", "posterior"), "model_uncertainty")
+        if isinstance(self.ensemble, str | Path | ShipModel):
+            raise InputError(f"ensemble: {self.ensemble!r} found, expected a list of models")
+        for name in ("speed_range", "loading_range"):
+            if (given := getattr(self, name)) is not None:
+                _check_range(given, name)
+
+    @classmethod
+    def names(cls) -> tuple[str, ...]:
+        """Its keywords."""
+        return tuple(item.name for item in fields(cls))
+
+    @classmethod
+    def take_from(cls, options: Mapping[str, Any]) -> tuple[Self, dict[str, Any]]:
+        """What is randomised among an environment's options, and the others."""
+        own = {key: value for key, value in options.items() if key in cls.names()}
+        return cls(**own), {key: value for key, value in options.items() if key not in own}
+
+    def ships(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
+        """Ship and sea of the pool that episodes are drawn from; a single one where nothing differs.
+
+        Parameters
+        ----------
+        model : ShipModel
+            The environment's model.
+        seas : sequence of Weather
+
+        Returns
+        -------
+        list of tuple of ShipModel and Weather
+            The same for the same arguments.
+
+        Raises
+        ------
+        InputError
+            If a model cannot be drawn from, has another structure, or is not loaded by its coefficients.
+        """
+        models = [model, *(one if isinstance(one, ShipModel) else load_model(one) for one in self.ensemble)]
+        for other in models[1:]:
+            if other.vessel is not model.vessel:
+                raise InputError(
+                    f"ensemble: {other.name!r} has other equations than {model.name!r}, expected models of "
+                    "one structure; make an environment for each"
+                )
+        if not (self.model_uncertainty or self.speed_range or self.loading_range):
+            return list(product(models, seas))
+        random = np.random.default_rng(POOL_SEED)
+        turns = -(-POOL_SIZE // len(models))
+        drawn = [one.sample(turns, random) if self.model_uncertainty else [one] * turns for one in models]
+        ships = [ship for turn in zip(*drawn, strict=True) for ship in turn]
+        in_turn = [(ship, seas[i // len(models) % len(seas)]) for i, ship in enumerate(ships[:POOL_SIZE])]
+        paces = self._paces(models)
+        return [(self._varied(ship, paces, random), sea) for ship, sea in in_turn]
+
+    def _paces(self, models: Sequence[ShipModel]) -> dict[int, list[Particulars]]:
+        """Particulars at each approach speed, one object each, because the weather is worked out for each."""
+        parts = np.linspace(*(self.speed_range or (1.0, 1.0)), N_SPEEDS)
+        known = {id(one.particulars): one.particulars for one in models}
+        return {
+            key: [replace(own, speed=part * own["speed"]) for part in parts.tolist()]
+            for key, own in known.items()
+        }
+
+    def _varied(
+        self, ship: ShipModel, paces: dict[int, list[Particulars]], random: np.random.Generator
+    ) -> ShipModel:
+        """A ship at a speed and of a loading within the ranges."""
+        if self.loading_range:
+            ship = _loaded(ship, random.uniform(*self.loading_range))
+        if self.speed_range:
+            ship = _at_speed(ship, paces[id(ship.particulars)][random.integers(N_SPEEDS)])
+        return ship
+
+
+def _check_range(given: Any, name: str) -> None:
+    if not isinstance(given, Sequence) or len(given) != 2:
+        raise InputError(f"{name}: {given!r} found, expected the least and the largest, two numbers")
+    check_number(given[0], f"{name}: the least", above=0.0)
+    check_number(given[1], f"{name}: the largest", at_least=given[0])
+
+
+def _at_speed(ship: ShipModel, particulars: Particulars) -> ShipModel:
+    """A ship with another approach speed, and shaft speed in proportion."""
+    part = particulars["speed"] / ship.particulars["speed"]
+    return replace(ship, particulars=particulars, service_shaft_speed=part * ship.service_shaft_speed)
+
+
+def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
+    """A ship that forces accelerate less, the heavier it is."""
+    if not isinstance(ship.dynamics, Structure):
+        raise InputError(
+            f"loading_range: the equations of {ship.name!r} are not a table of coefficients; name its "
+            "loading conditions as models of their own in `ensemble`"
+        )
+    lighter = {name: value / displacement for name, value in ship.coefficients.items()}
+    return replace(ship, coefficients=lighter, covariance=None)

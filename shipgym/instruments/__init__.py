@@ -1,0 +1,1 @@
+"""Sensor sets: what a ship's instruments show, as files of plain functions on named records."""

@@ -1,0 +1,114 @@
+"""A bridge's instruments: first-order motion in waves, noise, and a filter against the waves.
+
+The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of encounter: Fossen 2011,
+Handbook of Marine Craft Hydrodynamics and Motion Control, 11.1.2.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.engine.mathematics import clip, pick, sin_cos
+from shipgym.engine.motion import Motion, ground_velocity
+from shipgym.engine.random import DRAW, mix, normal, stream
+from shipgym.sea.open_sea import Sea
+from shipgym.tasks.contract import Interval, Random, Readings
+
+INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)  # apart from the draws of task and weather
+DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
+STEEPEST = 2.8  # largest angle between samples that the filter is tuned to, rad
+
+HAS_NOISE, HAS_FILTER = True, True  # known when compiled
+
+
+class Settings(NamedTuple):
+    """Standard deviations of white noise."""
+
+    heading: float = 0.0  # rad
+    yaw_rate: float = 0.0  # rad/s
+    speed: float = 0.0  # m/s, of surge and sway
+    position: float = 0.0  # m
+
+
+class Notch(NamedTuple):
+    """Last two signals, and last two that were taken away."""
+
+    signal_1: float
+    signal_2: float
+    taken_1: float
+    taken_2: float
+
+
+class Memory(NamedTuple):
+    """What is shown beyond the ship's slow motion, and the filters' memory."""
+
+    x: float
+    y: float
+    psi: float
+    u: float
+    v: float
+    r: float
+    heading: Notch
+    rate: Notch
+
+
+def measure(
+    motion: Motion,
+    sea: Sea,
+    memory: Memory,
+    frequency: float,
+    interval: Interval,
+    settings: Settings,
+    random: Random,
+) -> Memory:
+    """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
+    psi, r, x, y, u, v = sea.psi_wave, sea.r_wave, 0.0, 0.0, 0.0, 0.0
+    if HAS_NOISE:
+        word = stream(random.key, random.episode) ^ INSTRUMENTS_STREAM
+        word = mix(word + np.uint64(interval.steps) * DRAW[1])
+        psi += settings.heading * normal(word, DRAW[0])
+        r += settings.yaw_rate * normal(word, DRAW[1])
+        u, v = settings.speed * normal(word, DRAW[2]), settings.speed * normal(word, DRAW[3])
+        x, y = settings.position * normal(word, DRAW[4]), settings.position * normal(word, DRAW[5])
+    if not HAS_FILTER:
+        return Memory(x, y, psi, u, v, r, memory.heading, memory.rate)
+    turn = clip(frequency * interval.dt, 0.0, STEEPEST)
+    first = interval.steps == 0.0
+    heading = notched(motion.psi + psi, turn, first, memory.heading)
+    rate = notched(motion.r + r, turn, first, memory.rate)
+    return Memory(x, y, psi - heading.taken_1, u, v, r - rate.taken_1, heading, rate)
+
+
+def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
+    """A notch filter after a sample, around `turn` rad a sample; `taken_1` is what it takes away.
+
+    The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In the episode's first
+    sample nothing is taken away.
+    """
+    sine, cosine = sin_cos(0.5 * turn)
+    k = sine / cosine
+    per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)
+    band = 2.0 * (WIDE - DEEP) * k * per * (signal - memory.signal_2)
+    taken = (
+        band
+        - 2.0 * (k * k - 1.0) * per * memory.taken_1
+        - (1.0 - 2.0 * WIDE * k + k * k) * per * memory.taken_2
+    )
+    return Notch(
+        signal,
+        pick(first, signal, memory.signal_1),
+        pick(first, 0.0, taken),
+        pick(first, 0.0, memory.taken_1),
+    )
+
+
+def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
+    """The ship's motion, and what the instruments add."""
+    north, east = ground_velocity(motion, sea.current_north, sea.current_east)
+    return Readings(
+        motion.x + memory.x, motion.y + memory.y, motion.psi + memory.psi, motion.u + memory.u,
+        motion.v + memory.v, motion.r + memory.r, motion.p + sea.p_wave, motion.phi + sea.phi_wave,
+        motion.delta, motion.n, north, east,
+    )  # fmt: skip

@@ -1,0 +1,14 @@
+from .catalogue import list_models as list_models
+from .catalogue import load_model as load_model
+from .catalogue import register_ship_equations as register_ship_equations
+from .envelope import Envelope as Envelope
+from .equations import ShipEquations as ShipEquations
+from .grey_box_model import converted_model as converted_model
+from .grey_box_model import grey_box as grey_box
+from .grey_boxes import GreyBox as GreyBox
+from .ship_model import ShipModel as ShipModel
+from .structures import get_structure as get_structure
+from .structures import list_structures as list_structures
+from .structures import register_structure as register_structure
+from .term_table import Structure as Structure
+from .terms import Term as Term

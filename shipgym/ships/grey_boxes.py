@@ -1,0 +1,254 @@
+"""The grey box: the accelerations of a reference ship, converted by similarity, and a table of terms.
+
+Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
+minor rudder. Their equation 11 adds accelerations of two different ships; here those of the reference ship
+are converted back to the target first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.parts import Part
+from shipgym.engine.vessel import Vessel
+from shipgym.errors import InputError
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.structures import WITH_REFERENCE
+from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
+from shipgym.ships.term_table import Structure
+from shipgym.ships.terms import CHANNEL, read_terms
+
+Floats = NDArray[np.float64]
+
+GREY_BOX = WITH_REFERENCE
+SOURCE = (
+    "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with "
+    "minor rudder"
+)
+LINEAR = read_terms("du, v, r, delta, 1")
+CHANNELS = ("u", "v", "r", "p", "phi", "delta", "n")
+
+
+@dataclass(frozen=True)
+class GreyBox(Structure):
+    """A reference ship's accelerations plus a table of terms.
+
+    The target's state is converted to the reference ship by the prime system of the service speeds (u and v
+    by the ratio of the speeds, r and p by that of speed over length, heel and rudder as they are), and the
+    reference ship's accelerations back to the target. The terms are added. Water is deep. The shaft turns as
+    commanded, whatever lag the reference ship's has.
+
+    Attributes
+    ----------
+    reference : ManoeuvringModel
+        The reference ship: with equations of its own or a table of terms, without heave or trim.
+    shaft : bool
+        Whether the target's shaft speed is known: then the reference ship's is that times the ratio of the
+        shaft speeds at service speed. If not, its shaft turns as at service speed.
+
+    Raises
+    ------
+    InputError
+        For a table of forces, and for a reference ship that is a grey box itself or has no rudder.
+    """
+
+    reference: ManoeuvringModel | None = None
+    shaft: bool = False
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        where = f"structure '{self.name}'"
+        if self.reference is None:
+            raise InputError(
+                f"{where}: no reference found, expected a ManoeuvringModel, or the name of a shipped model"
+            )
+        if isinstance(self.reference.dynamics, GreyBox):
+            raise InputError(
+                f"{where}: reference {self.reference.name!r} is a grey box itself, expected a reference ship "
+                "or a table of terms; take that grey box's own reference"
+            )
+        if self.quantity != "acceleration":
+            raise InputError(
+                f"{where}: quantity 'force' found, expected 'acceleration': the terms are added to the "
+                "reference ship's accelerations"
+            )
+        if self.shaft and "n" not in self.reference.command_names:
+            raise InputError(
+                f"{where}: shaft true found, but reference {self.reference.name!r} knows no shaft speed; "
+                "leave it out"
+            )
+
+    @property
+    def ship(self) -> ManoeuvringModel:
+        """The reference ship."""
+        assert self.reference is not None
+        return self.reference
+
+    @property
+    def rolls(self) -> bool:
+        """Whether the reference ship has a rolling motion, and with it the target."""
+        return "phi" in self.ship.state_names
+
+    @cached_property
+    def required_channels(self) -> tuple[str, ...]:
+        """Channels a trial needs: those of the terms and those that the reference ship is evaluated at."""
+        needed = {CHANNEL[symbol] for symbol in self.symbols} | {"u", "v", "r", "delta"}
+        needed |= {"p", "phi"} if self.rolls else set()
+        needed |= {"n"} if self.shaft else set()
+        return tuple(name for name in CHANNELS if name in needed)
+
+    @property
+    def has_rudder(self) -> bool:
+        """Whether a rudder turns it: that of the reference ship does."""
+        return True
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the state, with roll or memory where the reference ship has it."""
+        roll = ("p", "phi") if self.rolls else ()
+        memory = ("q",) if "q" in self.ship.state_names else ()
+        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
+
+    @property
+    def needs_shaft_speed(self) -> bool:
+        """Whether the shaft speed at service speed has to be known."""
+        return self.shaft or super().needs_shaft_speed
+
+    @property
+    def astern(self) -> bool:
+        """Whether the reference ship's shaft may turn astern."""
+        return self.ship.turns_astern
+
+    def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
+        """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
+        return _vessel(self.ship.vessel, self._source, len(self._terms), self.shaft, self.state_names, lag)
+
+    @cached_property
+    def _source(self) -> str:
+        """Written once; an equation without terms is the reference ship's alone."""
+        return accelerations_source(self._sums, damped=False)
+
+    def numbers(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
+        terms = super().numbers(coefficients, particulars, shaft_speed)
+        return np.concatenate([self.ship.ship_numbers(), terms])
+
+    def converted_accelerations(
+        self, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> dict[str, Floats]:
+        """Accelerations of the reference ship, evaluated at and converted back to the target.
+
+        Parameters
+        ----------
+        channels : mapping of str to array of shape (n_samples,)
+            Of the target: u, v, r, delta, and n, p, phi where known; SI units.
+        particulars : Particulars
+            The target's length and service speed.
+        shaft_speed : float
+            The target's at service speed, 1/s.
+
+        Returns
+        -------
+        dict of str to array of shape (n_samples,)
+            By equation `u`, `v`, `r`, and `q` where the reference ship has a memory of yaw: SI units of the
+            target.
+        """
+        ship = self.ship
+        fast = ship.particulars["speed"] / particulars["speed"]
+        quick = fast * particulars["length"] / ship.particulars["length"]
+        u = np.asarray(channels["u"], dtype=float)
+        zero = np.zeros_like(u)
+        n = np.full_like(u, ship.service_shaft_speed)
+        if self.shaft:
+            n = np.asarray(channels["n"], dtype=float) * (ship.service_shaft_speed / shaft_speed)
+        scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "q": quick**2, "delta": 1.0}
+        values = {name: scale[name] * np.asarray(channels.get(name, zero), dtype=float) for name in scale}
+        values["n"] = n
+        states = np.stack([values.get(name, zero) for name in ship.state_names], axis=-1)
+        commands = np.stack([values[name] for name in ship.command_names], axis=-1)
+        rates = ship.derivatives(states, commands)
+        back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": quick**-2, "q": quick**-3}
+        return {q: rates[:, ship.state_names.index(q)] * back[q] for q in back if q in ship.state_names}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The table and the whole reference ship, as they stand in a model file."""
+        return {**super().to_dict(), "shaft": self.shaft, "reference": self.ship.to_dict()}
+
+
+class GreyBoxCoefficients(NamedTuple):
+    """Stands for the record of a grey box's coefficients."""
+
+    known: Ship  # the reference ship
+    reference: Any  # her coefficients
+    terms: Any  # coefficients of the terms
+
+
+KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
+
+
+def reference_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
+    """A part: the reference ship's."""
+
+
+def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
+    """A part: the sum of the terms."""
+
+
+def accelerations(
+    motion: Motion, c: GreyBoxCoefficients, ship: Ship
+) -> tuple[float, float, float, float, float]:
+    """The reference ship's at the converted state, converted back, and the terms."""
+    fast = c.known.speed / ship.speed
+    quick = fast * ship.length / c.known.length
+    at = Motion(
+        x=0.0,
+        y=0.0,
+        psi=0.0,
+        u=fast * motion.u,
+        v=fast * motion.v,
+        r=quick * motion.r,
+        p=quick * motion.p,
+        phi=motion.phi,
+        q=quick * quick * motion.q,
+        delta=motion.delta,
+        n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
+    )
+    surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
+    udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
+    linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)
+    return (
+        udot + linear * surge,
+        vdot + linear * sway,
+        rdot + angular * yaw,
+        angular * roll,
+        angular * memory / quick,
+    )
+
+
+@cache
+def _vessel(
+    reference: Vessel, source: str, n_terms: int, shaft: bool, state_names: tuple[str, ...], lag: bool
+) -> Vessel:
+    """Functions of the reference ship, the terms and their sum."""
+    terms = coefficients_record(n_terms, "GreyBoxTerms")
+    fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
+    parts = {
+        **reference.functions,
+        "accelerations": Part(accelerations),
+        "reference_accelerations": reference.functions["accelerations"],
+        "term_accelerations": Part(accelerations_function(source)),
+        "KNOWS_SHAFT": shaft,
+    }
+    parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
+    record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
+    return Vessel("a grey box", state_names, record, parts, lag)

@@ -1,0 +1,262 @@
+"""The equations of motion of one ship with her numbers: what every simulation is made from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shipgym.checks import check_number
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.motion import Ship
+from shipgym.engine.vessel import Vessel
+from shipgym.errors import InputError
+from shipgym.ships.envelope import Envelope
+from shipgym.ships.equations import ShipEquations
+from shipgym.ships.orders import check_units
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import PRINTED, SHIPPED_EQUATIONS, get_dynamics, get_structure
+from shipgym.ships.term_table import Structure
+
+Floats = NDArray[np.float64]
+FORMAT = 1  # of model files
+
+
+@dataclass(frozen=True, eq=False)
+class ManoeuvringModel:
+    """A ship's structure and coefficients, how certain they are, and where they hold (see `ShipModel`).
+
+    Attributes
+    ----------
+    name : str
+        Name of the ship or of the model file.
+    structure : str
+        Name of its structure.
+    particulars : Particulars
+        Length, mass, added mass, service speed, ...; what was estimated is marked.
+    steering : SteeringGear
+        Rudder limit, rate and lag.
+    coefficients : dict of str to float
+        By name, in the normalisation of the structure, rudder positive to starboard.
+    covariance : array of shape (n_coefficients, n_coefficients) or None
+        Of the coefficients in their order; None where not identified.
+    envelope : Envelope or None
+        Of the data it was identified from.
+    provenance : dict or None
+        Method, settings, software version and trials it came from, or the source of a reference ship.
+    own_table : Structure, ShipEquations or None
+        The table of terms a model file came with, or a registered table or ship; by default what is shipped
+        under the structure's name.
+    service_shaft_speed : float
+        Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
+    """
+
+    name: str
+    structure: str
+    particulars: Particulars
+    steering: SteeringGear
+    coefficients: dict[str, float]
+    covariance: Floats | None = None
+    envelope: Envelope | None = None
+    provenance: dict[str, Any] | None = None
+    own_table: Structure | ShipEquations | None = None
+    service_shaft_speed: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.own_table is None and self.structure not in PRINTED | SHIPPED_EQUATIONS.keys():
+            # another process lacks what is registered
+            object.__setattr__(self, "own_table", get_dynamics(self.structure))
+        self.particulars.require("speed")
+        names = self.dynamics.coefficient_names
+        missing = [name for name in names if name not in self.coefficients]
+        unknown = [name for name in self.coefficients if name not in names]
+        if missing or unknown:
+            raise InputError(
+                f"coefficients of {self.name!r}: structure {self.structure!r} has {len(names)}; "
+                f"missing: {', '.join(missing) or 'none'}; unknown: {', '.join(unknown) or 'none'}"
+            )
+        ordered = {name: float(self.coefficients[name]) for name in names}
+        wrong = [name for name, value in ordered.items() if not np.isfinite(value)]
+        if wrong:
+            raise InputError(
+                f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
+            )
+        object.__setattr__(self, "coefficients", ordered)
+        if (
+            isinstance(self.dynamics, Structure)
+            and "n" in self.command_names
+            and not self.service_shaft_speed > 0
+        ):
+            raise InputError(
+                f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g} found, expected that at "
+                f"service speed in 1/s: the terms of structure {self.structure!r} have a shaft speed"
+            )
+        if self.covariance is not None and self.covariance.shape != (len(names), len(names)):
+            raise InputError(
+                f"covariance of {self.name!r}: shape {self.covariance.shape}, "
+                f"expected ({len(names)}, {len(names)}), one row and column a coefficient"
+            )
+
+    @property
+    def table(self) -> Structure:
+        """The table of terms of its structure.
+
+        Raises
+        ------
+        InputError
+            If the ship has equations written by hand instead.
+        """
+        dynamics = self.dynamics
+        return dynamics if isinstance(dynamics, Structure) else get_structure(self.structure)
+
+    @property
+    def dynamics(self) -> Structure | ShipEquations:
+        """The table of terms, or the equations of a ship that has her own."""
+        return get_dynamics(self.structure) if self.own_table is None else self.own_table
+
+    @property
+    def vessel(self) -> Vessel:
+        """What is compiled of the ship: one for all models that differ in numbers only."""
+        return self.dynamics.vessel(self.coefficients, self.steering.time_constant > 0.0)
+
+    def ship_numbers(self, water_depth: float = np.inf) -> Floats:
+        """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
+
+        Raises
+        ------
+        InputError
+            For water that is too shallow, and particulars that the structure cannot do with.
+        """
+        self.check_depth(water_depth)
+        p, gear = self.particulars, self.steering
+        ship = Ship(
+            length=p["length"],
+            speed=p["speed"],
+            rudder_limit=gear.limit,
+            rudder_rate=gear.rate,
+            gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+            shaft=self.service_shaft_speed,
+            water_depth=water_depth,
+            scale_speed=p["speed"],
+        )
+        return np.concatenate([ship, self.dynamics.numbers(self.coefficients, p, self.service_shaft_speed)])
+
+    @property
+    def state_names(self) -> tuple[str, ...]:
+        """Names of the state, in the order of `derivatives`."""
+        return self.dynamics.state_names
+
+    @property
+    def command_names(self) -> tuple[str, ...]:
+        """Names of the commands."""
+        return self.dynamics.command_names
+
+    @property
+    def turns_astern(self) -> bool:
+        """Whether the shaft may turn astern: a table of terms is taken at its word."""
+        return self.dynamics.astern
+
+    @cached_property
+    def service_state(self) -> Floats:
+        """Straight ahead north at service speed with the rudder amidships, shape (n_state,)."""
+        values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
+        return np.array([values.get(name, 0.0) for name in self.state_names])
+
+    @property
+    def service_command(self) -> Floats:
+        """Rudder amidships and shaft at service speed, shape (n_command,)."""
+        return np.array([0.0, self.service_shaft_speed])[: len(self.command_names)]
+
+    def derivatives(self, state: ArrayLike, command: ArrayLike, water_depth: float = np.inf) -> Floats:
+        """Time derivative of the state, steering gear included.
+
+        Parameters
+        ----------
+        state : array-like of shape (..., n_state)
+            In the order of `state_names`, SI units.
+        command : array-like of shape (..., n_command)
+            In the order of `command_names`: rudder angle in rad, positive to starboard.
+        water_depth : float
+            In m; only deep water is known to identified structures.
+
+        Returns
+        -------
+        array of shape (..., n_state)
+
+        Raises
+        ------
+        InputError
+            For another number of states or commands, for those that are not finite or in other units
+            (degrees, revolutions per minute), or for water that is too shallow.
+        """
+        depth = np.asarray(water_depth, dtype=float)
+        self.check_depth(float(depth.min()))
+        states = np.asarray(state, dtype=float)
+        _expect_last_axis("state", states, self.state_names)
+        commands = np.asarray(command, dtype=float)
+        _expect_last_axis("command", commands, self.command_names)
+        if not np.all(np.isfinite(states)):
+            raise InputError(f"state: {states[~np.isfinite(states)][0]} found, expected finite numbers")
+        check_units(self, commands.reshape(-1, len(self.command_names)), "command")
+        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1], depth.shape)
+        flat = np.array(np.broadcast_to(states, (*shape, states.shape[-1]))).reshape(-1, states.shape[-1])
+        flat_commands = np.broadcast_to(commands, (*shape, commands.shape[-1])).reshape(len(flat), -1)
+        depths = np.array(np.broadcast_to(depth, shape)).reshape(-1)
+        out = np.empty_like(flat)
+        loop = ship_loop(self.vessel, "derivatives")
+        loop(flat, two_commands(flat_commands), depths, self.ship_numbers(), out)
+        return out.reshape(*shape, len(self.state_names))
+
+    def to_dict(self) -> dict[str, Any]:
+        """What a model file holds, ready for JSON (format in `shipgym.ships.model_file`)."""
+        return {
+            "format": FORMAT,
+            "name": self.name,
+            "structure": self.dynamics.to_dict(),
+            "normalisation": self.dynamics.normalisation,
+            "coefficients": self.coefficients,
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "particulars": self.particulars.to_dict(),
+            "steering": self.steering.to_dict(),
+            "service_shaft_speed": self.service_shaft_speed,
+            "envelope": None if self.envelope is None else self.envelope.to_dict(),
+            "provenance": self.provenance,
+        }
+
+    def check_depth(self, water_depth: float) -> None:
+        """Refuse water that is too shallow, or shallow water in a ship that knows none.
+
+        Raises
+        ------
+        InputError
+        """
+        if water_depth == np.inf:
+            return
+        check_number(water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water")
+        if not self.dynamics.shallow_water:
+            raise InputError(
+                f"water_depth: {water_depth:g} m found, but {self.name!r} is a deep-water model; leave it out"
+            )
+        draught = self.particulars["draught"]
+        if not water_depth > draught:
+            raise InputError(
+                f"water_depth: {water_depth:g} m found, expected more than the draught of {draught:g} m"
+            )
+
+
+def _expect_last_axis(argument: str, array: Floats, names: tuple[str, ...]) -> None:
+    if array.ndim == 0 or array.shape[-1] != len(names):
+        raise InputError(
+            f"{argument}: shape {array.shape} found, expected (..., {len(names)}) for {', '.join(names)}"
+        )
+
+
+def two_commands(commands: Floats) -> Floats:
+    """Rudder and shaft speed as loops take them, shape (n, 2); a ship without shaft has speed 0."""
+    two = np.zeros((len(commands), 2))
+    two[:, : commands.shape[1]] = commands
+    return two

@@ -1,0 +1,154 @@
+"""What a task is: a file of plain functions on named records, and what the engine gives them.
+
+A task file defines (see `shipgym/tasks/course_keeping.py` for one)
+
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings` has defaults, which are the
+  keywords of its environment; a last field annotated `Numbers` is a list. The reward is the sum of the fields of
+  `Reward`, which `info` has as `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
+* `begin(ship, settings, random, plan) -> (Motion, State)`: how an episode begins.
+* `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`: a control interval is over.
+* `observe(readings, state, interval, ship, settings) -> Observation`: what the autopilot sees, in SI units.
+
+and may define
+
+* `due(motion, state, interval, ship, settings) -> bool` and
+  `on_event(motion, state, interval, ship, settings, random, plan) -> State`: what comes seldom, such as the next
+  set-point.
+* `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays it for the rest of the
+  episode, so that ending early never pays.
+* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true or false.
+* `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts over an episode.
+* `check(settings, model)`: raises `InputError` for settings that do not fit; `listed(settings)`: what a keyword of
+  another kind, such as a list of waypoints, means as numbers.
+
+`step` and `observe` are compiled into a loop over ships: they call functions of `math` that the compiler
+vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose by `pick` or a conditional
+expression. The other functions are called ship by ship and may do what Numba can.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.random import uniform
+
+#: A last field of `Settings` that holds any number of numbers, and its default, none.
+Numbers = NDArray[np.float64]
+NO_NUMBERS: Numbers = np.zeros(0)
+#: A field of `State` that is true, 1, or false, 0.
+Flag = Annotated[float, bool]
+#: Physical value of an observation of 1, or how it follows from ship and settings.
+Scale = float | Callable[[Ship, Any], float]
+
+
+class Random(NamedTuple):
+    """The random numbers of one episode: each is a function of the episode and of its own number alone."""
+
+    key: Any  # uint64
+    episode: Any  # uint64
+
+
+def drawn(random: Random, number: int, low: float, high: float) -> float:
+    """Random number of an episode, by its number, in [low, high)."""
+    return uniform(random.key, random.episode, np.uint64(number), low, high)
+
+
+class Interval(NamedTuple):
+    """What the engine knows of the control interval that is over."""
+
+    dt: float  # s
+    steps: float  # control intervals so far
+    rudder_before: float  # rad, rudder at its beginning
+    rudder_command: float  # part of the limit
+    shaft_command: float  # part of the shaft speed at service speed
+    envelope_distance: float  # how many times further out than the training data (`Envelope.distance`)
+    extrapolating: float  # 1 where the ship was outside that data
+
+
+class Readings(NamedTuple):
+    """The ship as her instruments show her."""
+
+    x: float  # m, north
+    y: float  # m, east
+    psi: float  # rad
+    u: float  # m/s, through the water
+    v: float  # m/s
+    r: float  # rad/s
+    p: float  # rad/s
+    phi: float  # rad
+    delta: float  # rad
+    n: float  # 1/s
+    north: float  # m/s, over ground
+    east: float  # m/s
+
+
+@dataclass(frozen=True)
+class Seen:
+    """How a quantity is observed.
+
+    Attributes
+    ----------
+    low, high : float
+        Bounds of the observation.
+    unit : str
+        Of the quantity.
+    scale : float or callable
+        Physical value of an observation of 1, or `(ship, settings) -> float`.
+    option : str
+        Name of the option that shows it: `roll`, or `shaft`; by default it is always shown.
+    """
+
+    low: float
+    high: float
+    unit: str = "-"
+    scale: Scale = 1.0
+    option: str = ""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Bounds of a setting.
+
+    Attributes
+    ----------
+    about : str
+        What it is, a sentence.
+    at_least, at_most, above : float
+        Its bounds.
+    whole : bool
+        Whether it is a whole number.
+    """
+
+    about: str
+    at_least: float | None = None
+    at_most: float | None = None
+    above: float | None = None
+    whole: bool = False
+
+
+def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
+    """Straight ahead at service speed, the rudder amidships."""
+    return Motion(x, y, psi, ship.speed, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ship.shaft)
+
+
+__all__ = [
+    "NO_NUMBERS",
+    "Flag",
+    "Interval",
+    "Motion",
+    "Numbers",
+    "Random",
+    "Readings",
+    "Scale",
+    "Seen",
+    "Setting",
+    "Ship",
+    "at_service_speed",
+    "drawn",
+]

@@ -1,0 +1,161 @@
+"""Course keeping: hold a heading, and change it when the set-point changes.
+
+The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder rate (weight 0.01), all in
+units of 30 degrees, the rate per ship length sailed (Norrbin 1972; van Amerongen 1982). Losing control costs as
+much as the rest of the episode at the largest heading error, so that it never pays to end early.
+"""
+
+from __future__ import annotations
+
+from math import fabs, floor, pi, radians
+from typing import Annotated, NamedTuple
+
+from shipgym.engine.mathematics import wrap
+from shipgym.engine.motion import Motion, Ship
+from shipgym.tasks.contract import (
+    NO_NUMBERS,
+    Interval,
+    Numbers,
+    Random,
+    Readings,
+    Setting,
+    at_service_speed,
+    drawn,
+)
+from shipgym.tasks.steering import (
+    Extras,
+    Helm,
+    SteeringReward,
+    Weights,
+    extras,
+    helm,
+    integrated,
+    steering_reward,
+)
+
+NAME = "CourseKeeping"
+REPORTED = ("heading_error",)
+
+
+class Settings(NamedTuple):
+    """What is asked of the autopilot."""
+
+    course_change_deg: Annotated[
+        float,
+        Setting(
+            "Largest change of the set-point, degrees; 0 keeps the first course.", at_least=0.0, at_most=90.0
+        ),
+    ] = 30.0
+    change_interval_steps: Annotated[
+        int,
+        Setting("Mean number of control intervals between changes of the set-point.", at_least=1, whole=True),
+    ] = 200
+    max_heading_error_deg: Annotated[
+        float, Setting("Heading error beyond which control is lost, degrees.", above=0.0, at_most=180.0)
+    ] = 90.0
+    weights: Weights = Weights()
+    course_changes_deg: Annotated[
+        Numbers,
+        Setting(
+            "Changes of the set-point one after another, degrees, positive to starboard, in place of drawn ones: "
+            "the first at the start, the others every `change_interval_steps`.",
+            at_least=-180.0,
+            at_most=180.0,
+        ),
+    ] = NO_NUMBERS
+
+
+class State(NamedTuple):
+    """How an episode goes."""
+
+    course: float  # rad, to steer
+    next_change: float  # step of the next new set-point
+    changes: float  # how many there were
+    integral: float  # of the heading error, rad s
+    heading_error: float  # rad
+
+
+class Reward(NamedTuple):
+    """Its parts."""
+
+    heading: float
+    steering: SteeringReward
+
+
+class Observation(NamedTuple):
+    """What the autopilot sees."""
+
+    helm: Helm
+    extras: Extras
+
+
+def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tuple[Motion, State]:
+    """On a random heading, with a first set-point."""
+    heading = drawn(random, 0, -pi, pi)
+    motion = at_service_speed(0.0, 0.0, heading, ship)
+    state = changed(State(heading, 0.0, 0.0, 0.0, 0.0), 0.0, settings, random)
+    return motion, State(state.course, state.next_change, 1.0, 0.0, wrap(state.course - heading))
+
+
+def changed(state: State, steps: float, settings: Settings, random: Random) -> State:
+    """The next heading to keep, listed or drawn, and the step at which it changes again."""
+    number = int(state.changes)
+    largest = radians(settings.course_change_deg)
+    change = drawn(random, 1 + 2 * number, -largest, largest)
+    wait = floor(settings.change_interval_steps * drawn(random, 2 + 2 * number, 0.5, 1.5))
+    listed = settings.course_changes_deg
+    if len(listed) > 0:
+        change = radians(listed[number]) if number < len(listed) else 0.0
+        wait = settings.change_interval_steps
+    return State(
+        state.course + change,
+        steps + max(wait, 1.0),
+        state.changes + 1.0,
+        state.integral,
+        state.heading_error,
+    )
+
+
+def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:
+    """Whether the set-point changes."""
+    return interval.steps >= state.next_change
+
+
+def on_event(
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
+    random: Random,
+    plan: Numbers,
+) -> State:
+    """A new set-point."""
+    return changed(state, interval.steps, settings, random)
+
+
+def step(
+    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+) -> tuple[State, Reward, bool, bool]:
+    """The cost of an interval, and whether control is lost."""
+    error = wrap(state.course - motion.psi)
+    integral = integrated(state.integral, error, interval, ship, settings.weights)
+    scaled = error * (1.0 / radians(settings.weights.heading_scale_deg))
+    reward = Reward(-scaled * scaled, steering_reward(motion, interval, ship, settings.weights))
+    lost = fabs(error) > radians(settings.max_heading_error_deg)
+    return State(state.course, state.next_change, state.changes, integral, error), reward, lost, False
+
+
+def worst_cost(settings: Settings) -> float:
+    """Cost of a step at the largest heading error."""
+    largest: float = settings.max_heading_error_deg / settings.weights.heading_scale_deg
+    return largest * largest
+
+
+def observe(
+    readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
+) -> Observation:
+    """What every autopilot sees."""
+    return Observation(
+        helm(state.course, state.integral, readings, interval, ship), extras(readings, interval, ship)
+    )

@@ -1,0 +1,289 @@
+"""A task with its options: what is asked of an autopilot, in which sea, by which commands, with which sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.checks import check_choice, check_keys, check_number, check_whole
+from shipgym.engine.motion import Ship
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Weather
+from shipgym.sea.weather_column import as_weather
+from shipgym.ships import ShipModel
+from shipgym.tasks.definition import TaskDefinition, read_definition
+from shipgym.tasks.steering import Helm
+
+Floats = NDArray[np.float64]
+Sea = str | Weather
+
+LONGEST_INTERVAL = 5.0  # ship lengths at service speed
+STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
+
+ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
+#: Rudder orders of a discrete action, parts of the rudder limit.
+RUDDER_ORDERS = (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
+MEASUREMENTS = ("raw", "filtered")
+#: What every autopilot sees, in order.
+OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
+
+
+class Observed(NamedTuple):
+    """One quantity that is observed.
+
+    Attributes
+    ----------
+    name : str
+        Of the quantity.
+    low, high : float
+        Bounds of the observation.
+    scale : float
+        Physical value of 1, SI units.
+    path : str
+        Where it stands in the task's `Observation`.
+    """
+
+    name: str
+    low: float
+    high: float
+    scale: float
+    path: str
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked of an autopilot.
+
+    Attributes
+    ----------
+    definition : TaskDefinition
+        Records and functions of the task.
+    settings : NamedTuple
+        Its settings.
+    sea : {"calm", "slight", "moderate", "rough"}, Weather, or a sequence of them
+        Sea state, whose wind and waves come from a direction drawn for each episode, or any weather; of
+        several one is drawn for each episode.
+    dt : float or None
+        Control interval, s; by default about a twentieth of the time to travel one ship length,
+        rounded to 1, 2 or 5 times a power of ten.
+    episode_steps : int
+        Control intervals after which an episode is truncated.
+    max_envelope_distance : float
+        How many times further out than the training data the model may be taken before the episode
+        ends (see `Envelope.distance`).
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed. A
+        shaft whose propeller is known ahead only is stopped by an order astern.
+    roll : bool
+        Whether roll angle and rate are observed.
+    noise : float
+        Noise of heading, yaw rate, speeds and position, in multiples of a sea trial's sensors (`SEA_TRIAL`).
+    measurement : {"raw", "filtered"}
+        Whether heading and yaw rate are shown with the first-order motion in waves or through a notch filter
+        at the frequency of encounter.
+    water_depth : float
+        m; for ships that know shallow water.
+    """
+
+    definition: TaskDefinition
+    settings: Any
+    sea: Sea | Sequence[Sea] = "calm"
+    dt: float | None = None
+    episode_steps: int = 600
+    max_envelope_distance: float = 5.0
+    action: str = "rudder"
+    roll: bool = False
+    noise: float = 0.0
+    measurement: str = "raw"
+    water_depth: float = float("inf")
+    options: Mapping[str, Any] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.seas:
+            raise InputError("sea: none found, expected at least one")
+        if self.dt is not None:
+            check_number(self.dt, "dt", above=0.0)
+        check_whole(self.episode_steps, "episode_steps", at_least=1)
+        check_number(self.max_envelope_distance, "max_envelope_distance", at_least=1.0)
+        check_choice(self.action, ACTIONS, "action")
+        check_choice(self.measurement, MEASUREMENTS, "measurement")
+        check_number(self.noise, "noise", at_least=0.0)
+
+    @classmethod
+    def of(cls, definition: Any, **options: Any) -> Self:
+        """A task by keywords: those of all tasks, and the settings of its own.
+
+        Raises
+        ------
+        InputError
+            For a keyword that it does not have, or a value out of range.
+        """
+        task = read_definition(definition, options.pop("reward", None))
+        check_keys(options, cls.option_names(task), f"{task.name} options")
+        own = {name: value for name, value in options.items() if name in task.settings}
+        common = {name: value for name, value in options.items() if name not in own}
+        return cls(
+            task, task.make_settings(own), **{"episode_steps": task.episode_steps, **common}, options=options
+        )
+
+    @classmethod
+    def option_names(cls, definition: TaskDefinition) -> tuple[str, ...]:
+        """Keywords of a task."""
+        common = [item.name for item in fields(cls)[2:] if item.name != "options"]
+        return (*definition.settings, *common)
+
+    def changed(self, **options: Any) -> Task:
+        """The same task with other options."""
+        return Task.of(self.definition, **{**self.options, **options})
+
+    @property
+    def follows_path(self) -> bool:
+        """Whether there is a path to follow, of waypoints."""
+        return "waypoints" in self.definition.settings
+
+    @property
+    def name(self) -> str:
+        """Of the task."""
+        return self.definition.name
+
+    @cached_property
+    def seas(self) -> tuple[Weather, ...]:
+        """The weathers of which each episode has one."""
+        several: Sequence[Any] = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
+        return tuple(as_weather(one, "sea", None) for one in several)
+
+    @property
+    def weather(self) -> Weather:
+        """What the sea is like, the first of several."""
+        return self.seas[0]
+
+    def interval(self, model: ShipModel) -> float:
+        """Control interval for a ship, s."""
+        return control_interval(model) if self.dt is None else float(self.dt)
+
+    def substeps(self, model: ShipModel) -> int:
+        """Steps of the integration in a control interval."""
+        return int(np.ceil(self.interval(model) / (1.5 * control_interval(model))))
+
+    def substep(self, model: ShipModel) -> float:
+        """Step of the integration, s."""
+        return self.interval(model) / self.substeps(model)
+
+    def check_fits(self, model: ShipModel) -> None:
+        """Refuse a ship that lacks what the task needs.
+
+        Raises
+        ------
+        InputError
+            Naming the argument.
+        """
+        model.check_depth(self.water_depth)
+        if self.dt is not None:
+            longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
+            check_number(self.dt, "dt", at_most=longest, hint=f"s: {LONGEST_INTERVAL:g} ship lengths")
+        if not getattr(model.dynamics, "has_rudder", True):
+            raise InputError(f"model: {model.name!r} has no rudder, expected a ship that is steered by one")
+        if self.roll and "phi" not in model.state_names:
+            raise InputError(
+                f"roll: {model.name!r} does not roll; leave it out, or take a ship with 4 degrees of freedom"
+            )
+        if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
+            raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
+        self.definition.check(self.settings, model)
+
+    def observed(self, model: ShipModel) -> tuple[Observed, ...]:
+        """What is observed of a ship, in order."""
+        ship = ship_of(model, self.water_depth)
+        shown = self._options(model)
+        return tuple(
+            Observed(path.rpartition(".")[2], seen.low, seen.high, self.scale(path, ship), path)
+            for path, seen in self.definition.seen.items()
+            if seen.option in shown
+        )
+
+    def _options(self, model: ShipModel) -> tuple[str, ...]:
+        """Options that show a quantity."""
+        shaft = self.action == "rudder-shaft"
+        speed = shaft and "n" in model.state_names
+        return ("", *["roll"] * self.roll, *["shaft"] * shaft, *["shaft speed"] * speed)
+
+    def scale(self, path: str, ship: Ship) -> float:
+        """Physical value of an observation of 1."""
+        scale = self.definition.seen[path].scale
+        return float(scale(ship, self.settings)) if callable(scale) else float(scale)
+
+    @property
+    def n_commands(self) -> int:
+        """Number of commands: rudder, and shaft."""
+        return 2 if self.action == "rudder-shaft" else 1
+
+    def least_shaft(self, model: ShipModel) -> float:
+        """Least command of the shaft, part of service speed; one that may not turn astern is stopped."""
+        return -1.0 if model.turns_astern else 0.0
+
+    @cached_property
+    def info_names(self) -> tuple[str, ...]:
+        """What `info` has."""
+        parts = [f"reward_{name}" for name in (*self.definition.reward_names, "end")]
+        return (*self.definition.reported, "envelope_distance", "extrapolating", *parts)
+
+    @cached_property
+    def flags(self) -> frozenset[str]:
+        """What of it is true or false."""
+        return frozenset({"extrapolating", *self.definition.flags})
+
+    @property
+    def reward_parts(self) -> tuple[str, ...]:
+        """Names of the parts of the reward among those of `info`."""
+        return tuple(name for name in self.info_names if name.startswith("reward_"))
+
+    def __getattr__(self, name: str) -> Any:
+        """A setting by its name."""
+        if name.startswith("_") or name in ("definition", "settings", "seas"):
+            raise AttributeError(name)
+        for record in (self.settings, *(value for value in self.settings if hasattr(value, "_fields"))):
+            if name in record._fields:
+                return getattr(record, name)
+        raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
+
+
+def ship_of(model: ShipModel, water_depth: float = float("inf")) -> Ship:
+    """What every ship has beside her coefficients, as a record."""
+    gear, p = model.steering, model.particulars
+    return Ship(
+        length=p["length"],
+        speed=p["speed"],
+        rudder_limit=gear.limit,
+        rudder_rate=gear.rate,
+        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+        shaft=float(model.service_shaft_speed),
+        water_depth=water_depth,
+        scale_speed=p["speed"],
+    )
+
+
+def control_interval(model: ShipModel) -> float:
+    """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
+    wanted = model.particulars["length"] / model.particulars["speed"] / STEPS_PER_LENGTH
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted))) * power)
+
+
+def course_keeping_task(**options: Any) -> Task:
+    """The task of course keeping by keywords (`Task.of`)."""
+    return Task.of("CourseKeeping", **options)
+
+
+def path_following_task(**options: Any) -> Task:
+    """The task of path following by keywords (`Task.of`)."""
+    return Task.of("PathFollowing", **options)
+
+
+def observation_scales(model: ShipModel) -> Floats:
+    """Physical value of a course-keeping observation of 1, in the order of `OBSERVATION_NAMES`, SI units."""
+    return np.array([quantity.scale for quantity in course_keeping_task().observed(model)])

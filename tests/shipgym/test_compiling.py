@@ -1,0 +1,161 @@
+"""Compiled loops: the same numbers as plain Python, one file a loop and ship, any number of processes."""
+
+import inspect
+import os
+import re
+import subprocess
+import sys
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym.engine import compiling, mathematics
+from shipgym.engine.loops import LOOPS, ship_loop
+from shipgym.engine.parts import Part
+from shipgym.engine.specialise import fingerprint
+from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
+from shipgym.ships.term_functions import Sum, accelerations_source
+from shipgym.ships.terms import Term
+from tests.shipgym.outer import outer
+
+sin_cos, wrap = outer(mathematics.sin_cos), outer(mathematics.wrap)
+small_sin_cos, small_cosine = outer(mathematics.small_sin_cos), outer(mathematics.small_cosine)
+
+SAIL = """
+import numpy as np, shipgym
+found = []
+for name in ("mariner", "container", "tanker", "kvlcc2"):
+    model = shipgym.load_model(name)
+    commands = np.tile(model.service_command, (50, 1))
+    commands[:, 0] = 0.2
+    for weather in (None, "rough"):
+        trial = model.simulate(commands, 0.5, weather=weather, seed=1)
+        found += [float(trial[channel][-1]) for channel in ("x", "psi", "v", "r")]
+print(repr(found))
+"""
+COMPILE = """
+import shipgym
+from shipgym.engine.loops import ship_loop
+model = shipgym.load_model("mariner")
+print(ship_loop(model.vessel, "simulate") is not None)
+"""
+
+
+def run(code: str, **environment: str) -> str:
+    result = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return result.stdout.strip()
+
+
+def test_without_compiling_the_numbers_are_the_same():
+    compiled_run, plain_run = eval(run(SAIL)), eval(run(SAIL, NUMBA_DISABLE_JIT="1"))
+    np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9, atol=1e-12)
+
+
+def test_processes_may_compile_at_once_and_one_does(tmp_path):
+    environment = {**os.environ, "SHIPGYM_CACHE": str(tmp_path)}
+    workers = [
+        subprocess.Popen([sys.executable, "-c", COMPILE], env=environment, stdout=subprocess.PIPE)
+        for _ in range(3)
+    ]
+    assert [worker.communicate()[0] for worker in workers] == [b"True\n"] * 3
+    assert len(list(tmp_path.glob("*.nbc"))) == len(list(tmp_path.glob("*.nbi"))) == 1
+
+
+def test_another_ship_or_an_edited_function_has_a_file_of_its_own():
+    loop = LOOPS["simulate"].function
+    ships = [shipgym.load_model(name).vessel for name in ("mariner", "container")]
+    parts = ships[0].parts(1)
+
+    def twice(motion, coefficients, ship):
+        return 0.0, 0.0, 0.0, 0.0, 2.0
+
+    tags = {
+        fingerprint(loop, parts),
+        fingerprint(loop, ships[1].parts(1)),
+        fingerprint(loop, {**parts, "accelerations": Part(twice)}),
+        fingerprint(loop, {**parts, "HAS_LAG": False}),
+    }
+    assert len(tags) == 4
+    assert fingerprint(loop, ships[0].parts(1)) in tags
+
+
+def test_a_cache_that_cannot_be_written_is_said_and_survived(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
+    compiling._folder.cache_clear()
+    vessel = shipgym.load_model("mariner").vessel
+    loop = LOOPS["derivatives"]
+    with pytest.warns(UserWarning, match="compiled anew in each process"):
+        assert compiling.compiled(loop.function, loop.signature, vessel.parts(1), "mariner") is not None
+    compiling._folder.cache_clear()
+
+
+def test_each_coefficient_is_read_once_and_what_terms_share_is_taken_out():
+    accelerations = shipgym.load_model("mariner").vessel.functions["accelerations"].function
+    source = inspect.getsource(accelerations)
+    for row in range(40):
+        assert len(re.findall(rf"c\.c{row}\b", source)) == 1
+    sums = "".join(line for line in source.splitlines() if "dot =" in line)
+    assert sums.count(" * ") < 80  # of 40 terms with 93 factors and as many coefficients
+
+
+def test_sine_and_cosine_to_the_last_digits():
+    angles = np.linspace(-500.0, 500.0, 20001)
+    ours = np.array([sin_cos(angle) for angle in angles])
+    np.testing.assert_allclose(ours[:, 0], np.sin(angles), rtol=0.0, atol=5e-15)
+    np.testing.assert_allclose(ours[:, 1], np.cos(angles), rtol=0.0, atol=5e-15)
+
+
+def test_wrapped_angles_are_the_same_direction():
+    angles = np.linspace(-30.0, 30.0, 997)
+    wrapped = np.array([wrap(angle) for angle in angles])
+    assert np.all((wrapped >= -np.pi) & (wrapped < np.pi))
+    np.testing.assert_allclose(np.exp(1j * wrapped), np.exp(1j * angles), atol=1e-12)
+
+
+def test_importing_shipgym_leaves_the_heavy_libraries_alone():
+    heavy = ("numba", "scipy", "control", "torch", "stable_baselines3", "plotly", "sklearn")
+    code = f"import shipgym, sys; print([name for name in {heavy!r} if name in sys.modules])"
+    assert run(code) == "[]"
+
+
+def test_no_warnings_when_loops_are_loaded():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert ship_loop(shipgym.load_model("mariner").vessel, "simulate") is not None
+
+
+def test_small_angles_have_the_sine_and_cosine_of_the_library():
+    x = np.linspace(-np.pi / 2, np.pi / 2, 2001)
+    found = np.array([small_sin_cos(angle) for angle in x])
+    np.testing.assert_allclose(found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=4e-16)
+    np.testing.assert_allclose([small_cosine(angle) for angle in x], np.cos(x), rtol=0.0, atol=4e-16)
+    assert small_sin_cos(np.pi) == pytest.approx((0.0, -1.0), abs=3e-9)
+
+
+def test_models_of_one_structure_share_what_is_compiled():
+    model = shipgym.load_model("mariner-tls-svm")
+    assert {id(draw.vessel) for draw in model.sample(5, 0)} == {id(model.vessel)}
+    container = shipgym.load_model("container")
+    changed = replace(container, coefficients={**container.coefficients, "m": 0.008})
+    assert changed.vessel is container.vessel
+
+
+def test_the_form_of_a_ship_is_compiled_and_may_be_chosen():
+    published, package = kvlcc2(), kvlcc2("shipmmg")
+    assert published.vessel is not package.vessel
+    assert package.vessel is kvlcc2_l7("shipmmg").vessel
+
+
+def test_no_text_of_a_file_becomes_part_of_a_program():
+    source = accelerations_source({"r": Sum((Term("import os", (("r", 1),)),), (0,), 2)})
+    assert "import" not in source

@@ -1,0 +1,105 @@
+"""A ship with equations of her own from one file outside the package: the one of its documentation page."""
+
+import pickle
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shipgym
+from shipgym import InputError, check_ship_model, load_model, manoeuvres, register_ship_equations
+from shipgym.ships.linear import nomoto
+from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
+
+PAGE = Path(__file__).parents[2] / "docs" / "ship_of_your_own.md"
+TUG = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]  # type: ignore[index]
+
+
+@pytest.fixture
+def tug(tmp_path: Path) -> Iterator[Path]:
+    (tmp_path / "tug.py").write_text(TUG, encoding="utf-8")
+    yield tmp_path / "tug.py"
+    for name in EQUATIONS.keys() - SHIPPED_EQUATIONS.keys():
+        EQUATIONS.pop(name)
+
+
+def test_one_file_makes_a_sound_ship_that_manoeuvres(tug: Path) -> None:
+    model = load_model(tug)
+    assert model.state_names == ("x", "y", "psi", "u", "v", "r", "delta", "n")
+    assert check_ship_model(model).problems == ()
+    circle = manoeuvres.turning_circle(model, 35.0)
+    assert 1.0 < manoeuvres.turning_indices(circle).tactical_diameter_lengths < 10.0
+    zigzag = manoeuvres.zigzag(model, 20.0, 20.0, duration=200.0)
+    assert manoeuvres.zigzag_indices(zigzag).overshoot_1_deg > 0.0
+    assert nomoto(model).K > 0.0
+    assert np.ptp(manoeuvres.zigzag(model, duration=60.0, weather="moderate")["psi_wave"]) > 0.0
+
+
+def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_path: Path) -> None:
+    register_ship_equations(tug)
+    assert "tug" in shipgym.list_models()
+    model = load_model("tug")
+    model.save(tmp_path / "tug.json")
+    again = load_model(tmp_path / "tug.json")
+    np.testing.assert_array_equal(again.ship_numbers(), model.ship_numbers())
+    assert again.vessel is model.vessel
+    (tmp_path / "tug.pickle").write_bytes(pickle.dumps(model))
+    code = (
+        "import pickle, sys; tug = pickle.load(open(sys.argv[1], 'rb')); "
+        "print(tug.simulate([[0.1, 2.3]] * 20, 0.5)['r'][-1])"
+    )
+    told = subprocess.run(
+        [sys.executable, "-c", code, tmp_path / "tug.pickle"], capture_output=True, text=True, check=True
+    )
+    assert float(told.stdout) == model.simulate([[0.1, 2.3]] * 20, 0.5)["r"][-1]
+
+
+def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
+    model = load_model(tug)
+    quicker = replace(model, coefficients={**model.coefficients, "N_d": 2.8})
+    assert quicker.vessel is model.vessel
+    state, command = model.service_state, model.service_command
+    state[model.state_names.index("delta")] = 0.1
+    yaw = model.state_names.index("r")
+    rates = [ship.derivatives(state, command)[yaw] for ship in (model, quicker)]
+    assert rates[1] == pytest.approx(2.0 * rates[0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "message"),
+    [
+        ("SHIP =", "BOAT =", "SHIP = None found"),
+        ("from math import fabs", "from maths import fabs", "cannot be run: ModuleNotFoundError"),
+        ("= 5.0  # s", "= 'slow'", "coefficient 'T_shaft'.*'slow'"),
+        ("T_shaft: float = 5.0", "T_shaft: str = '5'", "expected a NamedTuple of floats"),
+        ('"tug",\n', '"mariner",\n', "'mariner' found, which is another ship's"),
+        ('"tug",\n', '"container",\n', "'container' found, which is another ship's"),
+        ("service_shaft_speed=2.357", "service_shaft_speed=0.0", "service_shaft_speed: 0"),
+        ("speed=6.0)", "speed=None)", "speed is needed"),
+        ("fabs(u) * u", "fabs(w) * u", r"accelerations .*tug\.py, line 25.*name 'w' is not defined"),
+        ("rdot, 0.0, 0.0\n", "rdot\n", "accelerations returns .*expected five numbers"),
+        ("c.N_v * U", "c.N_w * U", r"accelerations .*tug\.py, line 27.*no attribute 'N_w'"),
+        (
+            "c.X_nn * fabs(n) * n",
+            "c.X_nn * motion._replace(n=n).n",
+            r"cannot be compiled in accelerations .*line 25.*_replace",
+        ),
+        ("c.N_d * U * U", "-c.N_d * U * U", "a positive rudder turns to starboard"),
+    ],
+)
+def test_what_is_wrong_with_her_is_said(tug: Path, wrong: str, right: str, message: str) -> None:
+    tug.write_text(TUG.replace(wrong, right), encoding="utf-8")
+    found = check_ship_model(tug)
+    assert not found.ok
+    assert re.search(message, found.problems[0], re.DOTALL), found.problems[0]
+    print(found.problems[0])
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"barge\.py: no such file"):
+        load_model(tmp_path / "barge.py")
