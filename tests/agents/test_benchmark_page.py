@@ -166,7 +166,7 @@ def test_a_controller_that_fails_is_shown_up_to_then():
     assert np.isnan(cost)
 
 
-def test_a_changed_result_is_told(result):
+def test_a_changed_result_is_reported(result):
     costs = result.episodes["cost"].copy()
     result.episodes["cost"] = costs * 1.001
     try:
