@@ -168,7 +168,7 @@ def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]
     if not episodes:
         return {}
     found = {"histories": histories_figure(episodes, result.ranking)}
-    if load_suite(result.summary["suite"]["name"]).task(task).task.follows_path:
+    if any(episode.waypoints is not None for episode in episodes.values()):
         found["tracks"] = tracks_figure(episodes, result.ranking)
     return found
 
