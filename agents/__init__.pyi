@@ -16,8 +16,9 @@ from .controllers.mpc import MPC as MPC
 from .controllers.pid import PID as PID
 from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
-from .controllers.robustness import MarginSpread as MarginSpread
+from .controllers.robustness import MarginUncertainty as MarginUncertainty
 from .controllers.robustness import margin_spread as margin_spread
+from .controllers.robustness import margin_uncertainty as margin_uncertainty
 from .controllers.scheduled_lq import ScheduledLQ as ScheduledLQ
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .policies.shield import Shielded as Shielded

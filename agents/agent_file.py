@@ -9,7 +9,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
+from shipgym.files import read_json
 from shipgym.ships import ShipModel
 
 if TYPE_CHECKING:

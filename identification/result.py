@@ -12,8 +12,7 @@ from identification.report.figures import all_figures
 from identification.report.page import report_page
 from identification.report.summary import summary_table
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
-from shipgym.whole_file import write_text
+from shipgym.files import write_json, write_text
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure

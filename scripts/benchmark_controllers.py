@@ -14,9 +14,9 @@ def gentle(task: BenchmarkTask) -> Policy:
 
 
 def main(out: str) -> None:
-    """Fly, then print the ranking and each task's best."""
-    everybody = {"pid": "pid", "lq": "lq", "lqg": "lqg", "ilos": "ilos", "gentle": gentle}
-    result = benchmark(everybody, suite="shipgym-v1", out=out, workers=2, resume=True)
+    """Run them, then print the ranking and each task's best."""
+    contestants = {"pid": "pid", "lq": "lq", "lqg": "lqg", "ilos": "ilos", "gentle": gentle}
+    result = benchmark(contestants, suite="shipgym-v1", out=out, workers=2, resume=True)
     for place, entry in enumerate(result.summary["ranking"], start=1):
         print(f"{place}. {entry['name']:8} {entry['relative_cost']:.3f} times the lowest costs")
     for task, by_name in result.summary["tasks"].items():

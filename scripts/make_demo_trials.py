@@ -10,17 +10,19 @@ the ship file that reads them. The same seed always gives the same files.
 from __future__ import annotations
 
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym import ShipModel, load_model
+from shipgym import ShipModel, example_ship, load_model
 
 Floats = NDArray[np.float64]
 
 FOLDER = Path(__file__).parents[1] / "examples" / "mariner"
+PACKAGED = ("zigzag_20_20.csv", "zigzag_35_30_port.csv", "zigzag_15_15.csv")  # what the wheel holds
 SEED = 1965
 STEP = 0.1  # simulation, s
 SAMPLING = 0.5  # the logger, s
@@ -149,12 +151,14 @@ def log(truth: Floats, rng: np.random.Generator) -> Floats:
     return np.column_stack(columns) + 0.0
 
 
-def write(folder: Path) -> None:
-    """Write the ship file and its trials into a folder."""
+def write(folder: Path, files: Collection[str] | None = None) -> None:
+    """Write the ship file and some of its trials into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     model = load_model("mariner")
     text = SHIP_FILE.format(**model.particulars)
     for number, order in enumerate(ORDERS):
+        if files is not None and order.file not in files:
+            continue
         rng = np.random.default_rng([SEED, number])
         logged = log(sail(model, order, rng), rng)
         np.savetxt(folder / order.file, logged, FORMATS, delimiter=",", header=HEADER, comments="")
@@ -165,4 +169,8 @@ def write(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)
+    if len(sys.argv) > 1:
+        write(Path(sys.argv[1]))
+    else:
+        write(FOLDER)
+        write(example_ship().parent, PACKAGED)

@@ -51,7 +51,7 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.task import INTEGRAL_ZONE, Task
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 from shipgym.kernels.course_keeping import NEXT_CHANGE
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped

@@ -14,7 +14,7 @@ from papers.page import ALL, missed, page, papers_of, reproduce, terminal_table
 from agents.cli.command import FAILED, Json, answered, fail
 from agents.cli.terminal import err, print_json
 from agents.cli.terminal import out as console
-from shipgym.whole_file import write_text
+from shipgym.files import write_text
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 

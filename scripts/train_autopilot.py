@@ -1,4 +1,4 @@
-"""Train an autopilot by PPO on paths, keep it in a file, and fly it beside classical ones.
+"""Train an autopilot by PPO on paths, keep it in a file, and compare it with classical ones.
 
 python scripts/train_autopilot.py FOLDER
 """
@@ -26,7 +26,7 @@ def tell(now: Progress) -> None:
 
 
 def main(folder: Path) -> None:
-    """Train, or go on with a training that was stopped, then compare on episodes that nobody has seen."""
+    """Train, or go on with a training that was stopped, then compare on new episodes."""
     plan = make_plan(Given("ppo", environment="path-following", model="mariner", threads=2))
     train(plan, folder, resume=folder.exists(), tell=tell)
     task = plan.task

@@ -4,9 +4,9 @@
     python scripts/train_pretrained.py --tasks mariner-calm --seeds 0,1,2
     python scripts/train_pretrained.py --table                           # markdown for docs/pretrained.md
 
-Each task of the suite is learned with its settings in `agents/learning/hyperparameters`, once for each
+Each task of the suite is learned with its settings in `agents/training/hyperparameters`, once for each
 training seed. Of all evaluations of all runs the policy that costs least on held-out episodes is kept; only
-then is it flown on the episodes that are scored. Killed at any moment, it goes on where it was.
+then is it run on the episodes that are scored. Killed at any moment, it goes on where it was.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 AGENTS = Path(__file__).parents[1] / "agents"
 PRETRAINED = AGENTS / "pretrained"

@@ -42,7 +42,7 @@ from agents.training.settings import load_settings
 from agents.training.training import train
 from shipgym import InputError, ShipModel, load_model
 from shipgym.checks import check_whole
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships.scaling import scale_model
 
 ROOT = Path(__file__).parents[1]

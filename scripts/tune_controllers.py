@@ -18,7 +18,7 @@ from agents.benchmarking.direct_search import EPISODES, EVALUATIONS, FIRST_SEED,
 from agents.controllers.designs import CLASSICAL
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 
 
 def main() -> None:

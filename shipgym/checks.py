@@ -8,6 +8,9 @@ from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from shipgym.errors import InputError
 
 
@@ -26,13 +29,7 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
 
 
 def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str) -> None:
-    """Refuse a key that is not among `allowed`.
-
-    Raises
-    ------
-    InputError
-        Naming the first unknown key, the nearest known one, and all that are known.
-    """
+    """Refuse a key that is not among `allowed`, and name the nearest one that is."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -113,14 +110,31 @@ def check_number(
 
 
 def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int:
-    """Return `value`, which must be a whole number of at least so much.
-
-    Raises
-    ------
-    InputError
-        Naming the place, the value and what is expected.
-    """
+    """Return `value`, which must be a whole number of at least `at_least`."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value < at_least:
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
         raise InputError(f"{where}: {value!r} found, expected {expected}")
     return int(value)
+
+
+def check_flag(value: Any, where: str) -> bool:
+    """Return `value`, which must be true or false."""
+    if not isinstance(value, bool):
+        raise InputError(f"{where}: {value!r} found, expected true or false")
+    return value
+
+
+def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]:
+    """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
+    try:
+        array = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{where}: expected an array of numbers") from None
+    wrong = np.argwhere(~np.isfinite(array))
+    if len(wrong):
+        place = tuple(wrong[0].tolist())
+        sample = place[0] if len(place) == 1 else place
+        remedy = f"; {hint}" if hint else ""
+        raise InputError(f"{where}: {array[place]} found at sample {sample}, expected finite numbers{remedy}")
+    array.setflags(write=False)
+    return array

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from shipgym.trials.trial import Trial
+from typing import Any
 
 
 class InputError(ValueError):
@@ -38,10 +35,10 @@ class ManoeuvreError(RuntimeError):
 
     Attributes
     ----------
-    trial : Trial
+    trial : shipgym.Trial
         The manoeuvre so far.
     """
 
-    def __init__(self, message: str, trial: Trial) -> None:
+    def __init__(self, message: str, trial: Any) -> None:  # a Trial's own file imports this one
         super().__init__(message)
         self.trial = trial

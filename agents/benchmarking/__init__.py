@@ -1,1 +1,1 @@
-"""The benchmark: suites of tasks, flights of all contestants, their metrics, statistics and result files."""
+"""The benchmark: contestants in the tasks of a suite, statistics, result files and their page."""

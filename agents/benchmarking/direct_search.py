@@ -1,9 +1,9 @@
 """Settings of the classical controllers, found for each task by direct search on its cost.
 
-Every controller has the same budget: `EVALUATIONS` settings, each flown on the same `EPISODES` episodes,
+Every controller has the same budget: `EVALUATIONS` settings, each tried on the same `EPISODES` episodes,
 whose seeds are never scored. The search is Nelder and Mead's, over logarithms of the settings of
 `from_model`, and begins with the design's own; so what is found is never worse on those episodes than the
-design. Settings whose loop is unstable or has too little margin are refused without being flown.
+design. Settings whose loop is unstable or has too little margin are refused untried.
 
 Source: Nelder & Mead 1965, A simplex method for function minimization, Computer Journal 7 (scipy.optimize).
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+from shipgym.files import atomic_path
 
 Columns = dict[str, NDArray[Any]]
 
@@ -66,14 +66,8 @@ def write_episodes(columns: Columns, path: Path) -> None:
     """
     arrow, parquet = _arrow()
     arrays = {name: _array(arrow, name, values) for name, values in columns.items()}
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
-    try:
+    with atomic_path(path) as draft:
         parquet.write_table(arrow.table(arrays), draft, compression="zstd")
-        draft.replace(path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def read_episodes(path: Path) -> Columns:

@@ -23,9 +23,8 @@ from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
 from agents.suites.suite import N_EPISODES, load_suite
-from shipgym.envs.path_following_task import PathFollowingTask
+from shipgym.files import write_text
 from shipgym.pages import plotly_script, render
-from shipgym.whole_file import write_text
 
 if TYPE_CHECKING:
     from agents.verification.chain import Progress
@@ -88,11 +87,11 @@ def write_page(
     check_page(target)
     plotly_script()  # refuse a missing extra before the work
     count, episodes = replayable(result, worst)
-    replays = rerun(result, episodes, controllers, workers, progress)
-    write_text(_page(result, replays, count), target)
+    again = rerun(result, episodes, controllers, workers, progress)
+    write_text(_page(result, again, count), target)
 
 
-def _page(result: BenchmarkResult, replays: Rerun, count: int) -> str:
+def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     """The text of the page, with so many of the worst episodes of each contestant to replay."""
     wins = [name for task in result.tasks for name in bests_of(result, task)]
     return render(
@@ -107,13 +106,13 @@ def _page(result: BenchmarkResult, replays: Rerun, count: int) -> str:
             "scores": scores_figure(result),
             "profile": profile_figure(result.summary["profile"], result.ranking),
         },
-        tasks=[_task(result, replays, task) for task in result.tasks],
+        tasks=[_task(result, again, task) for task in result.tasks],
         replays={
             "count": count,
-            "episodes": len(replays.episodes),
-            "different": replays.different,
-            "refused": dict.fromkeys((name, why) for (name, _), why in replays.refused.items()),
-            "data": replay_data(result, replays, count),
+            "episodes": len(again.episodes),
+            "different": again.different,
+            "refused": dict.fromkeys((name, why) for (name, _), why in again.refused.items()),
+            "data": replay_data(result, again, count),
         },
         command=command(result),
         results_file=RESULTS,
@@ -139,7 +138,7 @@ def _failures(result: BenchmarkResult) -> list[str]:
     return failures
 
 
-def _task(result: BenchmarkResult, replays: Rerun, task: str) -> dict[str, Any]:
+def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """What the page shows of a task."""
     found = result.summary["tasks"][task]
     return {
@@ -150,7 +149,7 @@ def _task(result: BenchmarkResult, replays: Rerun, task: str) -> dict[str, Any]:
         "metrics": [(name, *METRICS[name]) for name in METRICS if _is_shown(name, found)],
         "costs": costs_figure(result, task),
         "seed": hardest_of(result, task),
-        "hardest": _hardest(result, replays, task),
+        "hardest": _hardest(result, again, task),
     }
 
 
@@ -160,15 +159,16 @@ def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
     return any(means) if metric in RARE else any(mean is not None for mean in means)
 
 
-def _hardest(result: BenchmarkResult, replays: Rerun, task: str) -> dict[str, Any]:
+def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """Figures of all contestants in the hardest episode; none where none of them can be replayed."""
-    seed = hardest_of(result, task)
-    wanted = {name: EpisodeId(name, task, 0, seed) for name in contestants_of(result, task)}
-    episodes = {name: replays.episodes[key] for name, key in wanted.items() if key in replays.episodes}
+    wanted = {
+        name: EpisodeId(name, task, 0, hardest_of(result, task)) for name in contestants_of(result, task)
+    }
+    episodes = {name: again.episodes[one] for name, one in wanted.items() if one in again.episodes}
     if not episodes:
         return {}
     found = {"histories": histories_figure(episodes, result.ranking)}
-    if isinstance(load_suite(result.summary["suite"]["name"]).task(task).task, PathFollowingTask):
+    if any(episode.waypoints is not None for episode in episodes.values()):
         found["tracks"] = tracks_figure(episodes, result.ranking)
     return found
 

@@ -18,7 +18,7 @@ from agents.rollouts.replay_series import quantities, run
 Floats = NDArray[np.float64]
 
 MOST_RUNS = 300  # in a page, 5 kB each
-MARK = "@episodes@"  # replaced with the runs by the page's script
+MARK = "@episodes@"  # what the page's script puts its runs in the place of
 DECIMALS = {
     "x": 1, "y": 1, "psi": 1, "delta": 1, "heading_error": 1, "course_order": 1, "rudder_order": 1,
     "cross_track_error": 1, "speed": 2, "yaw_rate": 3, "heel": 2, "shaft_speed": 1, "reward_so_far": 3,
@@ -62,19 +62,19 @@ def hardest_of(result: BenchmarkResult, task: str) -> int:
 
 
 def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[EpisodeId]]]:
-    """What may be replayed of a task: a contestant, and the episodes to show together.
+    """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
 
-    The first entry is of no contestant in particular: all of them in the hardest episode. Then come the
-    worst episodes of each contestant, together with the task's best contestant in the same episode.
+    At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
+    each, beside the task's best contestant in the same.
     """
-    names, seed = contestants_of(result, task), hardest_of(result, task)
+    who, seed = contestants_of(result, task), hardest_of(result, task)
     best = next(iter(bests_of(result, task)), None)
-    entries = [("", [EpisodeId(name, task, 0, seed) for name in names])]
-    for name in names:
-        for worst in worst_of(result, name, task, count):
-            others = [] if best is None or name == best else [EpisodeId(best, task, 0, worst.seed)]
-            entries.append((name, [worst, *others]))
-    return entries
+    found = [("", [EpisodeId(name, task, 0, seed) for name in who])]
+    for name in who:
+        for episode in worst_of(result, name, task, count):
+            beside = [] if best is None or name == best else [EpisodeId(best, task, 0, episode.seed)]
+            found.append((name, [episode, *beside]))
+    return found
 
 
 def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeId]]:
@@ -88,13 +88,13 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeI
     """
     for count in range(wanted, 0, -1):
         entries = [entry for task in result.tasks for entry in entries_of(result, task, count)]
-        episodes = list(dict.fromkeys(episode for _, shown in entries for episode in shown))
+        episodes = list(dict.fromkeys(one for _, some in entries for one in some))
         if len(episodes) <= MOST_RUNS:
             break
     return count, episodes
 
 
-def replay_data(result: BenchmarkResult, replays: Rerun, count: int) -> dict[str, Any]:
+def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, Any]:
     """All that the page's script needs to replay episodes, ready for JSON.
 
     Returns
@@ -103,37 +103,44 @@ def replay_data(result: BenchmarkResult, replays: Rerun, count: int) -> dict[str
         page : the player, with a mark where its runs go.
         quantities : what it shows over time.
         runs : short forms of them (`short`).
-        entries : what may be chosen, by task: the contestant, seed, cost, outcome and numbers of the runs.
+        entries : what may be chosen, by task: for whom, seed, cost, outcome and numbers of the runs.
     """
-    colours = {name: colour for name, (colour, _) in styles(result.ranking).items()}
-    numbers: dict[EpisodeId, int] = {}
+    kept: dict[EpisodeId, int] = {}
     runs: list[dict[str, Any]] = []
-    entries: dict[str, list[dict[str, Any]]] = {task: [] for task in result.tasks}
+    whole: list[dict[str, Any]] = []
+    entries: dict[str, list[dict[str, Any]]] = {}
+    look = styles(result.ranking)
     for task in result.tasks:
-        for name, wanted in entries_of(result, task, count):
-            found = [key for key in wanted if key in replays.episodes]
-            if not found or (name and found[0].contestant != name):
+        entries[task] = []
+        for who, episodes in entries_of(result, task, count):
+            there = [episode for episode in episodes if episode in again.episodes]
+            if not there or (who and there[0].contestant != who):
                 continue
-            for key in found:
-                if key not in numbers:
-                    numbers[key] = len(runs)
-                    one = run(_title(result, key), replays.episodes[key])
-                    runs.append({**one, "colour": colours[key.contestant]})
-            first = found[0]
-            entries[task].append({
-                "who": name, "seed": first.seed, "cost": round(cost_of(result, first), 2),
-                "outcome": runs[numbers[first]]["outcome"], "runs": [numbers[key] for key in found],
-            })  # fmt: skip
+            for episode in there:
+                if episode not in kept:
+                    kept[episode] = len(runs)
+                    whole.append(run(_called(result, episode), again.episodes[episode]))
+                    runs.append({**short(whole[-1]), "colour": look[episode.contestant][0]})
+            entries[task].append(
+                {
+                    "who": who,
+                    "seed": there[0].seed,
+                    "cost": round(cost_of(result, there[0]), 2),
+                    "outcome": runs[kept[there[0]]]["outcome"],
+                    "runs": [kept[episode] for episode in there],
+                }
+            )
+    page = player("Replay", MARK)
     return {
-        "page": player("Replay", MARK),
+        "page": page,
         "mark": f'"{MARK}"',
-        "quantities": quantities(runs),
-        "runs": [short(one) for one in runs],
+        "quantities": quantities(whole),
+        "runs": runs,
         "entries": entries,
     }
 
 
-def _title(result: BenchmarkResult, episode: EpisodeId) -> str:
+def _called(result: BenchmarkResult, episode: EpisodeId) -> str:
     several = result.summary["tasks"][episode.task][episode.contestant]["runs"] > 1
     return f"{episode.contestant}, run {episode.run + 1}" if several else episode.contestant
 

@@ -22,8 +22,8 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -41,12 +41,12 @@ from agents.benchmarking.episode_table import (
     read_episodes,
     write_episodes,
 )
-from agents.benchmarking.summary import summary_of
+from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
-from agents.suites.suite import FIRST_SEED, BenchmarkTask, Suite, suite_hash
+from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
 from shipgym.checks import check_choice, check_keys, check_table
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 Floats = NDArray[np.float64]
 
@@ -100,14 +100,18 @@ class BenchmarkResult:
         values: Floats = self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"])
         return values
 
-    def save(self, folder: str | Path) -> None:
-        """Write `episodes.parquet` and then `results.json`, each whole or not at all.
+    def save(self, folder: str | Path | None) -> BenchmarkResult:
+        """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
+
+        Returns the result with the hash of `episodes.parquet` in its summary.
 
         Raises
         ------
         InputError
             If pyarrow is missing or the folder cannot be written.
         """
+        if folder is None:
+            return self
         target = Path(folder)
         check_library()
         try:
@@ -116,10 +120,12 @@ class BenchmarkResult:
             raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
         write_episodes(self.episodes, target / EPISODES)
         about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
-        write_json({**self.summary, "episodes": about}, target / RESULTS)
+        saved = replace(self, summary={**self.summary, "episodes": about})
+        write_json(saved.summary, target / RESULTS)
+        return saved
 
 
-def check_new(folder: Path, resume: bool) -> None:
+def check_new(folder: Path, resume: bool) -> Path:
     """Refuse a folder that cannot take results, or that holds some and is not to be gone on with.
 
     Raises
@@ -128,39 +134,35 @@ def check_new(folder: Path, resume: bool) -> None:
         Saying what to do.
     """
     check_library()
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder}: is no folder, expected one to write the results to; choose another")
+    if not folder.exists():
+        return folder
     if not folder.is_dir():
-        return
-    known = (RESULTS, EPISODES, PARTS)
-    there = [entry.name for entry in folder.iterdir()]
-    if not resume and any(name in known for name in there):
+        raise InputError(f"{folder}: is no folder, expected one to write the results to; choose another")
+    found = sorted(entry.name for entry in folder.iterdir())
+    ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
+    if ours and not resume:
         raise InputError(
             f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
         )
-    if not any(name in known for name in there) and there:
-        raise InputError(
-            f"{folder}: holds '{sorted(there)[0]}', which is no result of this; choose a new folder"
-        )
+    if found and not ours:
+        raise InputError(f"{folder}: holds '{found[0]}', which is no result of this; choose a new folder")
+    return folder
 
 
 def gathered(
-    suite: Suite,
-    tasks: Sequence[BenchmarkTask],
-    who: Sequence[Contestant],
-    flown: Mapping[tuple[str, str], Mapping[str, Any]],
-    episodes: int,
+    suite: str, tasks: Sequence[BenchmarkTask], who: Sequence[Contestant], done: Done, episodes: int
 ) -> BenchmarkResult:
-    """Put together what was flown.
+    """Put together what was done.
 
     Parameters
     ----------
-    suite : Suite
+    suite : str
+        Its name.
     tasks : sequence of BenchmarkTask
-        Those that were flown.
+        Those that were run.
     who : sequence of Contestant
-    flown : dict of (contestant, task) to dict
-        See `agents.benchmarking.run.flown_by`.
+    done : dict of (contestant, task) to dict
+        See `agents.benchmarking.run.results_of`.
     episodes : int
         Number of episodes of each task.
     """
@@ -170,7 +172,7 @@ def gathered(
             (one.name, task.name, number, seeds, run["episodes"])
             for one in who
             for task in tasks
-            for number, run in enumerate(flown[one.name, task.name]["runs"])
+            for number, run in enumerate(done[one.name, task.name]["runs"])
         ]
     )
     about = {
@@ -178,14 +180,14 @@ def gathered(
         "kind": KIND,
         "versions": versions(),
         "suite": {
-            "name": suite.name,
-            "sha256": suite_hash(suite.name),
+            "name": suite,
+            "sha256": suite_hash(suite),
             "tasks": {task.name: _about_task(task) for task in tasks},
         },
         "seeds": {"first": FIRST_SEED, "count": episodes},
-        "contestants": {one.name: _about_contestant(one, tasks, flown) for one in who},
+        "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
     }
-    found = summary_of(suite.name, tasks, [one.name for one in who], flown)
+    found = summary_of(suite, [task.name for task in tasks], [one.name for one in who], done)
     rows = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
     return BenchmarkResult({**about, **found, "episodes": rows}, table)
 
@@ -212,13 +214,11 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
     }
 
 
-def _about_contestant(
-    one: Contestant, tasks: Sequence[BenchmarkTask], flown: Mapping[tuple[str, str], Mapping[str, Any]]
-) -> dict[str, Any]:
+def _about_contestant(one: Contestant, tasks: Sequence[BenchmarkTask], done: Done) -> dict[str, Any]:
     files: dict[str, str] = {}
     for task in tasks:
         files |= one.fingerprint(task)
-    parts = {task.name: flown[one.name, task.name] for task in tasks}
+    parts = {task.name: done[one.name, task.name] for task in tasks}
     return {
         "source": one.source if one.is_text else None,
         "files": files,

@@ -1,4 +1,4 @@
-"""The benchmark: every contestant sails every task of a suite, in the same episodes."""
+"""The benchmark: every contestant steers every task of a suite, in the same episodes."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
@@ -41,75 +40,58 @@ def benchmark(
     ----------
     controllers : str, sequence, or mapping of str
         Who takes part: texts such as ``"pid,lq"`` (`agents.benchmarking.contestants`), controllers, functions
-        that make one for a `BenchmarkTask`; or any of these by name, a list being the training runs of one.
-    suite : str
-        Name of a shipped suite.
-    tasks : sequence of str, optional
-        By default all of it.
+        of a `BenchmarkTask` that make one; or any of these by name, a list being the training runs of one.
+    suite, tasks : str, and sequence of str, optional
+        Name of a shipped suite, and of some of its tasks; by default all of them.
     out : str or Path, optional
-        Folder for the results and for what each contestant did in each task; by default nothing is written.
-    workers : int or None
-        Processes; None for as many as there are cores. Controllers that are given as objects, not by a text,
-        steer in this process.
-    engine : {"local", "ray"}
-        See `agents.engines.jobs.run_jobs`.
+        Folder for the results and their parts; by default nothing is written.
+    workers, engine, address
+        Where the work is done (`run_jobs`); controllers that are given as objects steer in this process.
     progress : callable, optional
         Told what is done, how many of it, and the total.
-    address : str, optional
-        Of a ray cluster.
     resume : bool
         Whether to go on in a folder where results are: what is there already is not run again.
     episodes : int
-        The first so many of the scored ones. Fewer than all of them are for a quick look, not for a ranking.
+        How many of the scored ones. Fewer than all are for a quick look, not for a ranking.
 
     Returns
     -------
     BenchmarkResult
-        The same whatever the number of workers and the engine, but for the times.
+        The same wherever the work is done, but for the times.
 
     Raises
     ------
     InputError
-        For an unknown contestant, suite or task, with the nearest known one, the file of an agent that is
-        broken or fits none of the tasks, or a folder that is in use.
+        For an unknown contestant, suite or task, a broken agent or one for no task, or a folder in use.
     """
-    found = load_suite(suite)
-    chosen = found.tasks if tasks is None else tuple(found.task(name) for name in _once(tasks))
-    who = contestants(controllers)
+    chosen, who = _chosen(suite, tasks), contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)
     check_engine(engine, workers, address)
-    folder = None if out is None else Path(out)
-    if folder is not None:
-        check_new(folder, resume)
+    folder = None if out is None else check_new(Path(out), resume)
     for one in who:
         check_agents(one, chosen)
     jobs = [job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
-    done = run_jobs(
-        run_job,
-        jobs,
-        engine=engine,
-        workers=workers,
-        address=address,
+    found = run_jobs(
+        run_job, jobs, engine=engine, workers=workers, address=address,
         keep=None if folder is None else folder / PARTS,
         progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
-    )
-    by_pair = {(job["contestant"], job["task"]): result for job, result in zip(jobs, done, strict=True)}
-    for one in who:
-        if not one.is_text:
-            for task in chosen:
-                by_pair[one.name, task.name] = results_of(one, task, suite, episodes)
-    result = gathered(found, chosen, who, by_pair, episodes)
-    if folder is not None:
-        result.save(folder)
-    return result
+    )  # fmt: skip
+    done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
+    for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
+        done[one.name, task.name] = results_of(one, task, suite, episodes)
+    return gathered(suite, chosen, who, done, episodes).save(folder)
 
 
-def _once(names: Sequence[str]) -> list[str]:
+def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:
+    """Tasks of a suite by name, each once."""
+    found = load_suite(suite)
+    if names is None:
+        return found.tasks
     if isinstance(names, str):
         names = [name.strip() for name in names.split(",")]
     if not names:
         raise InputError("tasks: none found, expected at least one")
-    return list(dict.fromkeys(names))
+    return tuple(found.task(name) for name in dict.fromkeys(names))
 
 
 def job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
@@ -141,10 +123,10 @@ def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) 
         runs : for each training run its `episodes` (arrays by name), `failure`, `seconds_per_action` and
             `policy_sha256`.
     """
-    seeds = task.seeds[:episodes]
     try:
         if one.source == ORACLE:
-            return {"refused": "", "runs": [_kept(oracle_costs(task, suite)[:episodes])]}
+            costs = oracle_costs(task, suite)[:episodes]
+            return {"refused": "", "runs": [_run({"cost": costs}, "", np.nan, None)]}
         policies = one.policies(task, suite)
     except InputError as error:
         return {"refused": str(error), "runs": []}
@@ -154,18 +136,15 @@ def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) 
         return {"refused": f"{type(error).__name__}: {error}", "runs": []}
     runs = []
     for policy in policies:
-        figures, run = evaluate(policy, task, seeds)
-        runs.append(
-            {
-                "episodes": figures,
-                "failure": run.failure,
-                "seconds_per_action": run.seconds_per_action,
-                "policy_sha256": policy_hash(policy),
-            }
-        )
+        figures, run = evaluate(policy, task, task.seeds[:episodes])
+        runs.append(_run(figures, run.failure, run.seconds_per_action, policy_hash(policy)))
     return {"refused": "", "runs": runs}
 
 
-def _kept(costs: NDArray[np.float64]) -> dict[str, Any]:
-    """A run of which only the costs are known."""
-    return {"episodes": {"cost": costs}, "failure": "", "seconds_per_action": np.nan, "policy_sha256": None}
+def _run(episodes: Any, failure: str, seconds_per_action: float, policy_sha256: str | None) -> dict[str, Any]:
+    return {
+        "episodes": episodes,
+        "failure": failure,
+        "seconds_per_action": seconds_per_action,
+        "policy_sha256": policy_sha256,
+    }

@@ -5,7 +5,7 @@ the shape (n_runs, n_episodes), runs being training runs of a learned agent; a c
 has one.
 
 The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement.
-Everybody gets the same draws of episodes, because everybody flew the same ones: differences are paired.
+All contestants get the same draws of episodes, because all sailed the same ones: differences are paired.
 
 Sources: Agarwal, Schwarzer, Castro, Courville & Bellemare 2021, Deep Reinforcement Learning at the Edge of
 the Statistical Precipice, NeurIPS 34 (interquartile mean, stratified bootstrap, probability of improvement,
@@ -226,7 +226,7 @@ def probability_of_improvement(one: Floats, other: Floats) -> float:
 def improvement(
     one: Mapping[int, Floats], other: Mapping[int, Floats], draws: Draws, who: tuple[int, int]
 ) -> Interval:
-    """Mean over the tasks that both flew of the probability of improvement.
+    """Mean over the tasks that both took part in of the probability of improvement.
 
     Parameters
     ----------

@@ -21,88 +21,150 @@ from agents.benchmarking.statistics import (
     score,
 )
 from agents.suites.reference import reference_costs
-from agents.suites.suite import N_EPISODES, BenchmarkTask
+from agents.suites.suite import N_EPISODES
 
 Floats = NDArray[np.float64]
-Flown = Mapping[tuple[str, str], Mapping[str, Any]]
+#: By contestant and task what `agents.benchmarking.run.results_of` answers.
+Done = Mapping[tuple[str, str], Mapping[str, Any]]
 
 THRESHOLDS = np.linspace(-1.0, 1.5, 51)  # scores of the performance profile
 NOTHING: dict[str, float | None] = {"value": None, "low": None, "high": None}
 
 
-def summary_of(
-    suite: str, tasks: Sequence[BenchmarkTask], names: Sequence[str], flown: Flown
-) -> dict[str, Any]:
+def summary_of(suite: str, tasks: Sequence[str], names: Sequence[str], done: Done) -> dict[str, Any]:
     """The fields `tasks`, `reference`, `ranking`, `improvement` and `profile` of the results.
 
     Parameters
     ----------
     suite : str
         Its name.
-    tasks : sequence of BenchmarkTask
-        Those that were flown.
-    names : sequence of str
-        Of the contestants.
-    flown : dict of (contestant, task) to dict
-        See `agents.benchmarking.run.flown_by`.
+    tasks, names : sequence of str
+        Of the tasks that were run, and of the contestants.
+    done : dict of (contestant, task) to dict
+        See `agents.benchmarking.run.results_of`.
     """
-    costs = {
-        (name, k): np.stack([run["episodes"]["cost"] for run in flown[name, task.name]["runs"]])
-        for name in names
-        for k, task in enumerate(tasks)
-        if flown[name, task.name]["runs"]
-    }
-    n_episodes = next((cost.shape[1] for cost in costs.values()), 1)
-    known = reference_costs(suite) if n_episodes == N_EPISODES else {}  # which are of all scored episodes
-    reference = {task.name: known[task.name] for task in tasks if task.name in known}
-    draws = Draws(len(tasks), n_episodes)
-    by_task = {
-        task.name: _of_task(task.name, k, names, flown, costs, draws, reference)
-        for k, task in enumerate(tasks)
-    }
-    return {
-        "tasks": by_task,
-        "reference": {task: {"pid": pid, "oracle": oracle} for task, (pid, oracle) in reference.items()},
-        "ranking": _ranking(tasks, names, by_task, costs, draws, reference),
-        "improvement": _improvements(names, costs, draws),
-        "profile": _profiles(tasks, names, costs, reference),
-    }
+    return _Summary(suite, tasks, names, done).fields()
 
 
-def _of_task(
-    task: str,
-    number: int,
-    names: Sequence[str],
-    flown: Flown,
-    costs: Mapping[tuple[str, int], Floats],
-    draws: Draws,
-    reference: Mapping[str, tuple[float, float]],
-) -> dict[str, Any]:
-    """What each contestant did in one task."""
-    taking_part = {name: costs[name, number] for name in names if (name, number) in costs}
-    flyable = [cost.mean() for name, cost in taking_part.items() if name != ORACLE]
-    lowest = min(flyable, default=np.nan)
-    found = {}
-    for name, cost in taking_part.items():
-        who = list(names).index(name)
-        runs = flown[name, task]["runs"]
-        mean = mean_cost(cost, draws, number, who)
-        found[name] = {
-            "cost": mean.to_dict(),
-            "cost_iqm": interquartile_cost(cost, draws, number, who).to_dict(),
-            "score": _score(mean, reference[task]).to_dict() if task in reference else NOTHING,
-            "relative_cost": finite(mean.value / lowest),
-            "runs": len(runs),
-            "lost": int(sum(np.nansum(run["episodes"].get("terminated", 0.0)) for run in runs)),
-            "failed": int(sum(np.nansum(run["episodes"].get("failed", 0.0)) for run in runs)),
-            "failure": next((run["failure"] for run in runs if run["failure"]), ""),
-            "policy_sha256": [run["policy_sha256"] for run in runs],
-            "microseconds_per_action": finite(
-                1e6 * float(np.mean([run["seconds_per_action"] for run in runs]))
-            ),
-            "metrics": _figures([run["episodes"] for run in runs]),
+class _Summary:
+    """Costs of everybody in all tasks, and the draws of the bootstrap that are common to them."""
+
+    def __init__(self, suite: str, tasks: Sequence[str], names: Sequence[str], done: Done) -> None:
+        self.tasks, self.names, self.done = list(tasks), list(names), done
+        #: By numbers of contestant and task, each of shape (n_runs, n_episodes).
+        self.costs: dict[tuple[int, int], Floats] = {
+            (who, k): np.stack([run["episodes"]["cost"] for run in done[name, task]["runs"]])
+            for who, name in enumerate(names)
+            for k, task in enumerate(tasks)
+            if done[name, task]["runs"]
         }
-    return found
+        n_episodes = next((cost.shape[1] for cost in self.costs.values()), 1)
+        known = reference_costs(suite) if n_episodes == N_EPISODES else {}  # which are of all scored episodes
+        self.reference = {k: known[task] for k, task in enumerate(tasks) if task in known}
+        self.draws = Draws(len(tasks), n_episodes)
+
+    def fields(self) -> dict[str, Any]:
+        """All of it."""
+        by_task = {task: self._of_task(k) for k, task in enumerate(self.tasks)}
+        return {
+            "tasks": by_task,
+            "reference": {
+                self.tasks[k]: {"pid": pid, "oracle": oracle} for k, (pid, oracle) in self.reference.items()
+            },
+            "ranking": self._ranking(by_task),
+            "improvement": self._improvements(),
+            "profile": self._profiles(),
+        }
+
+    def _of_task(self, number: int) -> dict[str, Any]:
+        """What each contestant did in one task."""
+        taking_part = {who: cost for (who, k), cost in self.costs.items() if k == number}
+        lowest = min(
+            (cost.mean() for who, cost in taking_part.items() if self.names[who] != ORACLE), default=np.nan
+        )
+        found = {}
+        for who, cost in taking_part.items():
+            runs = self.done[self.names[who], self.tasks[number]]["runs"]
+            mean, reference = mean_cost(cost, self.draws, number, who), self.reference.get(number)
+            seconds = float(np.mean([run["seconds_per_action"] for run in runs]))
+            found[self.names[who]] = {
+                "cost": mean.to_dict(),
+                "cost_iqm": interquartile_cost(cost, self.draws, number, who).to_dict(),
+                "score": NOTHING if reference is None else _score(mean, reference).to_dict(),
+                "relative_cost": finite(mean.value / lowest),
+                "runs": len(runs),
+                "lost": _count(runs, "terminated"),
+                "failed": _count(runs, "failed"),
+                "failure": next((run["failure"] for run in runs if run["failure"]), ""),
+                "policy_sha256": [run["policy_sha256"] for run in runs],
+                "microseconds_per_action": finite(1e6 * seconds),
+                "metrics": _figures([run["episodes"] for run in runs]),
+            }
+        return found
+
+    def _ranking(self, by_task: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+        """The contestants, those that took part in all tasks first, the best first.
+
+        By score if every task has its references, else by the geometric mean of their costs over the lowest.
+        """
+        entries = []
+        for who, name in enumerate(self.names):
+            part = [k for k in range(len(self.tasks)) if (who, k) in self.costs]
+            scored = [k for k in part if np.isfinite(score(0.0, *self.reference.get(k, (0.0, 0.0))))]
+            found = [by_task[self.tasks[k]][name] for k in part]
+            relative = [one["relative_cost"] for one in found if one["relative_cost"]]
+            entries.append(
+                {
+                    "name": name,
+                    "score": self._aggregate(who, scored),
+                    "scored_tasks": len(scored),
+                    "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
+                    "tasks": len(part),
+                    "lost": sum(one["lost"] for one in found),
+                    "failed": sum(one["failed"] for one in found),
+                }
+            )
+        by_score = len(self.reference) == len(self.tasks)
+        return sorted(entries, key=lambda entry: _place(entry, by_score))
+
+    def _aggregate(self, who: int, tasks: Sequence[int]) -> dict[str, float | None]:
+        """Score over some tasks."""
+        if not tasks:
+            return dict(NOTHING)
+        costs, known = [self.costs[who, k] for k in tasks], [self.reference[k] for k in tasks]
+        return aggregate_score(costs, known, self.draws, tasks, who).to_dict()
+
+    def _improvements(self) -> dict[str, dict[str, Any]]:
+        """Probability that one costs less than another, for all pairs."""
+        of = [{k: cost for (i, k), cost in self.costs.items() if i == who} for who in range(len(self.names))]
+        return {
+            one: {
+                other: improvement(of[i], of[k], self.draws, (i, k)).to_dict()
+                for k, other in enumerate(self.names)
+                if k != i
+            }
+            for i, one in enumerate(self.names)
+        }
+
+    def _profiles(self) -> dict[str, Any]:
+        """Share of episodes whose score is above each threshold."""
+        shares = {}
+        for who, name in enumerate(self.names):
+            scores = [
+                score(self.costs[who, k], *known).ravel()
+                for k, known in self.reference.items()
+                if (who, k) in self.costs
+            ]
+            every = np.concatenate([np.zeros(0), *scores])
+            every = every[np.isfinite(every)]
+            if len(every):
+                shares[name] = performance_profile(every, THRESHOLDS).tolist()
+        return {"thresholds": THRESHOLDS.round(6).tolist(), "shares": shares}
+
+
+def _count(runs: Sequence[Mapping[str, Any]], figure: str) -> int:
+    """Episodes of which a figure is true."""
+    return int(sum(np.nansum(run["episodes"].get(figure, 0.0)) for run in runs))
 
 
 def _score(cost: Interval, reference: tuple[float, float]) -> Interval:
@@ -122,84 +184,7 @@ def _figures(runs: Sequence[Mapping[str, Floats]]) -> dict[str, dict[str, float 
     return found
 
 
-def _ranking(
-    tasks: Sequence[BenchmarkTask],
-    names: Sequence[str],
-    by_task: Mapping[str, Mapping[str, Any]],
-    costs: Mapping[tuple[str, int], Floats],
-    draws: Draws,
-    reference: Mapping[str, tuple[float, float]],
-) -> list[dict[str, Any]]:
-    """The contestants, those that flew all tasks first, the best first.
-
-    By score if every task has its references, else by the geometric mean of their costs over the lowest.
-    """
-    entries = []
-    for who, name in enumerate(names):
-        flown = [k for k in range(len(tasks)) if (name, k) in costs]
-        scored = [
-            k
-            for k in flown
-            if tasks[k].name in reference and np.isfinite(score(0.0, *reference[tasks[k].name]))
-        ]
-        aggregate = dict(NOTHING)
-        if scored:
-            known = [reference[tasks[k].name] for k in scored]
-            aggregate = aggregate_score([costs[name, k] for k in scored], known, draws, scored, who).to_dict()
-        found = [by_task[tasks[k].name][name] for k in flown]
-        relative = [one["relative_cost"] for one in found if one["relative_cost"]]
-        entries.append(
-            {
-                "name": name,
-                "score": aggregate,
-                "scored_tasks": len(scored),
-                "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
-                "tasks": len(flown),
-                "lost": sum(one["lost"] for one in found),
-                "failed": sum(one["failed"] for one in found),
-            }
-        )
-    by_score = all(task.name in reference for task in tasks)
-    return sorted(entries, key=lambda entry: _place(entry, by_score))
-
-
 def _place(entry: Mapping[str, Any], by_score: bool) -> tuple[float, ...]:
     points = entry["score"]["value"] if by_score else None
     cost = entry["relative_cost"]
     return -entry["tasks"], -points if points is not None else np.inf, cost if cost is not None else np.inf
-
-
-def _improvements(
-    names: Sequence[str], costs: Mapping[tuple[str, int], Floats], draws: Draws
-) -> dict[str, dict[str, Any]]:
-    """Probability that one costs less than another, for all pairs."""
-    by_name = [{k: cost for (who, k), cost in costs.items() if who == name} for name in names]
-    return {
-        one: {
-            other: improvement(by_name[i], by_name[k], draws, (i, k)).to_dict()
-            for k, other in enumerate(names)
-            if k != i
-        }
-        for i, one in enumerate(names)
-    }
-
-
-def _profiles(
-    tasks: Sequence[BenchmarkTask],
-    names: Sequence[str],
-    costs: Mapping[tuple[str, int], Floats],
-    reference: Mapping[str, tuple[float, float]],
-) -> dict[str, Any]:
-    """Share of episodes whose score is above each threshold."""
-    shares = {}
-    for name in names:
-        scores = [
-            score(costs[name, k], *reference[task.name]).ravel()
-            for k, task in enumerate(tasks)
-            if (name, k) in costs and task.name in reference
-        ]
-        every = np.concatenate([np.zeros(0), *scores])
-        every = every[np.isfinite(every)]
-        if len(every):
-            shares[name] = performance_profile(every, THRESHOLDS).tolist()
-    return {"thresholds": THRESHOLDS.round(6).tolist(), "shares": shares}

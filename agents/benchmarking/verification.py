@@ -1,4 +1,4 @@
-"""Whether a file of benchmark results is true: a sample of it is flown again and compared."""
+"""Whether a file of benchmark results is true: a sample of it is run again and compared."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Check:
-    """One contestant and task, all episodes and training runs of it flown again.
+    """One contestant and task, all episodes and training runs of it run again.
 
     Attributes
     ----------
@@ -70,14 +70,14 @@ def verify(
     tolerance: float | None = None,
     workers: int | None = 1,
 ) -> list[Check]:
-    """Fly a sample of a benchmark again and compare.
+    """Run a sample of a benchmark again and compare.
 
     Parameters
     ----------
     path : str or Path
         Folder of the results, or their `results.json`.
     sample : int
-        Pairs of a contestant and a task; all their episodes are flown, at most all pairs there are.
+        Pairs of a contestant and a task; all their episodes are run, at most all pairs there are.
     seed : int
         Of the sample.
     tolerance : float, optional
@@ -93,7 +93,7 @@ def verify(
     Raises
     ------
     InputError
-        If the files are broken, written on another suite of the name, or hold nothing that can be flown
+        If the files are broken, written on another suite of the name, or hold nothing that can be run
         again: contestants that were given as objects.
     """
     result = load_results(path)
@@ -103,15 +103,15 @@ def verify(
     suite = result.summary["suite"]
     if suite_hash(suite["name"]) != suite["sha256"]:
         raise InputError(
-            f"{path}: was flown on another suite '{suite['name']}' than that of this version of shipgym "
+            f"{path}: is of another suite '{suite['name']}' than that of this version of shipgym "
             f"({result.summary['versions'].get('shipgym')}): install the version it was written with"
         )
     pairs = _sampled(result, sample, seed)
     jobs = [_job(result, one, task) for one, task in pairs]
-    flown = run_jobs(run_job, jobs, workers=workers)
+    found = run_jobs(run_job, jobs, workers=workers)
     return [
         _compared(result, one, task, again, tolerance)
-        for (one, task), again in zip(pairs, flown, strict=True)
+        for (one, task), again in zip(pairs, found, strict=True)
     ]
 
 
@@ -154,7 +154,7 @@ def _compared(
     allowed = tolerance if tolerance is not None else ROUNDING if learned or other else 0.0
     note = f"{', '.join(other)} differ from those of the file" if other else ""
     if changed:
-        note = f"'{changed[0]}' is not the file that was flown"
+        note = f"'{changed[0]}' is not the file that took part"
     if len(again["runs"]) != len(cost):
         note = (
             again["refused"] or note or f"{len(again['runs'])} training runs found, {len(cost)} in the file"

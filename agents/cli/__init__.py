@@ -30,6 +30,7 @@ from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
 
 if TYPE_CHECKING:
+    from agents.cli.standard_trials import StandardTrials
     from agents.verification.result import AutopilotResult
 
 app = typer.Typer(
@@ -87,14 +88,13 @@ def trials_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Put a model through the standard manoeuvres and judge it by the IMO criteria.
+    """Simulate the standard manoeuvres of a model and assess them by the IMO criteria.
 
     Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
     indices of an identified model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
-    from agents.cli.terminal import criteria_table, manoeuvre_table, print_json, progress_bars, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json, progress_bars
     from agents.cli.trials_page import check_page, write_page
     from shipgym.ships import load_model
 
@@ -110,20 +110,28 @@ def trials_command(
         write_page(ship, found, out)
     if as_json:
         print_json({"model": ship.name, "seed": seed, **found.to_dict()})
-        return
+    else:
+        _print_trials(found, out)
+
+
+def _print_trials(found: StandardTrials, page: Path | None) -> None:
+    """Print tables of the standard manoeuvres, and where the page was written."""
+    from agents.cli.terminal import criteria_table, manoeuvre_table, warn
+    from agents.cli.terminal import out as console
+
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
     if found.criteria:
         console.print(criteria_table(found.criteria))
     else:
-        console.print("The IMO criteria are made for deep water: leave --depth out to judge by them.")
+        console.print("The IMO criteria are made for deep water: leave --depth out to assess them.")
     for name, criterion in found.criteria.items():
         if criterion.note:
             console.print(f"{name}: {criterion.note}", soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
-    if out is not None:
-        console.print(f"\nwritten: {out}", soft_wrap=True)
+    if page is not None:
+        console.print(f"\nwritten: {page}", soft_wrap=True)
 
 
 @app.command("autopilot")
@@ -133,7 +141,7 @@ def autopilot_command(
     ship: ShipFileArgument,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
     draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes flown.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes.")] = 0,
     *,
     options: dict[str, Any],
     agents: Annotated[
@@ -141,7 +149,7 @@ def autopilot_command(
         typer.Option(
             "--agent",
             metavar="AGENT",
-            help="Fly this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+            help="Run this autopilot too: a file, or the name of a pretrained one. May be repeated.",
         ),
     ] = None,
     engine: EngineName = "local",
@@ -149,7 +157,7 @@ def autopilot_command(
     address: Address = None,
     as_json: Json = False,
 ) -> None:
-    """The whole chain: identify, predict, design PID and LQ, fly them over drawn models, write a report.
+    """The whole chain: identify, predict, design PID and LQ, run them on drawn models, write a report.
 
     Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
     model is unstable; the report then says so.

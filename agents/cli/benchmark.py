@@ -14,50 +14,58 @@ if TYPE_CHECKING:
     from agents.verification.chain import Progress
 
 
+Controllers = Annotated[
+    str | None,
+    typer.Option(
+        help="Who takes part, separated by commas: classical controllers (pid, lq, mpc, ...), tuned-pid, "
+        "pretrained agents (ppo, sac), files of agents, module:function, name=...; default: all classical "
+        "ones."
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
+]
+Workers = Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as there are cores.")]
+Episodes = Annotated[
+    int, typer.Option(min=1, max=100, help="How many of each task, from the first on: for a quick look.")
+]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on in a folder that holds results, or parts of them.")
+]
+Page = Annotated[
+    bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
+]
+Results = Annotated[
+    Path | None,
+    typer.Option(metavar="RESULTS", help="Instead, run a sample of these results again and compare."),
+]
+Tolerance = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="Relative difference of costs that --verify allows; default: see docs."),
+]
+
+
 @answered
 def benchmark_command(
-    controllers: Annotated[
-        str | None,
-        typer.Option(
-            help="Who takes part, separated by commas: classical controllers (pid, lq, mpc, ...), tuned-pid, "
-            "pretrained agents (ppo, sac), files of agents, module:function, name=...; default: all "
-            "classical ones."
-        ),
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
-    ] = None,
+    controllers: Controllers = None,
+    out: Out = None,
     suite: Annotated[str, typer.Option(help="Tasks by the name of their suite.")] = "shipgym-v1",
     tasks: Annotated[str | None, typer.Option(help="Only these tasks of it, separated by commas.")] = None,
-    workers: Annotated[
-        int | None, typer.Option(min=1, help="Processes; default: as many as there are cores.")
-    ] = None,
+    workers: Workers = None,
     engine: Annotated[str, typer.Option(help="local processes, or ray.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of a ray cluster.")] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Go on in a folder that holds results, or parts of them.")
-    ] = False,
-    episodes: Annotated[
-        int, typer.Option(min=1, max=100, help="The first so many of each task: for a quick look.")
-    ] = 100,
-    page: Annotated[
-        bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
-    ] = True,
-    verify: Annotated[
-        Path | None,
-        typer.Option(metavar="RESULTS", help="Instead, fly a sample of these results again and compare."),
-    ] = None,
-    sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify flies.")] = 8,
-    tolerance: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Relative difference of costs that --verify allows; default: see docs."),
-    ] = None,
+    resume: Resume = False,
+    episodes: Episodes = 100,
+    page: Page = True,
+    verify: Results = None,
+    sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
+    tolerance: Tolerance = None,
     as_json: Json = False,
 ) -> None:
-    """Fly controllers through the tasks of a suite, in the same episodes, and rank them.
+    """Run controllers through the tasks of a suite, in the same episodes, and rank them.
 
-    With --verify: exits with 1 if what is flown again differs from the file.
+    With --verify: exits with 1 if what is run again differs from the file.
     """
     if verify is not None:
         _verify(verify, sample, tolerance, workers, as_json)
@@ -72,22 +80,15 @@ def benchmark_command(
     try:
         with progress_bars(not as_json) as progress:
             result = benchmark(
-                controllers if controllers is not None else CLASSICAL,
-                suite,
-                None if tasks is None else tasks.split(","),
-                out,
-                workers,
-                engine,
-                progress,
-                address=address,
-                resume=resume,
-                episodes=episodes,
-            )
+                controllers if controllers is not None else CLASSICAL, suite,
+                None if tasks is None else tasks.split(","), out, workers, engine, progress,
+                address=address, resume=resume, episodes=episodes,
+            )  # fmt: skip
             _remove_page(out)  # of other results, where these were gone on with
             if page:
                 _write_page(result, out, workers, progress)
     except KeyboardInterrupt:
-        fail(f"interrupted; what was flown is kept in {out}: go on with --resume", INTERRUPTED)
+        fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
         return
     _told(result, out, as_json)
 
@@ -125,7 +126,7 @@ def _told(result: BenchmarkResult, out: Path, as_json: bool) -> None:
     console.print(f"\nwritten: {out}", soft_wrap=True)
     for name, about in result.summary["contestants"].items():
         for task, why in about["refused"].items():
-            warn(f"{name} did not fly {task}: {why}")
+            warn(f"{name} did not take part in {task}: {why}")
     for task, by_name in result.summary["tasks"].items():
         for name, found in by_name.items():
             if found["failed"]:
@@ -141,7 +142,7 @@ def _verify(path: Path, sample: int, tolerance: float | None, workers: int | Non
     from agents.cli.terminal import err, print_json
     from agents.cli.terminal import out as console
 
-    with err.status("flying a sample again"):
+    with err.status("running a sample again"):
         checks = verify(path, sample=sample, tolerance=tolerance, workers=workers)
     if as_json:
         print_json({"checks": [check.to_dict() for check in checks]})

@@ -70,8 +70,8 @@ def costs_table(result: BenchmarkResult) -> Table:
 
 
 def verification_table(checks: Sequence[Check]) -> Table:
-    """What was flown again."""
-    table = plain_table("Flown again")
+    """What was run again."""
+    table = plain_table("Run again")
     for heading in ("contestant", "task"):
         table.add_column(heading)
     for heading in ("episodes", "difference"):

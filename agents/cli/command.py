@@ -31,11 +31,11 @@ EnvironmentOptions = Annotated[
     typer.Option("--option", metavar="NAME=VALUE", help="Any other keyword of the environment; repeatable."),
 ]
 EngineName = Annotated[
-    str, typer.Option("--engine", help="Where jobs are done: local (this machine) or ray.")
+    str, typer.Option("--engine", help="Where jobs are done: local (this computer) or ray.")
 ]
 Workers = Annotated[int, typer.Option(min=1, help="Jobs done at once; the results do not depend on it.")]
 Address = Annotated[
-    str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this machine.")
+    str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this computer.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
 

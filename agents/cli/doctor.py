@@ -16,10 +16,13 @@ from rich.markup import escape
 import shipgym
 from shipgym.engine.compiled import CACHE_VARIABLE
 
-NEEDED = ("numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs")
+NEEDED = (
+    "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
+    "threadpoolctl", "safetensors", "jinja2", "joblib", "lazy-loader",
+)  # fmt: skip
 EXTRAS = {
     "report": ("plotly",),
-    "rl": ("torch", "stable-baselines3", "safetensors"),
+    "rl": ("torch", "stable-baselines3", "sb3-contrib"),
     "ray": ("ray",),
     "render": ("pygame-ce",),
 }
@@ -50,50 +53,36 @@ class Finding:
 
     def line(self) -> str:
         """One line for the terminal, with rich's markup."""
-        mark = {"fine": "[green]ok    [/]", "absent": "[dim]absent[/]", "wrong": "[bold red]wrong [/]"}[
-            self.state
-        ]
-        return f"{mark}  {self.what:<20} {escape(self.detail)}"
+        return f"{MARKS[self.state]}  {self.what:<20} {escape(self.detail)}"
 
 
 def examine_installation() -> list[Finding]:
     """Everything that `shipgym doctor` reports, in order."""
-    findings = [
-        Finding(
-            "shipgym",
-            "fine",
-            f"{shipgym.__version__}, Python {platform.python_version()}, {platform.platform()}",
-        )
+    system = f"{shipgym.__version__}, Python {platform.python_version()}, {platform.platform()}"
+    return [
+        Finding("shipgym", "fine", system),
+        *(_installed(name, (name,), "wrong", "shipgym") for name in NEEDED),
+        *(
+            _installed(f"extra {extra}", names, "absent", f"'shipgym[{extra}]'")
+            for extra, names in EXTRAS.items()
+        ),
+        cache_finding(),
+        *(name_finding(name) for name in OURS),
     ]
-    findings += [_needed(name) for name in NEEDED]
-    findings += [_extra(extra, names) for extra, names in EXTRAS.items()]
-    findings.append(cache_finding())
-    findings += [name_finding(name) for name in OURS]
-    return findings
 
 
-def _version(distribution: str) -> str | None:
-    try:
-        return importlib.metadata.version(distribution)
-    except importlib.metadata.PackageNotFoundError:
-        return None
-
-
-def _needed(name: str) -> Finding:
-    version = _version(name)
-    if version is None:
-        return Finding(name, "wrong", "not installed: pip install shipgym installs it")
-    return Finding(name, "fine", version)
-
-
-def _extra(extra: str, names: tuple[str, ...]) -> Finding:
-    versions = {name: _version(name) for name in names}
-    missing = [name for name, version in versions.items() if version is None]
+def _installed(what: str, names: tuple[str, ...], otherwise: str, remedy: str) -> Finding:
+    """Versions of distributions, or which of them are missing."""
+    versions, missing = [], []
+    for name in names:
+        try:
+            version = importlib.metadata.version(name)
+            versions.append(version if name == what else f"{name} {version}")
+        except importlib.metadata.PackageNotFoundError:
+            missing.append(name)
     if missing:
-        return Finding(f"extra {extra}", "absent", f"{', '.join(missing)}: pip install 'shipgym[{extra}]'")
-    return Finding(
-        f"extra {extra}", "fine", ", ".join(f"{name} {version}" for name, version in versions.items())
-    )
+        return Finding(what, otherwise, f"{', '.join(missing)} not installed: pip install {remedy}")
+    return Finding(what, "fine", ", ".join(versions))
 
 
 def cache_finding() -> Finding:

@@ -186,7 +186,7 @@ def reduce_command(
     from agents.identifying import reduce_ship
     from agents.output import check_folder, whole_folder
     from identification.result import FILES
-    from shipgym.json_file import write_json
+    from shipgym.files import write_json
 
     names = (*FILES, "reduction.json")
     check_folder(out, names)

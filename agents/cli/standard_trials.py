@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres import Criterion, IndexInterval, standard_manoeuvres
-from shipgym.manoeuvres.imo import judge_imo
+from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
+from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
 from shipgym.manoeuvres.spirals import Spiral
+from shipgym.manoeuvres.standard import families_of
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -23,6 +24,8 @@ class StandardTrials:
 
     Attributes
     ----------
+    families : dict of str to dict of str to Manoeuvre
+        The manoeuvres by family and name.
     sailed : dict of str to Trial or Spiral
         By manoeuvre, as simulated with the model itself.
     indices : dict of str to dict of str to IndexInterval
@@ -37,6 +40,7 @@ class StandardTrials:
         m.
     """
 
+    families: dict[str, dict[str, Manoeuvre]]
     sailed: dict[str, Trial | Spiral]
     indices: dict[str, dict[str, IndexInterval]]
     criteria: dict[str, Criterion]
@@ -92,22 +96,23 @@ def standard_trials(
     UnstableModelError
         If the ship itself runs away.
     """
-    manoeuvres = standard_manoeuvres(model, water_depth)
+    families = families_of(model, water_depth)
+    manoeuvres = {name: one for family in families.values() for name, one in family.items()}
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
     for name, manoeuvre in manoeuvres.items():
-        own[name] = manoeuvre.nothing
+        own[name] = manoeuvre.no_indices
         try:
             sailed[name] = manoeuvre.sail(model)
             own[name] = asdict(manoeuvre.indices(sailed[name]))
         except (InputError, ManoeuvreError) as error:
             refused[name] = str(error)
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
-    judged = {name: manoeuvre.judge for name, manoeuvre in manoeuvres.items()}
-    found = intervals_of(own, drawn, judged, progress)
-    criteria = judge_imo(model, found) if np.isinf(water_depth) else {}
-    return StandardTrials(sailed, found, criteria, refused, len(drawn), water_depth)
+    evaluated = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
+    found = intervals_of(own, drawn, evaluated, progress)
+    criteria = imo_criteria(model, found) if np.isinf(water_depth) else {}
+    return StandardTrials(families, sailed, found, criteria, refused, len(drawn), water_depth)
 
 
 def water_in_words(water_depth: float) -> str:

@@ -28,12 +28,15 @@ out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITH
 err = Console(stderr=True, highlight=False)
 
 
-def plain_table(title: str) -> Table:
-    """A table without lines, its title to the left."""
-    return Table(
+def plain_table(title: str, *headings: str) -> Table:
+    """A table without lines, its title to the left; a heading that begins with > is aligned right."""
+    table = Table(
         title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
         padding=(0, 2, 0, 0),
     )  # fmt: skip
+    for heading in headings:
+        table.add_column(heading.removeprefix(">"), justify="right" if heading.startswith(">") else "left")
+    return table
 
 
 def print_json(fields: Mapping[str, Any]) -> None:
@@ -147,11 +150,15 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
 def comparison_table(comparison: Comparison) -> Table:
     """Methods by how well they predict the trials held out, the best first."""
     held = "each trial in turn" if comparison.in_turn else "trials held out"
-    table = plain_table(f"Methods by how they predict {held}")
-    table.add_column("method")
-    table.add_column("model")
-    for heading in ("error by\nspread", "heading\ndeg", "yaw rate\ndeg/s", "ran away\ntrials"):
-        table.add_column(heading, justify="right")
+    headings = (
+        "method",
+        "model",
+        ">error by\nspread",
+        ">heading\ndeg",
+        ">yaw rate\ndeg/s",
+        ">ran away\ntrials",
+    )
+    table = plain_table(f"Methods by how they predict {held}", *headings)
     for standing in comparison.standings:
         table.add_row(
             standing.method,
@@ -181,13 +188,8 @@ def _indices(metrics: Mapping[str, Any]) -> str:
 def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water") -> Table:
     """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
     drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
-    table = plain_table(f"Manoeuvres from service speed in {water}")
-    table.add_column("manoeuvre")
-    table.add_column("index")
-    table.add_column("value", justify="right")
-    if drawn:
-        table.add_column("95 % interval", justify="right")
-        table.add_column("draws without value", justify="right")
+    more = (">95 % interval", ">draws without value") if drawn else ()
+    table = plain_table(f"Manoeuvres from service speed in {water}", "manoeuvre", "index", ">value", *more)
     for manoeuvre, indices in rows.items():
         for k, (name, index) in enumerate(indices.items()):
             cells = [manoeuvre if k == 0 else "", name, _number(index.value, 2)]
@@ -200,15 +202,11 @@ def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str 
 def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     """IMO criteria, with interval and probability of passing where there are models drawn."""
     drawn = any(criterion.share_passed is not None for criterion in criteria.values())
-    table = plain_table("IMO criteria, resolution MSC.137(76)")
-    table.add_column("criterion")
-    for heading in ("value", *(["95 % interval"] if drawn else []), "limit"):
-        table.add_column(heading, justify="right")
-    for heading in ("unit", "verdict"):
-        table.add_column(heading)
-    if drawn:
-        table.add_column("draws that pass", justify="right")
-    table.add_column("paragraph")
+    headings = (
+        "criterion", ">value", ">95 % interval", ">limit", "unit", "verdict", ">draws that pass", "paragraph"
+    )  # fmt: skip
+    shown = [one for one in headings if drawn or one not in (">95 % interval", ">draws that pass")]
+    table = plain_table("IMO criteria, resolution MSC.137(76)", *shown)
     for name, criterion in criteria.items():
         cells = [
             _number(criterion.value, 2),
@@ -237,27 +235,21 @@ def _interval(interval: tuple[float, float] | None) -> str:
 def ranking_table(result: AutopilotResult) -> Table:
     """Autopilots over the models drawn, the best first."""
     metrics = result.metrics
-    table = plain_table(f"Autopilots over {metrics['draws']['count']} models drawn, best first")
-    table.add_column("autopilot")
-    headings = (
-        "cost, mean", "cost, 95 %", "heading rmse, deg", "rudder, deg/min", "gain margin",
-        "phase margin, deg", "lost control",
+    table = plain_table(
+        f"Autopilots over {metrics['draws']['count']} models drawn, best first", "autopilot", ">cost, mean",
+        ">cost, 95 %", ">heading rmse, deg", ">rudder, deg/min", ">gain margin", ">phase margin, deg",
+        ">lost control",
     )  # fmt: skip
-    for heading in headings:
-        table.add_column(heading, justify="right")
     for name in metrics["ranking"]:
         found = metrics["controllers"][name]
         margins = found["margins"] or {}
-        table.add_row(
-            name.upper(),
-            _number(found["cost_mean"], 2),
-            _number(found["cost_quantile_95"], 2),
-            _number(found["heading_rmse_deg_mean"], 2),
-            _number(found["rudder_travel_deg_min_mean"], 1),
-            _margin(margins, "gain_margin", 2),
-            _margin(margins, "phase_margin_deg", 1),
-            str(found["lost_control"]),
-        )
+        columns = {
+            "cost_mean": 2, "cost_quantile_95": 2, "heading_rmse_deg_mean": 2,
+            "rudder_travel_deg_min_mean": 1,
+        }  # fmt: skip
+        figures = [_number(found[one], decimals) for one, decimals in columns.items()]
+        both = [_margin(margins, "gain_margin", 2), _margin(margins, "phase_margin_deg", 1)]
+        table.add_row(name.upper(), *figures, *both, str(found["lost_control"]))
     return table
 
 

@@ -50,7 +50,7 @@ def train_command(
     randomise: Annotated[
         bool | None,
         typer.Option(
-            "--randomise", help="Learn on ships drawn from the posterior, in all seas, at all speeds."
+            "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
         ),
     ] = None,
     threads: Annotated[int | None, typer.Option(min=1, help="Of torch and the ships; default: 1.")] = None,

@@ -49,7 +49,7 @@ def tune_command(
     randomise: Annotated[
         bool,
         typer.Option(
-            "--randomise", help="Learn on ships drawn from the posterior, in all seas, at all speeds."
+            "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
         ),
     ] = False,
     engine: EngineName = "local",
@@ -101,9 +101,8 @@ def _told(found: Tuning, out: Path, as_json: bool) -> None:
             }
         )
         return
-    table = plain_table("Trials by the mean cost of an episode held out, best first")
-    for heading in ("trial", "cost", "ended", "what was varied"):
-        table.add_column(heading, justify="right" if heading in ("trial", "cost") else "left")
+    title = "Trials by the mean cost of a held-out episode, best first"
+    table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
     for trial in sorted(found.trials, key=lambda one: (one.cost is None, one.cost or 0.0)):
         varied = ", ".join(f"{name} {_short(value)}" for name, value in trial.parameters.items())
         cost = "-" if trial.cost is None else f"{trial.cost:.3f}"

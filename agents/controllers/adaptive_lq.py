@@ -8,14 +8,14 @@ equivalence); van Amerongen 1982, Adaptive steering of ships; Song 2020, chapter
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
-from agents.controllers.batched_lq import lq_rows, sampled_ships
-from agents.controllers.linear_loop import SIGNALS, length_time
+from agents.controllers.batched_lq import lq_rows
+from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
@@ -55,7 +55,7 @@ class AdaptiveLQ(Stateful):
     """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
 
     It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
-    be linear are not learned from, nor is anything while the yaw rate trembles more than noise explains: in
+    be linear are not learned from, nor is anything while the yaw rate oscillates more than noise explains: in
     waves, unless they are filtered out. An estimate whose rudder effect is not believable, or whose gains
     would leave it or the model unstable, changes nothing.
 
@@ -102,10 +102,6 @@ class AdaptiveLQ(Stateful):
             Of sway speed and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`). The noisier, the
             longer the model is believed.
 
-        Returns
-        -------
-        AdaptiveLQ
-
         Raises
         ------
         InputError
@@ -117,40 +113,20 @@ class AdaptiveLQ(Stateful):
         if not has_sway(model):
             raise InputError(f"model: {model.name!r} has no sway, expected one with surge, sway and yaw")
         start = LQ.from_model(
-            model,
-            dt=dt,
-            integral_lengths=integral_lengths,
-            rudder_weight=rudder_weight,
+            model, dt=dt, integral_lengths=integral_lengths, rudder_weight=rudder_weight,
             rate_weight_s2=rate_weight_s2,
-        )
+        )  # fmt: skip
         interval, time = start.design["dt"], length_time(model)
-        length, speed = model.particulars["length"], straight_running(model).surge
-        deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
-        errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
-        return cls(
-            gains=start.gains,
-            neutral_rudder=start.neutral_rudder,
-            neutral_sway=start.neutral_sway,
-            margins=start.margins,
-            observation_scales=start.observation_scales,
-            model_name=start.model_name,
-            model_sha256=start.model_sha256,
-            design={
-                "dt": interval,
-                "integral_time": integral_lengths * time,
-                "rudder_weight": start.design["rudder_weight"],
-                "rate_weight_s2": start.design["rate_weight_s2"],
-                "length": length,
-                "speed": speed,
-                "sway_error": float(errors[0]),
-                "yaw_error": float(errors[1]),
-                "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
-                "gear_lag": model.steering.time_constant,
-                "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
-                "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
-            },
-            prior=prime_steering(model),
-        )
+        settings = {
+            "integral_time": integral_lengths * time,
+            "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
+            "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
+            "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
+        }
+        common = {one.name: getattr(start, one.name) for one in fields(start)}
+        design = start.design | _identification(model, interval, noise) | settings
+        design.pop("integral_lengths")
+        return cls(**common | {"design": design}, prior=prime_steering(model))
 
     @property
     def memory_size(self) -> int:
@@ -197,9 +173,9 @@ class AdaptiveLQ(Stateful):
     def _at_rest(self, kept: Floats, now: Floats, begins: Flags) -> Flags:
         """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
         change = np.where(begins, 0.0, now[:, 1] - kept[:, LAST][:, 1])
-        trembling = (change - kept[:, CHANGE]) ** 2
+        oscillation = (change - kept[:, CHANGE]) ** 2
         share = 1.0 / self.design["redesign_steps"]
-        kept[:, RESTLESS] += share * (trembling - kept[:, RESTLESS])
+        kept[:, RESTLESS] += share * (oscillation - kept[:, RESTLESS])
         kept[:, CHANGE] = change
         at_rest: Flags = kept[:, RESTLESS] < self.design["restless_limit"] ** 2
         return at_rest
@@ -254,7 +230,7 @@ class AdaptiveLQ(Stateful):
         chosen[:, COVARIANCE] = covariance.reshape(n, -1)
 
     def coefficients(self, state: Floats) -> Floats:
-        """Prime coefficients that are identified, of the state that `predict` hands back.
+        """Prime coefficients that are identified, of the state that `predict` returns.
 
         Parameters
         ----------
@@ -300,6 +276,20 @@ class AdaptiveLQ(Stateful):
         """The ship of the model, sampled."""
         linear = self.prior * units(self.design["length"], self.design["speed"])
         return sampled_ships(linear[None, :, :3], self.design["gear_lag"], self.design["dt"])
+
+
+def _identification(model: ShipModel, dt: float, noise: float) -> dict[str, float]:
+    """What identification needs to know of a ship: her scales, and errors of prime accelerations."""
+    length, speed = model.particulars["length"], straight_running(model).surge
+    deviation = np.sqrt(2.0) * noise / dt * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
+    errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
+    return {
+        "length": length,
+        "speed": speed,
+        "sway_error": float(errors[0]),
+        "yaw_error": float(errors[1]),
+        "gear_lag": model.steering.time_constant,
+    }
 
 
 def has_sway(model: ShipModel) -> bool:

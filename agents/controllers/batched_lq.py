@@ -10,52 +10,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER, SIGNALS, YAW_RATE
+from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER
 from shipgym.envs.task import RUDDER_WEIGHT
 
 Floats = NDArray[np.float64]
 
-N = len(SIGNALS)
 DOUBLINGS = 40  # each doubles the horizon
 ACCURACY = 1e-13
-
-
-def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
-    """Ships with their steering gear, the command held over a control interval (`sample_steering`).
-
-    Parameters
-    ----------
-    linear : array of shape (n, 2, 3)
-        d/dt (v, r) per sway, yaw rate and rudder, SI units.
-    lag : float
-        Of the steering gear, s; 0 for one that follows within the interval.
-    dt : float
-        Control interval, s.
-
-    Returns
-    -------
-    A : array of shape (n, 5, 5)
-    B : array of shape (n, 5)
-    """
-    from scipy.linalg import expm
-
-    n = RUDDER + 1
-    flow = np.zeros((len(linear), n + 1, n + 1))  # of state and command
-    flow[:, :ERROR, :ERROR] = linear[:, :, :ERROR]
-    flow[:, ERROR, YAW_RATE] = -1.0
-    if lag > 0.0:
-        flow[:, :ERROR, RUDDER] = linear[:, :, ERROR]
-        flow[:, RUDDER, RUDDER], flow[:, RUDDER, n] = -1.0 / lag, 1.0 / lag
-    else:
-        flow[:, :ERROR, n] = linear[:, :, ERROR]
-    held = expm(dt * flow)
-    A, B = np.zeros((len(linear), N, N)), np.zeros((len(linear), N))
-    A[:, :n, :n], B[:, :n] = held[:, :n, :n], held[:, :n, n]
-    if lag == 0.0:
-        A[:, RUDDER], B[:, RUDDER] = 0.0, 1.0
-    A[:, INTEGRAL] = dt * A[:, ERROR]
-    A[:, INTEGRAL, INTEGRAL], B[:, INTEGRAL] = 1.0, dt * B[:, ERROR]
-    return A, B
 
 
 def lq_rows(

@@ -1,4 +1,4 @@
-"""A conformance suite for controllers: what flights, benchmark and stable-baselines3's tools rely on."""
+"""A conformance suite for controllers: what rollouts, the benchmark and stable-baselines3's tools rely on."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def _answer(controller: Policy, seen: Any, state: Any, starts: Any, where: str) 
         if not np.array_equal(np.asarray(again), action):
             raise InputError(
                 f"{where}: asked again with {asked} it answers {np.asarray(again).ravel()} instead of "
-                f"{action.ravel()}; what it remembers belongs into the state that predict hands back, and "
+                f"{action.ravel()}; what it remembers belongs into the state that predict returns, and "
                 f"deterministic=True allows no chance"
             )
     if not np.array_equal(shown, seen):
@@ -149,5 +149,5 @@ def _check_same(found: Any, expected: Any, where: str) -> None:
     if not np.allclose(found, expected, rtol=0.0, atol=ROUNDING):
         raise InputError(
             f"{where}: {np.ravel(found)} found, expected {np.ravel(expected)} as otherwise; rows of a batch "
-            f"and episodes must not know of each other"
+            f"and episodes must be independent of each other"
         )

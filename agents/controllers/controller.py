@@ -27,7 +27,7 @@ from agents.controllers.linear_loop import (
 from agents.controllers.memory import checked_observation, heading_error
 from shipgym.envs.course_keeping_task import OBSERVATION_NAMES, observation_scales
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import ShipModel
 
 Floats = NDArray[np.float64]
@@ -239,10 +239,8 @@ class Controller:
         InputError
             Naming the first difference.
         """
-        n = len(self.observation_names)
-        check_names(names[:n], self.observation_names, where)
-        check_scales(
-            names[:n], scales[:n], self.observation_scales, where,
+        check_observed(
+            self, names, scales, where,
             f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
             f"rudder limit; design a controller on this model with {type(self).__name__}.from_model",
         )  # fmt: skip
@@ -293,14 +291,15 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
         )
 
 
-def check_scales(
-    names: Sequence[str], found: Sequence[float], expected: Sequence[float], where: str, meant: str
-) -> None:
-    """Refuse observations in other scales, naming the first difference; `meant` has {} for what is meant."""
-    for name, one, other in zip(names, found, expected, strict=True):
+def check_observed(agent: Any, names: Sequence[str], scales: Sequence[float], where: str, meant: str) -> None:
+    """Refuse observations that an agent was not made for; `meant` has {} for its own scale."""
+    n = len(agent.observation_names)
+    check_names(names[:n], agent.observation_names, where)
+    for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
         if abs(one - other) > SCALE_TOLERANCE * abs(other):
-            said = meant.replace("{}", f"{other:g}")
-            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
+            raise InputError(
+                f"{where}: the scale of '{name}' is {one:g}, but {meant.replace('{}', f'{other:g}')}"
+            )
 
 
 def model_hash(model: ShipModel) -> str:

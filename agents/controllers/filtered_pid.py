@@ -13,12 +13,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, sample_ship
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.pid import PID
 from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
-from shipgym.envs.task import control_interval
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 
@@ -60,7 +59,6 @@ class FilteredPID(Stateful):
         Parameters
         ----------
         model : ShipModel
-            Stable or unstable on its course.
         dt, frequency, damping, integral_lengths
             As in `PID.from_model`.
         reference_share : float
@@ -74,31 +72,22 @@ class FilteredPID(Stateful):
         wave_period : float, optional
             Of the first-order motion as it is met, s: heading and yaw rate go through a notch there.
 
-        Returns
-        -------
-        FilteredPID
-
         Raises
         ------
         InputError
             If the model has no straight course, an argument is out of its range, or the loop is unstable.
         """
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         plain = PID.from_model(
-            model, dt=interval, frequency=frequency, damping=damping, integral_lengths=integral_lengths
+            model, dt=dt, frequency=frequency, damping=damping, integral_lengths=integral_lengths
         )
-        share = 0.0 if np.isposinf(reference_share) else 1.0
-        if share:
-            share = check_number(reference_share, "reference_share", above=0.0)
-        tracking = 0.0
-        if not np.isposinf(tracking_lengths):
-            length_time = model.particulars["length"] / model.particulars["speed"]
-            tracking = 1.0 / (check_number(tracking_lengths, "tracking_lengths", above=0.0) * length_time)
-        turn_rate = 0.0  # none
+        interval = plain.design["dt"]
+        frequency_share = _rate(reference_share, "reference_share")
+        tracking = _rate(tracking_lengths, "tracking_lengths") and 1.0 / (
+            tracking_lengths * length_time(model)
+        )
+        turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
-            turn_rate = np.radians(
-                check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
-            )
+            turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
         if wave_period is not None:
             check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
         return cls.designed(
@@ -107,8 +96,8 @@ class FilteredPID(Stateful):
             gains=plain.gains,
             design={
                 **plain.design,
-                "reference_frequency": share * plain.design["frequency"],
-                "largest_turn_rate": float(turn_rate),
+                "reference_frequency": frequency_share * plain.design["frequency"],
+                "largest_turn_rate": float(np.radians(turn_rate)),
                 "tracking_rate": tracking,
                 "wave_frequency": 0.0 if wave_period is None else 2.0 * np.pi / wave_period,
             },
@@ -193,6 +182,11 @@ class FilteredPID(Stateful):
         B = np.vstack([b @ look, dt * d[:1] @ look])
         C = np.append(row @ c, gains["integral"])[None]
         return Compensator(A, B, C, (row @ d @ look)[None])
+
+
+def _rate(value: float, name: str) -> float:
+    """A positive number; 0 for an infinite one, which leaves its part out."""
+    return 0.0 if np.isposinf(value) else check_number(value, name, above=0.0)
 
 
 def notch_band(turn: float) -> tuple[float, float, float]:

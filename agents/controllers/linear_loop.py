@@ -129,50 +129,48 @@ def sample_ship(
         form = nomoto_of(steering, rudder)
         steering = np.diag([-1.0 / length_time(model), -1.0 / form.T])
         rudder = np.array([[0.0], [form.rudder_effect]])
-    return sample_steering(steering, rudder, model.steering.time_constant, dt, about)
+    linear = np.column_stack([steering, rudder])[None]
+    A, B = sampled_ships(linear, model.steering.time_constant, dt)
+    return SampledShip(A[0], B[0][:, None], dt, about)
 
 
-def sample_steering(
-    steering: Floats, rudder: Floats, lag: float, dt: float, about: StraightRunning
-) -> SampledShip:
-    """The same from linear steering dynamics.
+def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
+    """Ships with their steering gear, the command held over a control interval (zero-order hold).
 
     Parameters
     ----------
-    steering : array of shape (2, 2)
-    rudder : array of shape (2, 1)
-        d/dt (v, r) = steering (v, r) + rudder delta, SI units.
+    linear : array of shape (n, 2, 3)
+        d/dt (v, r) per sway, yaw rate and rudder, SI units.
     lag : float
-        Of the steering gear, s.
+        Of the steering gear, s; 0 for one that follows within the interval.
     dt : float
         Control interval, s.
-    about : StraightRunning
-        The state about which motions are small.
 
     Returns
     -------
-    SampledShip
+    A : array of shape (n, 5, 5)
+    B : array of shape (n, 5)
     """
-    import control  # here, because it takes a second to import
+    from scipy.linalg import expm
 
     n = RUDDER + 1
-    A, B = np.zeros((n, n)), np.zeros((n, 1))
-    A[:ERROR, :ERROR] = steering
-    A[ERROR, YAW_RATE] = -1.0
+    flow = np.zeros((len(linear), n + 1, n + 1))  # of state and command
+    flow[:, :ERROR, :ERROR] = linear[:, :, :ERROR]
+    flow[:, ERROR, YAW_RATE] = -1.0
     if lag > 0.0:
-        A[:ERROR, [RUDDER]] = rudder
-        A[RUDDER, RUDDER], B[RUDDER] = -1.0 / lag, 1.0 / lag
+        flow[:, :ERROR, RUDDER] = linear[:, :, ERROR]
+        flow[:, RUDDER, RUDDER], flow[:, RUDDER, n] = -1.0 / lag, 1.0 / lag
     else:
-        B[:ERROR] = rudder
-    held = control.sample_system(control.ss(A, B, np.eye(n), 0.0), dt, method="zoh")
-    sampled_A, sampled_B = np.zeros((n + 1, n + 1)), np.zeros((n + 1, 1))
-    sampled_A[:n, :n], sampled_B[:n] = held.A, held.B
+        flow[:, :ERROR, n] = linear[:, :, ERROR]
+    held = expm(dt * flow)
+    A, B = np.zeros((len(linear), n + 1, n + 1)), np.zeros((len(linear), n + 1))
+    A[:, :n, :n], B[:, :n] = held[:, :n, :n], held[:, :n, n]
     if lag == 0.0:
-        sampled_A[RUDDER], sampled_B[RUDDER] = 0.0, 1.0
+        A[:, RUDDER], B[:, RUDDER] = 0.0, 1.0
     # the environment adds each new error to the integral
-    sampled_A[INTEGRAL] = dt * sampled_A[ERROR]
-    sampled_A[INTEGRAL, INTEGRAL], sampled_B[INTEGRAL] = 1.0, dt * sampled_B[ERROR]
-    return SampledShip(sampled_A, sampled_B, dt, about)
+    A[:, INTEGRAL] = dt * A[:, ERROR]
+    A[:, INTEGRAL, INTEGRAL], B[:, INTEGRAL] = 1.0, dt * B[:, ERROR]
+    return A, B
 
 
 def feedback_row(feedback: Mapping[str, float]) -> Floats:
@@ -211,30 +209,6 @@ class Compensator:
             return whole
         kept = np.arange(len(whole)) != INTEGRAL
         return whole[np.ix_(kept, kept)]
-
-
-def loop_margins(ship: SampledShip, feedback: Mapping[str, float], name: str) -> Margins:
-    """Stability margins and bandwidth of order = sum of feedback times signal.
-
-    Parameters
-    ----------
-    ship : SampledShip
-    feedback : mapping of str to float
-        Rad of commanded rudder per unit of each signal of `SIGNALS`; absent ones are not fed back.
-    name : str
-        Of the design, for the message.
-
-    Returns
-    -------
-    Margins
-        From the frequency response of the sampled loop (`control.stability_margins`).
-
-    Raises
-    ------
-    InputError
-        If the closed loop is unstable.
-    """
-    return compensator_margins(ship, Compensator.static(feedback_row(feedback)), name)
 
 
 def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) -> Margins:

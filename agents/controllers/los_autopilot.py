@@ -80,10 +80,6 @@ class Guided(Controller):
             one ship length. By default 4 times `lookahead_lengths`, with which the way back to the path is
             critically damped; less swings, more is slower.
 
-        Returns
-        -------
-        LineOfSight, IntegralLineOfSight or AdaptiveLineOfSight
-
         Raises
         ------
         InputError

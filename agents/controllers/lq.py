@@ -72,10 +72,6 @@ class LQ(Controller):
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
 
-        Returns
-        -------
-        LQ
-
         Raises
         ------
         InputError

@@ -19,8 +19,10 @@ from agents.controllers.linear_loop import (
     SIGNALS,
     YAW_RATE,
     Compensator,
+    SampledShip,
     length_time,
     sample_ship,
+    sampled_ships,
 )
 from agents.controllers.lq import LQ, lq_gain, lq_settings
 from agents.controllers.memory import Flags, Floats, heading_error
@@ -44,8 +46,8 @@ class LQG(Stateful):
     """LQ feedback of estimated motions: a stationary Kalman filter on noisy heading and yaw rate.
 
     The measured sway speed is not used. The filter's states are sway, yaw rate and heading error and, where a
-    wave period is given, heading and rate of the first-order motion, which is not answered with rudder. It is
-    told the measured rudder, so limits of the steering gear do not mislead it. A jump of the
+    wave period is given, heading and rate of the first-order motion, which is not answered with rudder. Its
+    input is the measured rudder, so limits of the steering gear do not mislead it. A jump of the
     heading error that neither noise nor the ship can make is taken as a new course.
 
     Attributes
@@ -94,9 +96,7 @@ class LQG(Stateful):
         ----------
         model : ShipModel
             Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
-        integral_lengths, rudder_weight, rate_weight_s2
+        dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`.
         noise : float
             Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
@@ -104,7 +104,7 @@ class LQG(Stateful):
             How much the sea pushes the ship: standard deviation of a rudder angle, drawn anew each interval,
             that would do the same. More makes the filter trust what is measured.
         wave_period : float, optional
-            Of the first-order motion, s, as it is met; by default none is modelled.
+            Of the first-order motion, s, as it is met; by default it is not modelled.
         wave_heading_deg : float
             Standard deviation of the heading in it, degrees.
 
@@ -118,19 +118,14 @@ class LQG(Stateful):
         interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         ship = sample_ship(model, interval)
         gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
-        transition, effect = rudder_response(model, ship.about, interval)
-        push = np.radians(disturbance_deg) * effect
-        push[2] = np.hypot(push[2], COURSE_NOISE)
-        process, output = np.diag(push**2), np.eye(3)[list(OUTPUTS)]
+        push = np.radians(disturbance_deg)
+        transition, effect, process, output = _steering_in_sea(model, ship, push)
         if wave_period is not None:
             check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
-            check_number(wave_heading_deg, "wave_heading_deg", above=0.0)
-            motion, drive = wave_model(wave_period, np.radians(wave_heading_deg), interval)
-            transition, process = _beside(transition, motion), _beside(process, drive)
-            effect = np.append(effect, [0.0, 0.0])
-            output = np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]])
+            motion = wave_model(wave_period, np.radians(wave_heading_deg), interval)
+            transition, effect, process, output = _with_waves(transition, effect, process, output, motion)
         deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
-        kalman, spread = kalman_gain(transition, process, output, np.diag(deviation**2))
+        kalman, deviations = kalman_gain(transition, process, output, np.diag(deviation**2))
         return cls.designed(
             model,
             ship,
@@ -140,7 +135,7 @@ class LQG(Stateful):
                 "rate_weight_s2": weight,
                 "noise": float(noise),
                 "disturbance_deg": float(disturbance_deg),
-                "new_course_rad": max(NEW_COURSE, GATE * spread[1]),
+                "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
                 **({} if wave_period is None else {"wave_period": float(wave_period)}),
             },
             transition=transition,
@@ -196,6 +191,28 @@ class LQG(Stateful):
         )
 
 
+def _steering_in_sea(
+    model: ShipModel, ship: SampledShip, push: float
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """Transition, effect of the rudder, covariance of the sea's push (rad of rudder) and what is measured."""
+    transition, effect = rudder_response(model, ship.about, ship.dt)
+    pushed = push * effect
+    pushed[2] = np.hypot(pushed[2], COURSE_NOISE)
+    return transition, effect, np.diag(pushed**2), np.eye(3)[list(OUTPUTS)]
+
+
+def _with_waves(
+    transition: Floats, effect: Floats, process: Floats, output: Floats, waves: tuple[Floats, Floats]
+) -> tuple[Floats, Floats, Floats, Floats]:
+    """The same with heading and rate of the first-order motion as further states."""
+    return (
+        _beside(transition, waves[0]),
+        np.append(effect, [0.0, 0.0]),
+        _beside(process, waves[1]),
+        np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]]),
+    )
+
+
 def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:
     """Sway, yaw rate and heading error with the rudder held over an interval.
 
@@ -213,13 +230,8 @@ def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tupl
     effect : array of shape (3,)
         Of the rudder angle, per rad.
     """
-    import control  # here, because it takes a second to import
-
-    A, B = np.zeros((3, 3)), np.zeros((3, 1))
-    A[:2, :2], B[:2] = linearise(model, about)
-    A[2, 1] = -1.0
-    held = control.sample_system(control.ss(A, B, np.eye(3), 0.0), dt, method="zoh")
-    return np.asarray(held.A, dtype=np.float64), np.asarray(held.B, dtype=np.float64)[:, 0]
+    A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
+    return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
 
 
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
@@ -243,6 +255,7 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
     """
     from scipy.linalg import expm
 
+    check_number(deviation, "wave_heading_deg", above=0.0)
     frequency = 2.0 * np.pi / period
     motion = np.array([[0.0, 1.0], [-(frequency**2), -2.0 * WAVE_DAMPING * frequency]])
     transition: Floats = np.asarray(expm(motion * dt), dtype=np.float64)

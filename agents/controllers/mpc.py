@@ -100,10 +100,6 @@ class MPC(Stateful):
             Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
             (`linear_loop.rate_weight`), because LQ does not know that the gear is slow.
 
-        Returns
-        -------
-        MPC
-
         Raises
         ------
         InputError

@@ -58,7 +58,6 @@ class PID(Controller):
         Parameters
         ----------
         model : ShipModel
-            Stable or unstable on its course.
         dt : float, optional
             Control interval, s; by default that of the environment.
         frequency : float, optional
@@ -67,10 +66,6 @@ class PID(Controller):
             Its damping ratio.
         integral_lengths : float
             Time for an offset to decay, in times to travel one ship length.
-
-        Returns
-        -------
-        PID
 
         Raises
         ------
@@ -87,13 +82,11 @@ class PID(Controller):
         wanted, ratio = optimal_poles(response, rate_weight(model))
         if damping is not None:
             ratio = check_number(damping, "damping", above=0.0)
+        # the gear's pole must stay no slower than the pair
+        largest = (1.0 / lag + 1.0 / response.T - slow) / (2.0 * ratio + 1.0)
+        wanted = min(FREQUENCY_SHARE * wanted, largest)
         if frequency is not None:
             wanted = check_number(frequency, "frequency", above=0.0)
-        else:
-            # the gear's pole must stay no slower than the pair
-            wanted = min(
-                FREQUENCY_SHARE * wanted, (1.0 / lag + 1.0 / response.T - slow) / (2.0 * ratio + 1.0)
-            )
         return cls.designed(
             model,
             ship,

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class MarginSpread:
+class MarginUncertainty:
     """Margins and bandwidth of one controller on many ships.
 
     Attributes
@@ -51,7 +51,7 @@ class MarginSpread:
         }
 
 
-def margin_spread(controller: Controller, models: Sequence[ShipModel]) -> MarginSpread:
+def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> MarginUncertainty:
     """Margins of a linear controller on each of many ships.
 
     Parameters
@@ -59,11 +59,11 @@ def margin_spread(controller: Controller, models: Sequence[ShipModel]) -> Margin
     controller : Controller
         A linear one; of a scheduled or adaptive one the design at service speed, of MPC without limits.
     models : sequence of ShipModel
-        For example `model.sample(100, seed)`: the identified posterior.
+        For example `model.sample(100, seed)`, drawn from the estimated covariance.
 
     Returns
     -------
-    MarginSpread
+    MarginUncertainty
 
     Raises
     ------
@@ -81,4 +81,7 @@ def margin_spread(controller: Controller, models: Sequence[ShipModel]) -> Margin
             continue
         row[:] = [getattr(found, name) for name in names]
     by_name = dict(zip(names, table.T.copy(), strict=True))
-    return MarginSpread(controller.margins, by_name, ~np.isnan(table[:, 0]))
+    return MarginUncertainty(controller.margins, by_name, ~np.isnan(table[:, 0]))
+
+
+margin_spread = margin_uncertainty  # its older name

@@ -72,9 +72,7 @@ class ScheduledLQ(Stateful):
         ----------
         model : ShipModel
             Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
-        integral_lengths, rudder_weight, rate_weight_s2
+        dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`, at each speed.
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the

@@ -32,7 +32,7 @@ from shipgym.errors import InputError
 
 __all__ = ["JobError", "JobProgress", "WorkerDiedError", "check_engine", "run_jobs"]
 
-#: Told the number of jobs done and their total.
+#: Called with the number of jobs done and their total.
 JobProgress = Callable[[int, int], None]
 
 ENGINES = ("local", "ray")
@@ -70,7 +70,7 @@ def run_jobs(
     retries : int
         How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
     progress : callable, optional
-        Told the number of jobs done and their total.
+        Called with the number of jobs done and their total.
 
     Returns
     -------
@@ -80,12 +80,9 @@ def run_jobs(
     Raises
     ------
     InputError
-        For wrong arguments; for a cluster that does not answer; or, naming the job, if it says that its
-        input is wrong.
-    JobError
-        Naming the job, if it raises anything else.
-    WorkerDiedError
-        Naming the job, if its worker dies more often than `retries`.
+        For wrong arguments, a cluster that does not answer, or wrong input that a job reports.
+    JobError, WorkerDiedError
+        Naming the job, if it raises anything else, or its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
     check_whole(retries, "retries", at_least=0)
@@ -93,21 +90,16 @@ def run_jobs(
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
-    found: dict[str, dict[str, Any]] = {}
-    if kept is not None:
-        found = {text: packed for text in copies if (packed := kept.load(text)) is not None}
+    found = {} if kept is None else kept.load_all(copies)
 
-    def tell() -> None:
-        if progress is not None:
-            progress(sum(copies[text] for text in found), len(texts))
-
-    tell()
+    tell = progress or (lambda done, total: None)
+    tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]
     for text, outcome in _outcomes(function, pending, engine, workers, address, retries):
         found[text] = check_outcome(outcome, f"job {texts.index(text)} {shortened(text)}")
         if kept is not None:
             kept.save(text, outcome)
-        tell()
+        tell(sum(copies[text] for text in found), len(texts))
     return [unpack(found[text]["value"]) for text in texts]
 
 

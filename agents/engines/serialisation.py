@@ -10,7 +10,7 @@ import base64
 import hashlib
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ import numpy as np
 
 import shipgym
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
 LONGEST_IN_MESSAGE = 200  # characters
@@ -111,6 +111,10 @@ class KeptResults:
         self.function = f"{function.__module__}.{function.__qualname__}"
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"{folder}: is not a folder, expected one for results; choose another")
+
+    def load_all(self, texts: Iterable[str]) -> dict[str, dict[str, Any]]:
+        """The packed results that are there, by job."""
+        return {text: packed for text in texts if (packed := self.load(text)) is not None}
 
     def load(self, text: str) -> dict[str, Any] | None:
         """The packed result of a job, None where there is none yet or its file is broken."""

@@ -2,8 +2,8 @@
 
 Inputs, with a free first axis:
 
-    observations   float32 (batch, history * n_observations): oldest first, the newest last, in the scales of
-                   the metadata; where an episode begins the first observation fills the history
+    observations   float32 (batch, frame_stack * n_observations): oldest first, the newest last, in the
+                   scales of the metadata; where an episode begins the first observation fills the stack
     base_action    float32 (batch, 1): the base controller's command, part of the rudder limit; only if the
                    policy adds to one, which stands in the metadata as in `agents.controllers.controller_file`
 
@@ -12,9 +12,10 @@ Output:
     action         float32 (batch, n_commands): parts of the limits in [-1, 1]; of discrete orders the order
     part           float32 (batch, 1): what is added to the base's command, if there is a base
 
-Metadata, as JSON: observation_names, observation_scales, history, action, authority, hold, base, environment,
-model. With `hold` above 1 the graph decides at every `hold`-th control interval; between them the action
-stays, or, with a base, is `base_action + part`, limited to [-1, 1], with the part of the last decision.
+Metadata, as JSON: observation_names, observation_scales, frame_stack, action, authority, action_repeat, base,
+environment, model; `history` and `hold` are older names of frame_stack and action_repeat. With action_repeat
+above 1 the graph decides once in so many control intervals; in between the action stays, or, with a base, is
+`base_action + part`, limited to [-1, 1], with the part of the last decision.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ import numpy as np
 from agents.policies.policy import ORDERS, LearnedPolicy
 from agents.policies.weights_file import as_json
 from shipgym.errors import InputError
-from shipgym.whole_file import write_bytes
+from shipgym.files import write_bytes
 
 OPSET, IR_VERSION = 17, 8  # of 2022: what runs on ships is not of this year
 OPERATORS = {"relu": "Relu", "tanh": "Tanh"}
@@ -40,13 +41,13 @@ def export_onnx(policy: Any, path: str | Path) -> None:
     Parameters
     ----------
     policy : LearnedPolicy
-        With a history or a base too: see the inputs above.
+        With a frame stack or a base too: see the inputs above.
     path : str or Path
 
     Raises
     ------
     InputError
-        For what is no learned policy, if the file cannot be written, or onnx is not installed.
+        If it is not a learned policy, if the file cannot be written, or onnx is not installed.
     """
     write_bytes(onnx_model(policy).SerializeToString(), Path(path))
 
@@ -65,7 +66,7 @@ def onnx_model(policy: Any) -> Any:
     except ImportError:
         raise InputError("onnx is not installed, the export needs it: pip install 'shipgym[onnx]'") from None
     real = onnx.TensorProto.FLOAT
-    width = policy.history * len(policy.observation_names)
+    width = policy.frame_stack * len(policy.observation_names)
     inputs = [helper.make_tensor_value_info("observations", real, ["batch", width])]
     if policy.base is not None:
         inputs.append(helper.make_tensor_value_info("base_action", real, ["batch", 1]))
@@ -127,10 +128,12 @@ def _metadata(policy: LearnedPolicy) -> dict[str, str]:
     values = {
         "observation_names": list(policy.observation_names),
         "observation_scales": list(policy.observation_scales),
-        "history": policy.history,
+        "frame_stack": policy.frame_stack,
         "action": policy.action,
         "authority": policy.authority,
-        "hold": policy.hold,
+        "action_repeat": policy.action_repeat,
+        "history": policy.frame_stack,
+        "hold": policy.action_repeat,
         "base": None if policy.base is None else policy.base.to_dict(),
         "environment": {"id": policy.env_id, "options": as_json(policy.env_options)},
         "model": {"name": policy.model_name, "sha256": policy.model_sha256},

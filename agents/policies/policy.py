@@ -1,10 +1,10 @@
 """Learned policies: what reinforcement learning found, run in NumPy.
 
-A policy is a network on `[observation(t - history + 1), ..., observation(t), base action(t)]`, its
+A policy is a network on `[observation(t - frame_stack + 1), ..., observation(t), base action(t)]`, its
 observations in the scales of the environment; the base's action only if there is a base. Where an episode
-begins, the first observation fills the history. Without a base the network's output, limited to [-1, 1], is
-the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning. The
-output is held for `hold` control intervals, while the base goes on with its feedback.
+begins, the first observation fills the frame stack. Without a base the network's output, limited to [-1, 1],
+is the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning. The
+output is repeated for `action_repeat` control intervals, while the base goes on with its feedback.
 
 Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
 al. 2019, Residual reinforcement learning for robot control, ICRA.
@@ -20,7 +20,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Controller, check_names, check_scales
+from agents.controllers.controller import FORMAT, Action, Controller, check_observed
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
 from agents.policies.policy_extraction import sb3_fields
@@ -43,22 +43,22 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy with a history, a base or outputs that it holds remembers.
+    """What a policy with a frame stack, a base or an action repeat remembers.
 
     Attributes
     ----------
-    seen : float32 array of shape (n, history - 1, n_observations)
+    seen : float32 array of shape (n, frame_stack - 1, n_observations)
         Past observations, oldest first; for a single observation without the first axis.
     base : Any
         State of the base.
-    held : float32 array of shape (n, 1 + n_outputs)
+    repeated : float32 array of shape (n, 1 + n_outputs)
         Control intervals until the next decision, and the network's outputs of the last one; for a single
         observation without the first axis.
     """
 
     seen: Numbers
     base: Any
-    held: Numbers
+    repeated: Numbers
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +75,13 @@ class LearnedPolicy:
         Physical value of each observation of 1, SI units.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What it commands. Of discrete orders that with the largest output is taken.
-    history : int
+    frame_stack : int
         Number of observations the network sees, the newest last.
     base : Controller or None
         Whose rudder the network adds to.
     authority : float
         Share of the rudder limit by which it may differ from the base; 1 without a base.
-    hold : int
+    action_repeat : int
         Control intervals for which an output of the network holds.
     env_id : str
         Environment that it learned in.
@@ -102,10 +102,10 @@ class LearnedPolicy:
     observation_names: tuple[str, ...]
     observation_scales: tuple[float, ...]
     action: str = "rudder"
-    history: int = 1
+    frame_stack: int = 1
     base: Controller | None = None
     authority: float = 1.0
-    hold: int = 1
+    action_repeat: int = 1
     env_id: str = "shipgym/CourseKeeping-v0"
     env_options: Mapping[str, Any] = field(default_factory=dict)
     model_name: str = "unknown"
@@ -114,8 +114,8 @@ class LearnedPolicy:
 
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")
-        check_whole(self.history, "history", at_least=1)
-        check_whole(self.hold, "hold", at_least=1)
+        check_whole(self.frame_stack, "frame_stack", at_least=1)
+        check_whole(self.action_repeat, "action_repeat", at_least=1)
         check_number(self.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
         n = len(self.observation_names)
         if len(self.observation_scales) != n:
@@ -128,29 +128,18 @@ class LearnedPolicy:
             if self.action != "rudder":
                 raise InputError(f"action: '{self.action}' found beside a base, expected 'rudder'")
             self.base.check_fits(self.observation_names, self.observation_scales, "base")
-        n_in = self.history * n + (self.base is not None)
+        n_in = self.frame_stack * n + (self.base is not None)
         _check_size(
-            "inputs", self.network.sizes[0], n_in, f"{self.history} x {n} observations and the base's"
+            "inputs", self.network.sizes[0], n_in, f"{self.frame_stack} x {n} observations and the base's"
         )
         _check_size("outputs", self.network.sizes[-1], OUTPUTS[self.action], f"for action '{self.action}'")
 
     @classmethod
     def from_sb3(cls, agent: Any, env: Any = None, training: Mapping[str, Any] | None = None) -> Self:
-        """The policy of a trained agent of stable-baselines3 (see `agents.policies.policy_extraction`).
+        """The policy of a trained agent of stable-baselines3.
 
-        Parameters
-        ----------
-        agent : BaseAlgorithm
-            PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy".
-        env : VecEnv, optional
-            The environment that it learned in, with its wrappers; by default the agent's own.
-        training : dict, optional
-            How it was made.
-
-        Raises
-        ------
-        InputError
-            For an agent or a wrapper that cannot be written as such a policy.
+        Arguments and errors as in `agents.policies.policy_extraction.sb3_fields`; `training` is a record of
+        how it was made.
         """
         return cls(**sb3_fields(agent, env), training=dict(training or {}))
 
@@ -172,12 +161,12 @@ class LearnedPolicy:
         """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
 
         Of discrete orders the order itself is returned, not its number (`order_numbers` gives it). The state
-        is a `Memory` if there is a history or a base, or outputs last, else as given.
+        is a `Memory` if there is a frame stack, a base or an action repeat, else as given.
         """
         n = len(self.observation_names)
         given = checked_observation(observation, self.observation_names, np.float32)
         rows = given.reshape(-1, given.shape[-1])
-        if self.history == 1 and self.base is None and self.hold == 1:
+        if self.frame_stack == 1 and self.base is None and self.action_repeat == 1:
             action = self.commands(self.network(rows[:, :n]), None)
             return action.reshape(*given.shape[:-1], -1), state
         seen, inner, held = self._recalled(state, episode_start, rows[:, :n], given.ndim)
@@ -194,15 +183,17 @@ class LearnedPolicy:
         return action.reshape(*given.shape[:-1], -1), memory
 
     def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
-        """Outputs that hold now: new ones of the ships whose last decision is over, or was none."""
-        due = (held[:, 0] <= 0.0) | ~np.isfinite(held).all(axis=1)  # what was no number is not held
+        """Outputs in use: new ones of the ships whose last decision is over, or was not a number."""
+        due = (held[:, 0] <= 0.0) | ~np.isfinite(held).all(axis=1)
         now = held if not due.any() else np.where(due[:, None], self._outputs(inputs), held)
         now[:, 0] -= 1.0
         return now
 
     def _outputs(self, inputs: Numbers) -> Numbers:
-        """The network's outputs, behind the control intervals for which they hold."""
-        return np.column_stack([np.full(len(inputs), self.hold, dtype=np.float32), self.network(inputs)])
+        """The network's outputs, behind the control intervals for which they are repeated."""
+        return np.column_stack(
+            [np.full(len(inputs), self.action_repeat, dtype=np.float32), self.network(inputs)]
+        )
 
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
@@ -215,7 +206,7 @@ class LearnedPolicy:
 
     def _recalled(self, state: Any, starts: Any, rows: Numbers, ndim: int) -> tuple[Numbers, Any, Numbers]:
         """What each ship remembers, as in `Memory`; where an episode begins, the present fills the past."""
-        past, n = self.history - 1, len(rows)
+        past, n = self.frame_stack - 1, len(rows)
         present = np.repeat(rows[:, None], past, axis=1)
         nothing = np.zeros((n, 1 + OUTPUTS[self.action]), dtype=np.float32)
         if state is None:
@@ -235,24 +226,10 @@ class LearnedPolicy:
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse what shows other quantities first, or in other scales, than those it learned with.
 
-        Parameters
-        ----------
-        names : sequence of str
-            `observation_names` of an environment; it may show more after what the policy observes.
-        scales : sequence of float
-            Its `observation_scales`.
-        where : str
-            Start of the message.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
+        Arguments and errors as in `Controller.check_fits`.
         """
-        n = len(self.observation_names)
-        check_names(names[:n], self.observation_names, where)
-        check_scales(
-            names[:n], scales[:n], self.observation_scales, where,
+        check_observed(
+            self, names, scales, where,
             f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
             f"ship or task; train one in this environment",
         )  # fmt: skip
@@ -291,10 +268,10 @@ class LearnedPolicy:
             "network": {
                 "activation": network.activation, "output": network.output, "sizes": list(network.sizes)
             },
-            "history": self.history,
+            "frame_stack": self.frame_stack,
             "base": None if self.base is None else self.base.to_dict(),
             "authority": self.authority,
-            "hold": self.hold,
+            "action_repeat": self.action_repeat,
             "environment": {"id": self.env_id, "options": as_json(self.env_options)},
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "training": as_json(self.training),

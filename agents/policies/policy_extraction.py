@@ -80,21 +80,21 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
         if name in REFUSED or isinstance(wrapper, gymnasium.ObservationWrapper | gymnasium.ActionWrapper):
             raise InputError(
                 f"env: wrapper {name} found, expected none that changes observations or actions but "
-                f"ResidualVecEnv, whose history shows past ones"
+                f"ResidualVecEnv, whose frame_stack shows past ones"
             )
 
 
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """History, base and authority of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if all(name in vars(wrapper) for name in ("base", "authority", "history", "hold")):
+        if all(name in vars(wrapper) for name in ("base", "authority", "frame_stack", "action_repeat")):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 raise InputError(
                     f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
                     "hold"
                 )
-            numbers = {"history": int(wrapper.history), "hold": int(wrapper.hold)}
+            numbers = {"frame_stack": int(wrapper.frame_stack), "action_repeat": int(wrapper.action_repeat)}
             return {"base": base, "authority": float(wrapper.authority), **numbers}
     return {}
 

@@ -9,10 +9,10 @@ They are written by `agents.policies.weights_file`. Format 1 of kind "learned":
     action               "rudder", "rudder-discrete" or "rudder-shaft"
     network              {"activation": "relu" or "tanh", "output": "linear" or "tanh", "sizes": inputs, then
                          outputs of each layer}; weights by the names layers.0.weight, layers.0.bias, ...
-    history              number of observations the network sees, the newest last
+    frame_stack          number of observations the network sees, the newest last
     base                 null or a classical controller (see `controller_file.py`), whose rudder it adds to
     authority            share of the rudder limit by which it may differ from the base
-    hold                 control intervals for which an output of the network holds
+    action_repeat        control intervals for which an output of the network is repeated
     environment          {"id", "options"}: where it learned
     model                {"name", "sha256"}: the model it learned on
     training             how it was made: any JSON
@@ -53,10 +53,11 @@ from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 
 LEARNED = (
-    "format", "kind", "observation_names", "observation_scales", "action", "network", "history", "base",
-    "authority", "hold", "environment", "model", "training",
+    "format", "kind", "observation_names", "observation_scales", "action", "network", "frame_stack", "base",
+    "authority", "action_repeat", "environment", "model", "training",
 )  # fmt: skip
-LATER = {"hold": 1}  # what older files lack, and what it means
+LATER = {"action_repeat": 1}  # what older files lack, and what it means
+RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
 
@@ -70,6 +71,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
     """
     where = str(path)
     learned = content["kind"] == "learned"
+    content = _current(content)
     _check_fields(content, (*(LEARNED if learned else SHIELDED), "weights"), where)
     tensors: Tensors = {}
     if content["weights"] is not None:
@@ -84,6 +86,11 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
             f"{weights_path(path)}: unknown {quoted(tensors)} found beside the weights; {REMEDY}"
         )
     return agent
+
+
+def _current(content: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields by their present names."""
+    return {RENAMED.get(name, name): value for name, value in content.items()}
 
 
 def _check_fields(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
@@ -111,10 +118,10 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             observation_names=names,
             observation_scales=read_scales(content["observation_scales"], names, where),
             action=content["action"],
-            history=content["history"],
+            frame_stack=content["frame_stack"],
             base=None if base is None else read_controller(_table(base, "base", where), f"{where}: base"),
             authority=content["authority"],
-            hold=content.get("hold", LATER["hold"]),
+            action_repeat=content.get("action_repeat", LATER["action_repeat"]),
             env_id=place["id"],
             env_options=dict(check_table(place.get("options"), f"{where}: environment.options")),
             model_name=model["name"],
@@ -128,7 +135,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
 def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> Shielded:
     """A shielded policy; its weights are taken out of `tensors`."""
     _check_fields(content, SHIELDED, where)
-    inner, at = _table(content["policy"], "policy", where), f"{where}: policy"
+    inner, at = _current(_table(content["policy"], "policy", where)), f"{where}: policy"
     policy: Any
     if inner.get("kind") == "learned":
         policy = _learned(inner, tensors, f"{prefix}policy.", at)

@@ -8,7 +8,7 @@ It looks at observations alone and takes over
 * where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
   towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
   count, however large;
-* where the policy's command is no number.
+* where the policy's command is not a number.
 
 It hands back after the ship has been within `Limits.back_deg` of her course and within
 `Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
@@ -115,7 +115,7 @@ class Interventions:
 
 
 def interventions(state: ShieldState) -> Interventions:
-    """Read from the state that `Shielded.predict` handed back how often and how long the fallback steered."""
+    """Read from the state that `Shielded.predict` returned how often and how long the fallback steered."""
     watch = state.watch
     count, intervals = watch[..., COUNT].astype(np.int64), watch[..., INTERVALS].astype(np.int64)
     return Interventions(count, intervals, watch[..., STEERED] > 0.0)

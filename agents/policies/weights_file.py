@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_bytes, write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
-from shipgym.whole_file import write_bytes
 
 Tensors = dict[str, NDArray[Any]]
 

@@ -10,8 +10,8 @@ from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
+from shipgym.files import write_text
 from shipgym.pages import render
-from shipgym.whole_file import write_text
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from agents.suites.suite import N_EPISODES, BenchmarkTask, suite_file
 from shipgym.checks import check_number, check_table
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
+from shipgym.files import read_json
 
 REMEDY = "take another copy"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from agents.training.settings import (
     RUNNING,
     OffPolicySettings,
     PPOSettings,
-    SACSettings,
     Settings,
     TD3Settings,
     TQCSettings,
@@ -31,18 +31,11 @@ from shipgym.kernels import layout
 from shipgym.kernels import voyage_rows as rows
 
 ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
-#: Settings that go to the algorithms by their own names, and those that go by others.
-SHARED = ("batch_size", "gamma")
-OF_PPO = ("n_steps", "n_epochs", "gae_lambda", "clip_range", "ent_coef", "vf_coef", "max_grad_norm")
-OF_STORE = ("buffer_size", "learning_starts", "train_freq", "gradient_steps", "tau")
-OF_SAC = (*OF_STORE, "ent_coef", "target_entropy")
-OF_TD3 = (*OF_STORE, "policy_delay", "target_policy_noise", "target_noise_clip")
-_OWN: dict[type[Settings], tuple[str, ...]] = {
-    PPOSettings: OF_PPO,
-    SACSettings: OF_SAC,
-    TQCSettings: OF_SAC,
-    TD3Settings: OF_TD3,
-}
+#: Settings that do not go to the algorithms' classes as keywords of the same name.
+_ELSEWHERE = {item.name for item in fields(Settings)} - {"batch_size", "gamma"} | {
+    "log_std_init", "log_std_end", "critic_arch", "action_noise", "n_critics", "n_quantiles",
+    "top_quantiles_to_drop",
+}  # fmt: skip
 
 
 class StaggeredShips(ShipVecEnv):
@@ -73,9 +66,13 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
         **training_options(plan),
     )
     settings = plan.settings
-    if base is not None or settings.history > 1 or settings.hold > 1:
+    if base is not None or settings.frame_stack > 1 or settings.action_repeat > 1:
         ships = ResidualVecEnv(
-            ships, base, authority=settings.authority, history=settings.history, hold=settings.hold
+            ships,
+            base,
+            authority=settings.authority,
+            frame_stack=settings.frame_stack,
+            action_repeat=settings.action_repeat,
         )
     return scaled_rewards(ships, settings)
 
@@ -132,7 +129,9 @@ def sb3_arguments(settings: Settings, action_shape: tuple[int, ...] = (1,)) -> d
     action_shape : tuple of int
         Of one ship's actions.
     """
-    arguments = {name: getattr(settings, name) for name in (*SHARED, *_OWN[type(settings)])}
+    arguments = {
+        one.name: getattr(settings, one.name) for one in fields(settings) if one.name not in _ELSEWHERE
+    }
     network: dict[str, Any] = {
         "net_arch": list(settings.net_arch),
         "activation_fn": ACTIVATIONS[settings.activation],

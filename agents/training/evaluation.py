@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Episodes of a task that nobody learns from, and what LQ costs on them.
+    """Episodes of a task that are not learned from, and what LQ costs on them.
 
     Attributes
     ----------

@@ -78,9 +78,10 @@ class Plan:
             raise InputError(f"ships: {self.settings.ships} found, expected at most {SEEDS_EACH}")
         check_whole(self.threads, "threads", at_least=1)
         longest = self.task.task.episode_steps
-        if self.settings.hold > longest:
+        if self.settings.action_repeat > longest:
             raise InputError(
-                f"hold: {self.settings.hold} found, expected at most an episode's {longest} steps"
+                f"action_repeat: {self.settings.action_repeat} found, expected at most an episode's "
+                f"{longest} steps"
             )
         self._check_action()
         self.task.task.check_fits(self.task.ship)
@@ -101,7 +102,7 @@ class Plan:
         return SEEDS_EACH * self.seed
 
     def configuration(self) -> dict[str, Any]:
-        """All that decides what is learned, ready for JSON; threads are told beside it."""
+        """All that decides what is learned, ready for JSON; threads are stored beside it."""
         return {
             "algorithm": self.algorithm,
             "task": self.task.name,
@@ -116,7 +117,7 @@ class Plan:
 
     @classmethod
     def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Plan:
-        """The run that `configuration` tells of."""
+        """The run that `configuration` describes."""
         options = {name: _read(value, name) for name, value in content["options"].items()}
         task = BenchmarkTask(content["task"], content["environment"], content["model"], "", options)
         settings = make_settings(content["algorithm"], content["settings"])

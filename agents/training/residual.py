@@ -2,7 +2,7 @@
 
 The network acts on what `LearnedPolicy` gives it when it steers: the last observations, oldest
 first, then the base controller's action. The rudder is that action and the network's part of it, which may
-be held for several control intervals while the base goes on with its feedback.
+be repeated for several control intervals while the base goes on with its feedback.
 
 Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
 al. 2019, Residual reinforcement learning for robot control, ICRA.
@@ -36,11 +36,11 @@ Flags = NDArray[np.bool_]
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships steered by a base controller to which an agent adds; the agent remembers observations.
 
-    The agent sees `[observation(t - history + 1), ..., observation(t), base action(t)]`; where an episode
-    begins the first observation fills the history. What is done is
-    `clip(base action + authority * clip(output, -1, 1), -1, 1)`, for `hold` control intervals with the same
-    output. A step is these intervals, its reward their sum. Where an episode ends among them, the rest of the
-    step belongs to nobody: the next episode begins with the base alone, or with the output if there is none.
+    The agent sees `[observation(t - frame_stack + 1), ..., observation(t), base action(t)]`; where an episode
+    begins the first observation fills the stack. The command is
+    `clip(base action + authority * clip(output, -1, 1), -1, 1)`, with the same output for `action_repeat`
+    control intervals. A step is these intervals, its reward their sum. Where an episode ends among them, the
+    rest of the step is not counted: the next episode begins with the base alone (without base: the output).
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     authority : float
         Share of the action's range by which the agent may differ from the base, above 0, at most 2; without a
         base it has to be 1.
-    history : int
+    frame_stack : int
         Number of observations that are shown, the newest last.
-    hold : int
+    action_repeat : int
         Control intervals of a step.
 
     Raises
@@ -70,14 +70,14 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         base: Policy | None = None,
         *,
         authority: float = 1.0,
-        history: int = 1,
-        hold: int = 1,
+        frame_stack: int = 1,
+        action_repeat: int = 1,
     ) -> None:
         self.base = base
         self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
-        self.history = check_whole(history, "history", at_least=1)
-        self.hold = check_whole(hold, "hold", at_least=1)
-        low, high = (np.tile(bound, self.history) for bound in _bounds(venv))
+        self.frame_stack = check_whole(frame_stack, "frame_stack", at_least=1)
+        self.action_repeat = check_whole(action_repeat, "action_repeat", at_least=1)
+        low, high = (np.tile(bound, self.frame_stack) for bound in _bounds(venv))
         if base is None:
             if self.authority != 1.0:
                 raise InputError(f"authority: {authority:g} found without a base, expected 1, or a base")
@@ -85,7 +85,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             _check_base(venv, base)
             low, high = np.append(low, venv.action_space.low), np.append(high, venv.action_space.high)
         super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
-        self._past = np.zeros((venv.num_envs, self.history, *venv.observation_space.shape), np.float32)
+        self._past = np.zeros((venv.num_envs, self.frame_stack, *venv.observation_space.shape), np.float32)
         self._state: Any = None
         self._proposed: Floats = np.zeros((venv.num_envs, 0), np.float32)
         self._outputs: Any = None
@@ -95,7 +95,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
 
         Returns
         -------
-        float32 array of shape (num_envs, history * n_observations + n_commands), n_commands without a base 0
+        float32 array of shape (num_envs, frame_stack * n_observations + n_commands); 0 commands without base
         """
         observations = self.venv.reset()
         self._state = None
@@ -107,7 +107,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._outputs = np.array(actions)
 
     def step_wait(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
-        """`hold` control intervals; `terminal_observation` is what the agent would have seen next.
+        """`action_repeat` control intervals; `terminal_observation` is what the agent would have seen next.
 
         Returns
         -------
@@ -116,7 +116,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         """
         observations, rewards, dones, infos = self._interval()
         infos = list(infos)  # the ships fill theirs anew
-        for _ in range(self.hold - 1):
+        for _ in range(self.action_repeat - 1):
             if self.base is not None:
                 self._outputs[dones] = 0
             observations, more, ends, latest = self._interval()
@@ -145,7 +145,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return self._begin(observations, np.asarray(dones, dtype=np.bool_)), rewards, dones, infos
 
     def memory(self) -> dict[str, Any]:
-        """All that it adds to what the steps to come depend on: history, the base's state and proposals."""
+        """What further steps depend on here: past observations, the base's state and its proposals."""
         return copy.deepcopy({"past": self._past, "state": self._state, "proposed": self._proposed})
 
     def remember(self, memory: Mapping[str, Any]) -> None:

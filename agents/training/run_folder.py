@@ -18,9 +18,10 @@ from typing import Any
 
 from agents.output import whole_folder
 from agents.training.plan import Plan, check_same
+from agents.training.settings import present_names
 from shipgym.checks import check_keys, check_table, check_whole
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 
 FORMAT = 1
 RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"
@@ -54,7 +55,7 @@ def check_new(folder: Path) -> None:
             f"{folder}: a run is there already; go on with it by --resume, or name another folder"
         )
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists and is no run of training; name another folder")
+        raise InputError(f"{folder}: exists and is not a training run; name another folder")
 
 
 def begin_folder(folder: Path, plan: Plan, command: str) -> None:
@@ -84,7 +85,7 @@ def read_plan(folder: Path) -> Plan:
     """
     content = _content(folder)
     where = f"{folder / RUN}"
-    configuration = check_table(content["configuration"], f"{where}: configuration")
+    configuration = content["configuration"]
     try:
         plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
     except InputError as error:
@@ -103,10 +104,7 @@ def check_resumable(folder: Path, plan: Plan) -> None:
     InputError
         As `read_plan`, or for a difference.
     """
-    configuration = _content(folder)["configuration"]
-    check_same(
-        plan.configuration(), check_table(configuration, f"{folder / RUN}: configuration"), str(folder)
-    )
+    check_same(plan.configuration(), _content(folder)["configuration"], str(folder))
 
 
 def other_versions(folder: Path) -> list[str]:
@@ -130,4 +128,7 @@ def _content(folder: Path) -> Mapping[str, Any]:
             raise InputError(f"{path}: field '{name}' is missing; {REMEDY}")
     if content["format"] != FORMAT:
         raise InputError(f"{path}: format {content['format']!r} found, expected {FORMAT}; {REMEDY}")
-    return content
+    configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
+    if isinstance(settings := configuration.get("settings"), Mapping):
+        configuration["settings"] = present_names(settings)
+    return {**content, "configuration": configuration}

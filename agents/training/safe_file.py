@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.errors import InputError
-from shipgym.whole_file import write_bytes
+from shipgym.files import write_bytes
 
 Arrays = dict[str, Any]
 CONTENT = "content"  # entry of the file's metadata: what is not an array, as JSON

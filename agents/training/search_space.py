@@ -1,86 +1,36 @@
-"""What tuning varies, algorithm by algorithm; a setting that is given is left as it is.
-
-=====================  =============================================  =====================
-setting                values                                         of
-=====================  =============================================  =====================
-learning_rate          1e-4 to 3e-3, evenly in its logarithm          all
-gamma                  1 - gamma: 1e-3 to 0.1, in its logarithm       all
-net_arch               [32, 32], [64, 64], [128, 128]                 all
-activation             relu, tanh                                     all
-hold                   1, 4, 16                                       all
-n_steps                16, 32, 64, 128, 256                           ppo
-batch_size             ships x n_steps over 2, 4, 8 or 16             ppo
-n_epochs               2 to 12                                        ppo
-gae_lambda             0.85 to 1                                      ppo
-clip_range             0.1 to 0.4                                     ppo
-ent_coef               1e-6 to 1e-2, in its logarithm                 ppo
-log_std_init           -3 to 0.5                                      ppo
-batch_size             128, 256, 512                                  sac, td3, tqc
-gradient_steps         2, 4, 8, 16                                    sac, td3, tqc
-tau                    1e-3 to 5e-2, in its logarithm                 sac, td3, tqc
-critic_arch            [64, 64], [128, 128], [256, 256]               sac, td3, tqc
-ent_coef               auto, auto_0.1, auto_0.01                      sac, tqc
-target_entropy         -3 to 0.5                                      sac, tqc
-action_noise           0.03 to 0.5, in its logarithm                  td3
-policy_delay           1 to 8                                         td3
-top_quantiles_to_drop  0 to 5                                         tqc
-=====================  =============================================  =====================
-"""
+"""What tuning varies, algorithm by algorithm; a setting that is given is left as it is."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from optuna.distributions import BaseDistribution
+from optuna.distributions import CategoricalDistribution as Choice
+from optuna.distributions import FloatDistribution as Reals
+from optuna.distributions import IntDistribution as Wholes
 
 from agents.training.settings import Settings, changed
 
-
-@dataclass(frozen=True)
-class Reals:
-    """Real numbers from low to high, evenly or evenly in their logarithm."""
-
-    low: float
-    high: float
-    log: bool = False
-
-
-@dataclass(frozen=True)
-class Wholes:
-    """Whole numbers from low to high."""
-
-    low: int
-    high: int
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One of some words or numbers."""
-
-    options: Sequence[str | int]
-
-
-Dimension = Reals | Wholes | Choice
-
-ALL: Mapping[str, Dimension] = {
+ALL: Mapping[str, BaseDistribution] = {
     "learning_rate": Reals(1e-4, 3e-3, log=True),
     "one_minus_gamma": Reals(1e-3, 0.1, log=True),
     "net_arch": Choice(("32 32", "64 64", "128 128")),
     "activation": Choice(("relu", "tanh")),
-    "hold": Choice((1, 4, 16)),
+    "action_repeat": Choice((1, 4, 16)),
 }
-OFF_POLICY: Mapping[str, Dimension] = {
+OFF_POLICY: Mapping[str, BaseDistribution] = {
     "batch_size": Choice((128, 256, 512)),
     "gradient_steps": Choice((2, 4, 8, 16)),
     "tau": Reals(1e-3, 5e-2, log=True),
     "critic_arch": Choice(("64 64", "128 128", "256 256")),
 }
-ENTROPY: Mapping[str, Dimension] = {
+ENTROPY: Mapping[str, BaseDistribution] = {
     "ent_coef": Choice(("auto", "auto_0.1", "auto_0.01")),
     "target_entropy": Reals(-3.0, 0.5),
 }
 #: By algorithm, then by parameter.
-SPACES: Mapping[str, Mapping[str, Dimension]] = {
+SPACES: Mapping[str, Mapping[str, BaseDistribution]] = {
     "ppo": {
         **ALL,
         "n_steps": Choice((16, 32, 64, 128, 256)),
@@ -104,7 +54,7 @@ SPACES: Mapping[str, Mapping[str, Dimension]] = {
 STANDS_FOR = {"one_minus_gamma": "gamma", "minibatches": "batch_size"}
 
 
-def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Dimension]:
+def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, BaseDistribution]:
     """The parameters that are varied, without those whose setting is fixed."""
     space = SPACES[algorithm]
     return {name: space[name] for name in space if STANDS_FOR.get(name, name) not in fixed}

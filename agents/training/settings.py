@@ -1,8 +1,8 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML.
 
-The files in `hyperparameters/` hold the tuned ones, later tables before earlier ones:
+The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 
-    [defaults]                          # every setting of the algorithm, to learn from nothing
+    [defaults]                          # every setting of the algorithm, to learn from scratch
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
     [suite]                             # those that differ on every task of the suite
     [tasks.mariner-rough]               # those that differ on one of them
@@ -25,18 +25,19 @@ from shipgym.checks import check_choice, check_keys, check_number, check_table, 
 from shipgym.envs.task import ACTIONS
 from shipgym.errors import InputError
 
+RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED, AUTO = "running", "learned", "auto"
 NUMBER_OR_WORD, WIDTHS = "float | str", "tuple[int, ...]"  # types of settings
 
 
 def setting(**allowed: Any) -> Any:
-    """A setting, and what is allowed: bounds of `check_number`, a `word` in a number's place, or `options`."""
+    """A setting and what is allowed: bounds of `check_number`, a `word` for a number, or `options`."""
     return field(metadata=allowed)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all algorithms have; a decision is what the policy commands for `hold` control intervals."""
+    """What all algorithms have; a decision lasts `action_repeat` control intervals."""
 
     #: Decisions to learn from, of all ships together.
     total_steps: int = setting(at_least=1)
@@ -57,16 +58,16 @@ class Settings:
     #: Function between the layers.
     activation: str = setting(options=("relu", "tanh"))
     #: Observations that the policy sees, the newest last.
-    history: int = setting(at_least=1)
+    frame_stack: int = setting(at_least=1)
     #: Control intervals of a decision; a base goes on with its feedback in each of them.
-    hold: int = setting(at_least=1)
-    #: Classical controller that the policy adds to: a kind, a controller's file that ends in .json, "none", or
-    #: "tuned", the best of those tuned for the suite's task (but `designs.NO_BASES`).
+    action_repeat: int = setting(at_least=1)
+    #: Classical controller that the policy adds to: a kind, a controller's file that ends in .json, "none",
+    #: or "tuned", the best of those tuned for the suite's task (but `designs.NO_BASES`).
     base: str = setting()
     #: Share of the action's range by which it may differ from the base; 1 without a base.
     authority: float = setting(above=0.0, at_most=2.0)
-    #: What rewards are divided by before they are limited to [-10, 10]; "running" is the standard deviation of
-    #: their discounted sum so far.
+    #: What rewards are divided by before they are limited to [-10, 10]; "running" is the standard deviation
+    #: of their discounted sum so far.
     reward_scale: float | str = setting(above=0.0, word=RUNNING)
 
     def __post_init__(self) -> None:
@@ -108,8 +109,8 @@ class PPOSettings(Settings):
     max_grad_norm: float = setting(above=0.0)
     #: Logarithm of the action's standard deviation at the beginning.
     log_std_init: float = setting(at_least=-10.0, at_most=3.0)
-    #: To what it falls evenly over the training. A rudder that trembles costs more than steering does, and the
-    #: policy that is best while it explores is not the one that is best without.
+    #: To what it falls evenly over the training. A rudder that chatters costs more than steering does, and
+    #: the policy that is best while it explores is not the one that is best without.
     log_std_end: float | str = setting(at_least=-10.0, at_most=3.0, word=LEARNED)
 
     def _check_together(self) -> None:
@@ -151,8 +152,8 @@ class SACSettings(OffPolicySettings):
 
     #: Weight of the entropy; "auto" or "auto_0.1" adapts it, from that value.
     ent_coef: float | str = setting(at_least=0.0, word="auto_")
-    #: Entropy that it is adapted to; "auto" is -1 for each command. One command has the standard deviation 0.09
-    #: with -1, 0.24 with 0.
+    #: Entropy that it is adapted to; "auto" is -1 for each command. One command has the standard deviation
+    #: 0.09 with -1, 0.24 with 0.
     target_entropy: float | str = setting(at_most=1.0, word=AUTO)
 
 
@@ -248,7 +249,7 @@ def load_settings(
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        nothing.
+        scratch.
 
     Raises
     ------
@@ -344,6 +345,11 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
     return found
 
 
+def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Settings by their present names, where some have older ones."""
+    return {RENAMED.get(name, name): value for name, value in settings.items()}
+
+
 def _parsed(text: str, where: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
@@ -353,7 +359,7 @@ def _parsed(text: str, where: str) -> dict[str, Any]:
 
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
     """A table that names settings only; whole numbers stand for decimal ones."""
-    table = check_table(value, where)
+    table = present_names(check_table(value, where))
     types = {one.name: one.type for one in fields(kind)}
     check_keys(table, tuple(types), where)
     return {

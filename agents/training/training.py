@@ -23,7 +23,7 @@ from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 
 try:
     import torch
@@ -51,7 +51,7 @@ class Progress(NamedTuple):
     cost, best_cost, lq_cost : float or None
         Mean cost of the episodes held out, at the last evaluation, at the best one, and of LQ.
     evaluated : bool
-        Whether this tells of a new evaluation.
+        Whether there is a new evaluation.
     """
 
     steps: int
@@ -138,7 +138,7 @@ def train(
     max_seconds : float, optional
         Time after which the training stops at the next boundary; it can be resumed.
     tell : callable, optional
-        Is told the progress at each boundary. What it raises ends the training.
+        Called with the progress at each boundary. What it raises ends the training.
     command : str, optional
         Command line that is written into the run's folder.
 
@@ -275,7 +275,7 @@ class _Training:
         )  # fmt: skip
 
     def evaluate(self) -> None:
-        """Fly the episodes held out; keep the policy if it is the best."""
+        """Run the held-out episodes; keep the policy if it is the best."""
         steps = self.agent.num_timesteps
         if not all(bool(weight.isfinite().all()) for weight in self.agent.policy.parameters()):
             raise self._diverged()

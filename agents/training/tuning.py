@@ -8,26 +8,30 @@ Vizier, section 3.1): when its best cost so far is above the median of what fini
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from agents.engines.jobs import run_jobs
 from agents.training.plan import Plan, check_same
-from agents.training.search_space import Choice, Reals, search_space, with_parameters
 from agents.training.settings import changed
 from agents.verification.monte_carlo import HERE, Engine
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
-from shipgym.whole_file import write_text
+from shipgym.files import read_json, write_json, write_text
 
-if TYPE_CHECKING:
+try:
     import optuna
+
+    from agents.training.search_space import search_space, with_parameters
+except ModuleNotFoundError:
+    raise InputError("optuna is not installed, tuning needs it: pip install 'shipgym[tune]'") from None
+
+optuna.logging.set_verbosity(optuna.logging.WARNING)
 
 #: Trials proposed at once: so many workers are of use.
 BATCH = 4
@@ -36,7 +40,6 @@ TRIALS_BEFORE_STOPPING, SHARE_BEFORE_STOPPING = 4, 0.25
 EVALUATIONS = 10  # of a trial
 
 CONFIGURATION, STUDY, KEPT, BEST = "study.json", "study.db", "trials", "best.toml"
-MISSING = "optuna is not installed, tuning needs it: pip install 'shipgym[tune]'"
 
 LAST = 2**62  # steps, after all evaluations
 
@@ -105,13 +108,9 @@ def tune(
     where : Engine
         Where trials are trained; the results are the same.
     progress : callable, optional
-        Told the trials done, their total and the best cost.
+        Called with the trials done, their total and the best cost.
     training : callable, optional
         In the place of `train_trial`: a job in, cost, curve and how it ended out.
-
-    Returns
-    -------
-    Tuning
 
     Raises
     ------
@@ -120,8 +119,6 @@ def tune(
         of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
-    if find_spec("optuna") is None:
-        raise InputError(MISSING)
     folder = Path(out)
     study = _opened(folder, plan, fixed)
     found: list[Trial] = []
@@ -130,9 +127,8 @@ def tune(
 
         def tell(done: int, _: int, before: int = first) -> None:
             if progress is not None:
-                progress(
-                    before + done, trials, min((t.cost for t in found if t.cost is not None), default=None)
-                )
+                best = min((trial.cost for trial in found if trial.cost is not None), default=None)
+                progress(before + done, trials, best)
 
         results = run_jobs(
             training or train_trial,
@@ -158,7 +154,7 @@ def evaluated_evenly(plan: Plan) -> Plan:
 def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     """Train one trial; stop it when it is worse than finished ones were.
 
-    What a base does before anything is learned is no merit of the settings: step 0 does not count.
+    What a base does before anything is learned says nothing about the settings: step 0 does not count.
     """
     from agents.training.training import Progress, train
 
@@ -225,10 +221,7 @@ def _proposed(
     plan: Plan, found: Sequence[Trial], number: int, fixed: Sequence[str]
 ) -> list[tuple[dict[str, Any], dict[str, Any]]]:
     """Parameters and settings of the next trials; they follow from the trials before and the seed."""
-    import optuna
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
-    space = _distributions(plan, fixed)
+    space = search_space(plan.algorithm, fixed)
     sampler = optuna.samplers.TPESampler(seed=plan.seed + len(found), n_startup_trials=BATCH)
     study = optuna.create_study(sampler=sampler)
     study.add_trials([_frozen(trial, space) for trial in found])
@@ -237,24 +230,8 @@ def _proposed(
     return [(parameters, with_parameters(plan.settings, parameters).to_dict()) for parameters in asked]
 
 
-def _distributions(plan: Plan, fixed: Sequence[str]) -> dict[str, Any]:
-    from optuna.distributions import CategoricalDistribution, FloatDistribution, IntDistribution
-
-    found: dict[str, Any] = {}
-    for name, dimension in search_space(plan.algorithm, fixed).items():
-        if isinstance(dimension, Choice):
-            found[name] = CategoricalDistribution(tuple(dimension.options))
-        elif isinstance(dimension, Reals):
-            found[name] = FloatDistribution(dimension.low, dimension.high, log=dimension.log)
-        else:
-            found[name] = IntDistribution(dimension.low, dimension.high)
-    return found
-
-
 def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
     """A trial as Optuna knows it."""
-    import optuna
-
     finished = trial.cost is not None
     return optuna.trial.create_trial(
         state=optuna.trial.TrialState.COMPLETE if finished else optuna.trial.TrialState.PRUNED,
@@ -268,16 +245,13 @@ def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
 
 def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
     """The study in the folder; a new one where there is none."""
-    import optuna
-
-    optuna.logging.set_verbosity(optuna.logging.WARNING)
     expected = {"configuration": plan.configuration(), "fixed": sorted(fixed)}
     note = folder / CONFIGURATION
     if note.is_file():
         found = read_json(note, "study", "name another folder")
         check_same(expected, found, str(note))
     elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise InputError(f"{folder}: exists and is no study of tuning; name another folder")
+        raise InputError(f"{folder}: exists and is not a tuning study; name another folder")
     else:
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -298,7 +272,7 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
 def _record(study: optuna.Study, found: Sequence[Trial], plan: Plan, fixed: Sequence[str]) -> None:
     """Add to the study what it does not have yet: it may have been written until anywhere."""
     there = {trial.user_attrs.get("number") for trial in study.trials}
-    space = _distributions(plan, fixed)
+    space = search_space(plan.algorithm, fixed)
     study.add_trials([_frozen(trial, space) for trial in found if trial.number not in there])
 
 
@@ -311,20 +285,5 @@ def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
         f"{plan.task.name or plan.task.environment} with {plan.task.model}.\n"
         f"# shipgym train {plan.algorithm} --settings {BEST} ...\n\n"
     )
-    write_text(
-        head
-        + "".join(
-            f"{name} = {_toml(value)}\n" for name, value in best.settings.items() if name != "evaluate_every"
-        ),
-        folder / BEST,
-    )
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(_toml(item) for item in value) + "]"
-    return repr(value)
+    lines = [f"{name} = {json.dumps(value)}\n" for name, value in best.settings.items()]  # as TOML has them
+    write_text(head + "".join(line for line in lines if not line.startswith("evaluate_every")), folder / BEST)

@@ -9,14 +9,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from agents.agent_file import load_agent
+from agents.controllers.controller import Controller
+from agents.controllers.lq import LQ
+from agents.controllers.pid import PID
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import check_folder, whole_folder
+from agents.rollouts.course_keeping import sail, step_response
+from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import HERE, Engine, monte_carlo
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
+from shipgym.envs.course_keeping_task import CourseKeepingTask
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.plots import graph_objects
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
@@ -24,7 +31,6 @@ from shipgym.trials.ship_file import ShipFile
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
-    from agents.controllers.controller import Controller
 
 Floats = NDArray[np.float64]
 
@@ -70,18 +76,11 @@ def build_autopilot(
     where : Engine
         Where the models drawn are worked on; the results are the same.
 
-    Returns
-    -------
-    AutopilotResult
-
     Raises
     ------
     InputError
         For anything wrong with the files or arguments; nothing is written then.
     """
-    from agents.controllers.controller import Controller
-    from agents.verification.page import write_report
-
     folder = Path(out)
     where.check()
     check_number(draws, "draws", at_least=2)
@@ -89,25 +88,27 @@ def build_autopilot(
     check_folder(folder, FILES)
     graph_objects()  # a missing extra shall be told now, not after the work
     result = examine(
-        ship_file,
-        draws=int(draws),
-        seed=int(seed),
-        options=options,
-        agents=agents,
-        progress=progress,
+        ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
         where=where,
-    )
+    )  # fmt: skip
+    _tell(progress, "writing the report", 0, 1)
+    _write(result, folder)
+    _tell(progress, "writing the report", 1, 1)
+    return result
+
+
+def _write(result: AutopilotResult, folder: Path) -> None:
+    """Write the files of the chain, all or none."""
+    from agents.verification.page import write_report
+
     with whole_folder(folder, FILES) as draft:
-        _tell(progress, "writing the report", 0, 1)
         write_json(result.metrics, draft / "metrics.json")
         if result.verification is not None:
             result.model.save(draft / "model.json")
             for pilot in result.verification.pilots:
-                if isinstance(pilot.controller, Controller):  # the others are files already
-                    pilot.controller.save(draft / f"{pilot.key}.json")
+                if pilot.design is not None:  # the others are files already
+                    pilot.design.save(draft / f"{pilot.key}.json")
         write_report(result, draft / "report.html")
-        _tell(progress, "writing the report", 1, 1)
-    return result
 
 
 def examine(
@@ -121,8 +122,6 @@ def examine(
     where: Engine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
-    from agents.agent_file import load_agent
-
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
     guests = [load_agent(agent) for agent in agents]
@@ -157,18 +156,10 @@ def verify(
     ----------
     model : ShipModel
         With a covariance.
-    draws, seed : int
+    draws, seed, progress, where
         See `build_autopilot`.
-    progress : callable, optional
-        Called as the work goes on.
-    where : Engine
-        Where the draws are worked on; the results are the same.
     guests : sequence of Controller, LearnedPolicy or Shielded
         Further autopilots.
-
-    Returns
-    -------
-    Verification
 
     Raises
     ------
@@ -177,23 +168,16 @@ def verify(
     InputError
         If no autopilot can be designed on it.
     """
-    from agents.rollouts.course_keeping import sail, step_response
-
     stage = "models drawn"
     _tell(progress, stage, 0, draws)
     controllers, refused = _designed(model)
     found = monte_carlo(
-        controllers,
-        model,
-        draws,
-        seed,
-        where=where,
-        progress=lambda done: _tell(progress, stage, done, draws),
-    )
+        controllers, model, draws, seed,
+        where=where, progress=lambda done: _tell(progress, stage, done, draws),
+    )  # fmt: skip
     seeds = seed + np.arange(draws)
     episodes = [*found.episodes, *(sail(guest, found.draws, seeds=seeds) for guest in guests)]
-    lost = found.manoeuvres.unstable
-    stable = [draw for draw, gone in zip(found.draws, lost, strict=True) if not gone]
+    stable = [draw for draw, lost in zip(found.draws, found.manoeuvres.unstable, strict=True) if not lost]
     pilots, autopilots = [], [*controllers, *guests]
     keys = _told_apart([str(one.name) for one in autopilots])
     for k, controller in enumerate(autopilots):
@@ -214,16 +198,14 @@ def verify(
 
 def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     """Refuse a guest that was not made for keeping this ship's course."""
-    from shipgym.envs.course_keeping_task import CourseKeepingTask
-
-    shown = CourseKeepingTask().observed(model)
-    names = [one.name for one in shown]
+    task = CourseKeepingTask()
+    names = [one.name for one in task.observed(model)]
     if more := [name for name in guest.observation_names if name not in names]:
         raise InputError(
             f"{where}: it observes {quoted(more)}, which course keeping does not show; expected an agent for "
             "course keeping, such as mariner-calm-ppo; for paths there is shipgym benchmark"
         )
-    guest.check_fits(names, [one.scale for one in shown], where)
+    check_fits(guest, task, model, where)
 
 
 def _told_apart(names: Sequence[str]) -> list[str]:
@@ -242,9 +224,6 @@ def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
     InputError
         If none could.
     """
-    from agents.controllers.lq import LQ
-    from agents.controllers.pid import PID
-
     controllers: list[Controller] = []
     refused: dict[str, str] = {}
     designs: tuple[Any, ...] = (PID, LQ)

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import Criterion, turning_circle, zigzag
-from shipgym.manoeuvres.imo import imo_manoeuvres, judge_imo
+from shipgym.manoeuvres.imo import imo_criteria, imo_manoeuvres
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of
-from shipgym.manoeuvres.standard import TURN_DEG
+from shipgym.manoeuvres.turning import TURN_DEG
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -120,8 +120,8 @@ def sail_draws(
 ) -> SailedDraws:
     """Put models drawn from one through the standard manoeuvres."""
     needed = imo_manoeuvres(model)
-    empty = {name: test.nothing for name, test in needed.items()}
-    found = intervals_of(empty, draws, {name: test.judge for name, test in needed.items()}, progress)
+    empty = {name: test.no_indices for name, test in needed.items()}
+    found = intervals_of(empty, draws, {name: test.evaluate for name, test in needed.items()}, progress)
     runs = [_kept_runs(draw) for draw in draws]
     headings, paths = zip(*(run or _nothing(model) for run in runs), strict=True)
     return SailedDraws(
@@ -139,7 +139,7 @@ def spread_of(
     """The spread over draws that were sailed in parts."""
     criteria = {
         name: criterion
-        for name, criterion in judge_imo(model, _intervals(model, parts)).items()
+        for name, criterion in imo_criteria(model, _intervals(model, parts)).items()
         if criterion.passed is not None
     }
     unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
@@ -165,7 +165,7 @@ def _intervals(model: ShipModel, parts: Sequence[SailedDraws]) -> dict[str, dict
                 np.concatenate([part.indices[name][index] for part in parts]),
                 np.concatenate([part.ran_away[name] for part in parts]),
             )
-            for index, value in (attempt(test.judge, model)[0] or test.nothing).items()
+            for index, value in (attempt(test.evaluate, model)[0] or test.no_indices).items()
         }
         for name, test in imo_manoeuvres(model).items()
     }

@@ -20,6 +20,7 @@ from agents.verification.figures import (
 )
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.report.view import fit_view, trial_figures
+from shipgym.files import write_text
 from shipgym.pages import NONE, render
 
 SURE = 0.95  # probability of passing from which on a criterion counts as met
@@ -65,7 +66,7 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         step_deg=STEP_DEG,
         infinity=np.inf,
     )
-    Path(path).write_text(page, encoding="utf-8")
+    write_text(page, Path(path))
 
 
 def verification_view(found: Verification) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
+from agents.rollouts.course_keeping import Episodes, StepResponses
 from agents.verification.index_uncertainty import ManoeuvreSpread
 from identification import IdentificationResult
 from shipgym.ships import ShipModel
@@ -18,7 +19,6 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
-    from agents.rollouts.course_keeping import Episodes, StepResponses
 
 Floats = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""PPO of RLlib learns to keep a course with a ship of shipgym, and is flown beside LQ afterwards."""
+"""PPO of RLlib learns to keep a course with a ship of shipgym, and is compared with LQ afterwards."""
 
 import argparse
 import logging
@@ -36,7 +36,7 @@ class Steersman:
 
 
 def main() -> None:
-    """Train for some iterations, then fly the same 100 episodes as LQ."""
+    """Train for some iterations, then run the same 100 episodes as LQ."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--model", default="mariner", help="name of a shipped model, or a model file")
     parser.add_argument("--iterations", type=int, default=12)

@@ -20,7 +20,7 @@ from shipgym.ships.grey_box import GREY_BOX
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")

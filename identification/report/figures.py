@@ -47,8 +47,9 @@ def all_figures(fit: Fit) -> dict[str, Figure]:
     """Every figure of a fit by its name; see `IdentificationResult.plots`."""
     fitted = [trial for trial in fit.trials if trial.use == "fit"]
     found = regression_figures(fit) | {"coefficients": coefficients_figure(fit)}
-    if all("psi" in trial and "delta" in trial for trial in fitted):
-        found["trials"] = overview_figure(fitted, fit.predictions)
+    overview = overview_figure(fitted, fit.predictions)
+    if overview is not None:
+        found["trials"] = overview
     return found | {
         f"prediction: {trial.name}": prediction_figure(trial, fit.predictions[trial.name])
         for trial in fit.trials

@@ -17,11 +17,19 @@ if TYPE_CHECKING:
 RUDDER = "#9aa5b1"
 
 
-def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | None]) -> Figure:
-    """Heading and rudder of the trials, one panel each, with the model's open-loop simulation."""
-    rows = -(-len(trials) // 2)
+def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | None]) -> Figure | None:
+    """Heading and rudder of the trials, one panel each, with the model's open-loop simulation.
+
+    None where a trial has no heading or no rudder.
+    """
+    if not all("psi" in trial and "delta" in trial for trial in trials):
+        return None
+    rows, columns = -(-len(trials) // 2), min(len(trials), 2)
     figure = subplots(
-        rows, 2, titles=[PurePath(trial.name).name for trial in trials], vertical_spacing=0.36 / max(rows, 2)
+        rows,
+        columns,
+        titles=[PurePath(trial.name).name for trial in trials],
+        vertical_spacing=0.36 / max(rows, 2),
     )
     for k, trial in enumerate(trials):
         place = {"row": k // 2 + 1, "col": k % 2 + 1}

@@ -18,11 +18,10 @@ from identification.validation.cross_validation import cross_validate
 from identification.validation.prediction import COMPARED
 from identification.validation.ranking import Ranking, Standing
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json, write_text
 from shipgym.ships.grey_box import GREY_BOX
 from shipgym.trials.identify_table import OPTIONS
 from shipgym.trials.trial import Trial
-from shipgym.whole_file import write_text
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "output-error")

@@ -1,4 +1,4 @@
-"""A conformance suite for vector environments, which Gymnasium's own checker refuses to look at."""
+"""A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
 from __future__ import annotations
 
@@ -59,13 +59,7 @@ def _expect(condition: bool, promise: str) -> None:
 
 
 def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
-    """How an environment says that it begins the next episode.
-
-    Raises
-    ------
-    InputError
-        If it does not say.
-    """
+    """How an environment says that it begins the next episode; InputError where it does not say."""
     mode = env.metadata.get("autoreset_mode")
     if not isinstance(mode, AutoresetMode):
         raise InputError(
@@ -152,7 +146,7 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
 
 def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     first, again, list_of_seeds, other = (
-        _fly(env, seed, n_steps)
+        _rollout(env, seed, n_steps)
         for seed in (SEED, SEED, [SEED + i for i in range(env.num_envs)], SEED + 10_000)
     )
     _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
@@ -163,7 +157,7 @@ def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     _expect(not _same(first[:1], other[:1]), "reset with another seed gave the same first observations")
 
 
-def _fly(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
+def _rollout(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
     env.action_space.seed(SEED)
     observations, _ = env.reset(seed=seed)
     nothing = np.zeros(env.num_envs)

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.checks import check_number, check_table, check_text, quoted
+from shipgym.checks import (
+    check_finite,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    check_whole,
+    quoted,
+)
+from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
+from shipgym.files import read_json, write_json
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -52,7 +61,7 @@ class Episode:
     reward_parts : mapping of str to array-like of shape (n_steps,), optional
         Parts of the rewards, as `info` names them.
     info : mapping of str to array-like of shape (n_steps + 1,), optional
-        What else `info` told in numbers, at the beginning and after each step; true is 1.
+        What else `info` reported in numbers, at the beginning and after each step; true is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
     corridor : float, optional
@@ -64,11 +73,11 @@ class Episode:
     seed : int, optional
         With which the environment was last reset.
     number : int
-        Of the episode since then, from 0: `reset(seed=seed)` and so many times `reset()` begin it again.
+        Of the episode since then, from 0: `reset(seed=seed)` and that many times `reset()` begin it again.
     terminated, truncated : bool
         How it ended; neither where it was cut off.
     success : bool, optional
-        What the environment said about it, if it did.
+        Whether it was a success, where the environment reports that.
 
     Raises
     ------
@@ -108,18 +117,20 @@ class Episode:
         if self.corridor is not None:
             check_number(self.corridor, "corridor", above=0.0)
         check_table(self.arguments, "arguments")
-        for name in ("seed", "number"):
-            _check_count(getattr(self, name), name)
+        if self.seed is not None:
+            check_whole(self.seed, "seed", at_least=0)
+        check_whole(self.number, "number", at_least=0)
         for name in ("terminated", "truncated", "success"):
-            _check_flag(getattr(self, name), name)
+            if getattr(self, name) is not None or name != "success":
+                check_flag(getattr(self, name), name)
         self._set_series()
         self._set_waypoints()
 
     def _set_series(self) -> None:
         rewards = series(self.rewards, "rewards", None)
         if not len(rewards):
-            raise InputError("rewards: none found, expected at least one step")
-        actions = _finite(self.actions, "actions")
+            raise InputError("rewards: no step found, expected at least one step")
+        actions = check_finite(self.actions, "actions")
         if actions.ndim != 2 or len(actions) != len(rewards):
             raise InputError(
                 f"actions: shape {actions.shape} found, expected ({len(rewards)}, n_actions), a row for "
@@ -141,7 +152,7 @@ class Episode:
     def _set_waypoints(self) -> None:
         if self.waypoints is None:
             return
-        points = _finite(self.waypoints, "waypoints")
+        points = check_finite(self.waypoints, "waypoints")
         if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
             raise InputError(
                 f"waypoints: shape {points.shape} found, expected (n, 2), north and east of two or more"
@@ -174,7 +185,7 @@ class Episode:
         Returns
         -------
         Trial
-            States that are channels of trials, the orders `delta_command` and `n_command` held from each
+            States that are channels of trials, the orders `delta_command` and `n_command` constant from each
             sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
 
         Raises
@@ -185,10 +196,10 @@ class Episode:
         channels = {key: values for key, values in self.states.items() if key in CHANNELS}
         channels["psi"] = np.unwrap(channels["psi"])
         for key, values in self.commands.items():
-            held = np.append(values, values[-1])
-            channels[f"{key}_command"] = held
+            orders = np.append(values, values[-1])
+            channels[f"{key}_command"] = orders
             if key == "n":
-                channels.setdefault("n", held)
+                channels.setdefault("n", orders)
         return Trial(
             self.t,
             channels,
@@ -198,16 +209,8 @@ class Episode:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the episode as JSON: to a temporary name, then renamed.
-
-        Raises
-        ------
-        InputError
-            If the file cannot be written.
-        """
-        from shipgym.envs.episode_file import save
-
-        save(self, Path(path))
+        """Write the episode as JSON, atomically; InputError where that fails."""
+        write_json(to_file(vars(self)), Path(path), indent=None)
 
     @classmethod
     def load(cls, path: str | Path) -> Episode:
@@ -218,50 +221,18 @@ class Episode:
         InputError
             Naming the file and the field at fault.
         """
-        from shipgym.envs.episode_file import load
-
-        return load(Path(path))
+        content = read_json(Path(path), "episode file", "record the episode again or take another copy")
+        try:
+            return cls(**from_file(content))
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:
-    """Finite numbers over time, of shape (count,), as a read-only array.
-
-    Raises
-    ------
-    InputError
-        Naming the first value that is not finite, or the length found.
-    """
-    array = _finite(values, where)
+    """Finite numbers over time, of shape (count,), as a read-only array; InputError for others."""
+    array = check_finite(values, where)
     if array.ndim != 1 or (count is not None and len(array) != count):
         raise InputError(
             f"{where}: shape {array.shape} found, expected ({'n_steps' if count is None else count},)"
         )
     return array
-
-
-def _finite(values: Any, where: str) -> Floats:
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: expected an array of numbers") from None
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        place = tuple(wrong[0].tolist())
-        index = place[0] if len(place) == 1 else place
-        raise InputError(f"{where}: {array[place]} found at {index}, expected finite numbers")
-    array.setflags(write=False)
-    return array
-
-
-def _check_count(value: Any, where: str) -> None:
-    if value is None and where == "seed":
-        return
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
-        raise InputError(f"{where}: {value!r} found, expected a whole number from 0 on")
-
-
-def _check_flag(value: Any, where: str) -> None:
-    if value is None and where == "success":
-        return
-    if not isinstance(value, bool):
-        raise InputError(f"{where}: {value!r} found, expected true or false")

@@ -1,4 +1,4 @@
-"""The episode file: JSON, versioned, written whole or not at all, validated field by field on reading.
+"""The episode file: JSON, versioned, validated field by field on reading.
 
 Format 1:
 
@@ -16,80 +16,54 @@ Format 1:
     actions      n rows, as the agent gave them
     rewards      n values
     reward_parts {name: n values}
-    info         {name: n + 1 values}: what else was told, at the beginning and after each step
+    info         {name: n + 1 values}: what else it reported, at the beginning and after each step
     outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Collection, Mapping
-from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from shipgym.checks import check_keys, check_table, quoted
-from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-from shipgym.json_file import read_json
-from shipgym.whole_file import write_text
 
 FORMAT = 1
 KIND = "episode"
-REMEDY = "record the episode again or take another copy"
-FIELDS = (
-    "format", "kind", "environment", "model", "seed", "number", "dt", "ship", "path", "states", "commands",
-    "actions", "rewards", "reward_parts", "info", "outcome",
-)  # fmt: skip
+
+#: Tables of the file, with the name of each of their fields in an episode.
+TABLES = {
+    "environment": {"id": "environment", "arguments": "arguments"},
+    "ship": {name: name for name in ("length", "beam", "rudder_limit")},
+    "path": {name: name for name in ("waypoints", "corridor")},
+    "outcome": {name: name for name in ("terminated", "truncated", "success")},
+}
+SERIES = ("states", "commands", "reward_parts", "info")
+#: Fields that stand in the file as in an episode.
+PLAIN = ("model", "seed", "number", "dt", *SERIES, "actions", "rewards")
 
 
-def save(episode: Episode, path: Path) -> None:
-    """Write an episode file: to a temporary name, then renamed."""
-    write_text(json.dumps(episode_fields(episode), allow_nan=False) + "\n", path)
-
-
-def episode_fields(episode: Episode) -> dict[str, Any]:
-    """What an episode file holds, ready for JSON."""
-    path = None
-    if episode.waypoints is not None:
-        path = {"waypoints": episode.waypoints.tolist(), "corridor": episode.corridor}
-    return {
-        "format": FORMAT,
-        "kind": KIND,
-        "environment": {"id": episode.environment, "arguments": dict(episode.arguments)},
-        "model": episode.model,
-        "seed": episode.seed,
-        "number": episode.number,
-        "dt": episode.dt,
-        "ship": {
-            "length": episode.length,
-            "beam": episode.beam,
-            "rudder_limit": episode.rudder_limit,
-        },
-        "path": path,
-        "states": _lists(episode.states),
-        "commands": _lists(episode.commands),
-        "actions": episode.actions.tolist(),
-        "rewards": episode.rewards.tolist(),
-        "reward_parts": _lists(episode.reward_parts),
-        "info": _lists(episode.info),
-        "outcome": {
-            "terminated": episode.terminated,
-            "truncated": episode.truncated,
-            "success": episode.success,
-        },
+def to_file(episode: Mapping[str, Any]) -> dict[str, Any]:
+    """The content of an episode file, ready for JSON, from an episode's fields by name."""
+    values = {name: _listed(value) for name, value in episode.items()}
+    tables: dict[str, Any] = {
+        table: {key: values[name] for key, name in names.items()} for table, names in TABLES.items()
     }
+    if values["waypoints"] is None:
+        tables["path"] = None
+    return {"format": FORMAT, "kind": KIND, **tables, **{name: values[name] for name in PLAIN}}
 
 
-def load(path: Path) -> Episode:
-    """Read and validate an episode file."""
-    content = read_json(path, "episode file", REMEDY)
-    try:
-        return _episode(content)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
+def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
+    """An episode's fields by name, from the content of an episode file.
 
-
-def _episode(content: Mapping[str, Any]) -> Episode:
+    Raises
+    ------
+    InputError
+        For another kind of file or format, a field that is missing or unknown, or one that holds no numbers.
+    """
     if content.get("kind") != KIND:
         raise InputError(
             f"kind: {content.get('kind')!r} found, expected {KIND!r}: a file that RecordEpisode wrote"
@@ -98,28 +72,21 @@ def _episode(content: Mapping[str, Any]) -> Episode:
         raise InputError(
             f"format: {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
         )
-    _exactly(content, FIELDS, "episode file")
-    environment = _fields(content, "environment", ("id", "arguments"))
-    ship = _fields(content, "ship", ("length", "beam", "rudder_limit"))
-    outcome = _fields(content, "outcome", ("terminated", "truncated", "success"))
-    path: Mapping[str, Any] = {"waypoints": None, "corridor": None}
-    if content["path"] is not None:
-        path = _fields(content, "path", ("waypoints", "corridor"))
-        _check_numbers(path["waypoints"], "path.waypoints")
+    _exactly(content, ("format", "kind", *TABLES, *PLAIN), "episode file")
+    values = {name: content[name] for name in PLAIN}
+    for table, names in TABLES.items():
+        if table == "path" and content[table] is None:
+            continue
+        found = _fields(content, table, names)
+        values |= {name: found[key] for key, name in names.items()}
     for name in ("actions", "rewards"):
         _check_numbers(content[name], name)
-    for group in ("states", "commands", "reward_parts", "info"):
-        for name, values in check_table(content[group], group).items():
-            _check_numbers(values, f"{group}.{name}")
-    return Episode(
-        environment=environment["id"],
-        arguments=environment["arguments"],
-        **{name: content[name] for name in ("model", "seed", "number", "dt", "states", "commands")},
-        **{name: content[name] for name in ("actions", "rewards", "reward_parts", "info")},
-        **ship,
-        **path,
-        **outcome,
-    )
+    if "waypoints" in values:
+        _check_numbers(values["waypoints"], "path.waypoints")
+    for group in SERIES:
+        for name, numbers in check_table(content[group], group).items():
+            _check_numbers(numbers, f"{group}.{name}")
+    return values
 
 
 def _fields(content: Mapping[str, Any], name: str, keys: Collection[str]) -> Mapping[str, Any]:
@@ -147,5 +114,8 @@ def _check_numbers(value: Any, where: str) -> None:
             raise InputError(f"{where}[{i}]: {entry!r} found, expected a number")
 
 
-def _lists(arrays: Mapping[str, Any]) -> dict[str, list[float]]:
-    return {name: values.tolist() for name, values in arrays.items()}
+def _listed(value: Any) -> Any:
+    """Arrays as lists, also within a mapping."""
+    if isinstance(value, Mapping):
+        return {key: _listed(entry) for key, entry in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray) else value

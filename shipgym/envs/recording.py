@@ -51,7 +51,7 @@ class RecordEpisode(
     Raises
     ------
     InputError
-        If the environment is none of shipgym's, the folder cannot be made, or it holds recordings already.
+        If the environment is not one of shipgym's, the folder cannot be made, or it holds recordings already.
     """
 
     def __init__(
@@ -163,11 +163,11 @@ class _Recorded:
         self._commands.append({name: state[f"{name}_command"] for name in self._model.command_names})
         self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
         self._info.append(_numbers(info))
-        said = next((info[key] for key in SUCCESS if key in info), None)
+        success = next((info[key] for key in SUCCESS if key in info), None)
         self._outcome = {
             "terminated": bool(terminated),
             "truncated": bool(truncated),
-            "success": None if said is None else bool(said),
+            "success": None if success is None else bool(success),
         }
 
     def episode(self) -> Episode:
@@ -185,7 +185,7 @@ class _Recorded:
 
 
 def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
-    """What `info` tells in single finite numbers, without the parts of the reward and the success."""
+    """The single finite numbers in `info`, without the parts of the reward and the success."""
     return {
         key: float(value)
         for key, value in info.items()

@@ -41,48 +41,22 @@ HULL_OUTLINE = np.vstack([OUTLINE, OUTLINE[:0:-1] * [1.0, -1.0]])
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What one picture shows, SI units.
+    """What one picture shows, SI units."""
 
-    Attributes
-    ----------
-    x, y : float
-        Position of the ship, north and east, m.
-    heading, rudder : float
-        rad.
-    length, beam : float
-        Of the ship, m.
-    rudder_limit : float
-        rad.
-    wake : array of shape (n, 2)
-        Where the ship has been.
-    course_order : float or None
-        Heading to steer, rad.
-    waypoints : array of shape (n, 2) or None
-        Of the path.
-    corridor : float or None
-        Half the width of the corridor along the path, m.
-    wind : tuple of float or None
-        Speed, m/s, and direction it comes from, rad.
-    current : tuple of float or None
-        Speed, m/s, and direction it sets towards, rad.
-    readouts : mapping of str to str
-        Lines of text: what, and how much with its unit.
-    """
-
-    x: float
-    y: float
+    x: float  # north, m
+    y: float  # east, m
     heading: float
     rudder: float
     length: float
     beam: float
     rudder_limit: float
-    wake: Floats
-    course_order: float | None = None
-    waypoints: Floats | None = None
-    corridor: float | None = None
-    wind: tuple[float, float] | None = None
-    current: tuple[float, float] | None = None
-    readouts: Mapping[str, str] = field(default_factory=dict)
+    wake: Floats  # where the ship has been, shape (n, 2)
+    course_order: float | None = None  # heading to steer
+    waypoints: Floats | None = None  # shape (n, 2)
+    corridor: float | None = None  # half its width
+    wind: tuple[float, float] | None = None  # speed, and direction it comes from
+    current: tuple[float, float] | None = None  # speed, and direction it sets towards
+    readouts: Mapping[str, str] = field(default_factory=dict)  # a quantity, and its value with the unit
 
 
 class Renderer:
@@ -116,16 +90,7 @@ class Renderer:
         self._clock: Any = None
 
     def draw(self, scene: Scene) -> Picture:
-        """The picture of a scene.
-
-        Parameters
-        ----------
-        scene : Scene
-
-        Returns
-        -------
-        uint8 array of shape (600, 600, 3)
-        """
+        """The picture of a scene, a uint8 array of shape (600, 600, 3)."""
         chart = _Chart(scene)
         self._brush.fill(WATER)
         self._draw_grid(chart)
@@ -254,10 +219,10 @@ class Renderer:
         if not lines:
             return
         self._brush.panel(PANEL, (8.0, 8.0, 212.0, 12.0 + 19.0 * len(lines)))
-        for k, (what, much) in enumerate(lines):
+        for k, (label, value) in enumerate(lines):
             height = 15.0 + 19.0 * k
-            self._brush.text(what, (18.0, height), LEGEND.get(what, FAINT))
-            self._brush.text(much, (210.0, height), INK, "right")
+            self._brush.text(label, (18.0, height), LEGEND.get(label, FAINT))
+            self._brush.text(value, (210.0, height), INK, "right")
 
 
 class _Brush:
@@ -336,13 +301,7 @@ class _Chart:
 
 
 def check_render_mode(mode: str) -> str:
-    """A render mode that there is.
-
-    Raises
-    ------
-    InputError
-        For another.
-    """
+    """Return a render mode, which must be one of `RENDER_MODES`."""
     if mode not in RENDER_MODES:
         raise InputError(
             f"render_mode: {mode!r} found, expected one of {', '.join(map(repr, RENDER_MODES))}, or None"

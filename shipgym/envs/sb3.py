@@ -1,7 +1,4 @@
-"""The native vector environment as stable-baselines3 has them.
-
-stable-baselines3 takes no vector environment of Gymnasium's; its own step single ones in turn.
-"""
+"""The native vector environment as a `VecEnv` of stable-baselines3, which takes none of Gymnasium's."""
 
 from __future__ import annotations
 
@@ -78,12 +75,12 @@ FIXED = {*SHARED, *(name for name in vars(Row) if not name.startswith("_"))}
 
 
 class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """Ships under a task as a vector environment of stable-baselines3; step by step its DummyVecEnv of them.
+    """Ships under a task as a vector environment of stable-baselines3, equal to its DummyVecEnv of them.
 
     The list of infos is the same in every step, and its dictionaries are empty but for episodes that ended:
     those hold what the single environment's `info` does, `terminal_observation`, `TimeLimit.truncated`,
     `episode` as stable-baselines3's Monitor writes it (return `r`, length `l`, time `t`) and, where paths
-    are followed, `is_success`. Who keeps infos beyond the next step has to copy the list.
+    are followed, `is_success`. Copy the list to keep infos beyond the next step.
 
     Parameters
     ----------
@@ -94,7 +91,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     seed : int, optional
         Row i has the seed `seed + i`, as if `seed` was called.
     info_names : sequence of str
-        Entries of `info` that every step gives for every ship; at the price of time.
+        Entries of `info` that every step gives for every ship, which takes time.
     **options
         Of the environment, `threads` among them.
 
@@ -199,7 +196,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
             self._infos[row] = dict(zip(self.info_names, values, strict=True))
 
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
-        """What is told at the end of an episode."""
+        """The info of a row whose episode ended."""
         info = _info_of(infos["final_info"], row)
         if "success" in info:
             info["is_success"] = info["success"]  # read by stable-baselines3's log
@@ -216,7 +213,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         return own | self.vector_env.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
+        """Go on from the `memory` of an environment made with the same arguments, in place of a `reset`."""
         self._returns[:], self._lengths[:] = memory["returns"], memory["lengths"]
         self.vector_env.remember(memory)
         self.reset_infos = [{} for _ in range(self.num_envs)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
 from shipgym.ships.ship_model import Seed, ShipModel
@@ -20,11 +20,11 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 CLOCK = 0.5  # of the binary sequence, L / U0
-LONGEST_PERIOD, SHORTEST_PERIOD = 20.0, 2.0  # of the multi-sine, L / U0
+PERIODS = 20.0, 2.0  # longest and shortest of the multi-sine, L / U0
 REGISTER = 10  # bits of the shift register: the sequence repeats after 1023 clock periods
 TRIES = 32  # draws of phases from which the multi-sine of least crest is taken
-SHORTEST_HOLD, LONGEST_HOLD = 0.5, 4.0  # of random rudder steps, L / U0
-SHORTEST_SHAFT_HOLD, LONGEST_SHAFT_HOLD = 5.0, 15.0  # of shaft-speed steps, L / U0
+RUDDER_STEPS = 0.5, 4.0  # shortest and longest of random rudder steps, L / U0
+SHAFT_STEPS = 5.0, 15.0  # of shaft-speed steps, L / U0
 
 
 def prbs_rudder(
@@ -56,10 +56,6 @@ def prbs_rudder(
     weather : Weather or str, optional
         A weather or the name of a sea state, with the same seed; by default calm.
 
-    Returns
-    -------
-    Trial
-
     Raises
     ------
     InputError
@@ -71,7 +67,9 @@ def prbs_rudder(
 
     amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
     times = _times(duration, dt)
-    clock = _length_times(model, CLOCK) if clock_s is None else check_number(clock_s, "clock_s", at_least=dt)
+    (clock,) = _durations(model, (clock_s,), (CLOCK,))
+    if clock_s is not None:
+        check_number(clock, "clock_s", at_least=dt)
     register = np.zeros(REGISTER, dtype=np.int8)
     while not register.any():
         register = np.random.default_rng(seed).integers(0, 2, REGISTER, dtype=np.int8)
@@ -106,16 +104,8 @@ def multi_sine_rudder(
         Of the phases.
     longest_period_s, shortest_period_s : float, optional
         The band, s; by default 20 and 2 times the time to travel one ship length.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------
@@ -127,8 +117,7 @@ def multi_sine_rudder(
     """
     amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
     times = _times(duration, dt)
-    longest = _length_times(model, LONGEST_PERIOD) if longest_period_s is None else longest_period_s
-    shortest = _length_times(model, SHORTEST_PERIOD) if shortest_period_s is None else shortest_period_s
+    longest, shortest = _durations(model, (longest_period_s, shortest_period_s), PERIODS)
     check_number(shortest, "shortest_period_s", at_least=2.0 * dt, hint="two samples")
     check_number(longest, "longest_period_s", above=shortest, hint="the band goes from long to short")
     period = len(times) * dt
@@ -173,16 +162,8 @@ def random_rudder_steps(
         Of the steps.
     shortest_s, longest_s : float, optional
         How long an angle is held, s; by default 0.5 to 4 times the time to travel one ship length.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------
@@ -193,9 +174,8 @@ def random_rudder_steps(
     """
     largest = _rudder_angle(model, largest_deg, "largest_deg")
     times = _times(duration, dt)
-    shortest = _length_times(model, SHORTEST_HOLD) if shortest_s is None else shortest_s
-    longest = _length_times(model, LONGEST_HOLD) if longest_s is None else longest_s
-    rudder = _steps(times, -largest, largest, shortest, longest, seed)
+    lengths = _durations(model, (shortest_s, longest_s), RUDDER_STEPS)
+    rudder = _steps(times, (-largest, largest), lengths, seed)
     return _sail(model, rudder, None, dt, Conditions(water_depth, weather, seed))
 
 
@@ -226,16 +206,8 @@ def shaft_speed_steps(
         How long a speed is held, s; by default 5 to 15 times the time to travel one ship length.
     rudder_deg : float
         Rudder held meanwhile, degrees.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state, with the same seed; by default calm.
-
-    Returns
-    -------
-    Trial
+    duration, dt, water_depth, weather
+        As in `prbs_rudder`.
 
     Raises
     ------
@@ -251,21 +223,14 @@ def shaft_speed_steps(
     limit = model.steering.rudder_limit_deg
     check_number(rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit")
     times = _times(duration, dt)
-    shortest = _length_times(model, SHORTEST_SHAFT_HOLD) if shortest_s is None else shortest_s
-    longest = _length_times(model, LONGEST_SHAFT_HOLD) if longest_s is None else longest_s
-    shaft = service * _steps(times, lowest_ratio, highest_ratio, shortest, longest, seed)
+    lengths = _durations(model, (shortest_s, longest_s), SHAFT_STEPS)
+    shaft = service * _steps(times, (lowest_ratio, highest_ratio), lengths, seed)
     rudder = np.full(len(times), np.radians(rudder_deg))
     return _sail(model, rudder, shaft, dt, Conditions(water_depth, weather, seed))
 
 
 def shaft_of(model: ShipModel) -> float:
-    """Shaft speed at service speed, 1/s, of a ship that has a shaft.
-
-    Raises
-    ------
-    InputError
-        If its thrust is part of the hull's coefficients.
-    """
+    """Shaft speed at service speed, 1/s; InputError where the thrust is part of the hull's coefficients."""
     if "n" not in model.command_names:
         raise InputError(
             f"model {model.name!r}: no shaft speed among its commands ({', '.join(model.command_names)}), "
@@ -275,15 +240,16 @@ def shaft_of(model: ShipModel) -> float:
     return model.service_shaft_speed
 
 
-def _steps(times: Floats, low: float, high: float, shortest: float, longest: float, seed: Seed) -> Floats:
-    """Random levels, each held for a random time; shape of the times."""
+def _steps(times: Floats, levels: tuple[float, float], lengths: tuple[float, ...], seed: Seed) -> Floats:
+    """Random levels of random lengths, both from a range; of the shape of the times."""
+    shortest, longest = lengths
     check_number(shortest, "shortest_s", above=0.0)
     check_number(longest, "longest_s", at_least=shortest, hint="shortest_s or more")
     rng = np.random.default_rng(seed)
     most = int((times[-1] - times[0]) / shortest) + 2
     ends = np.cumsum(rng.uniform(shortest, longest, most))
-    levels: Floats = rng.uniform(low, high, most)
-    return levels[np.searchsorted(ends, times, side="right")]
+    drawn: Floats = rng.uniform(*levels, most)
+    return drawn[np.searchsorted(ends, times, side="right")]
 
 
 def _rudder_angle(model: ShipModel, angle_deg: float, argument: str) -> float:
@@ -293,9 +259,12 @@ def _rudder_angle(model: ShipModel, angle_deg: float, argument: str) -> float:
     return float(np.radians(angle))
 
 
-def _length_times(model: ShipModel, count: float) -> float:
-    """So many times the time to travel one ship length, s."""
-    return float(count * model.particulars["length"] / model.particulars["speed"])
+def _durations(
+    model: ShipModel, given: tuple[float | None, ...], usual: tuple[float, ...]
+) -> tuple[float, ...]:
+    """The given durations, or the usual ones in times to travel one ship length; s."""
+    travel = float(model.particulars["length"] / model.particulars["speed"])
+    return tuple(count * travel if own is None else own for own, count in zip(given, usual, strict=True))
 
 
 def _times(duration: float, dt: float) -> Floats:

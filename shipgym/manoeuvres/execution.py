@@ -1,10 +1,13 @@
-"""When a manoeuvre was executed: found from the rudder, ordered or measured."""
+"""When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 
@@ -19,6 +22,13 @@ def rudder(trial: Trial) -> Floats:
         if name in trial.channels:
             return trial[name]
     raise InputError(f"trial {trial.name!r}: channel 'delta' is missing, it shows when the rudder moved")
+
+
+def require(trial: Trial, names: Sequence[str], what: str) -> None:
+    """Refuse a trial that lacks a channel that `what` needs."""
+    for name in names:
+        if name not in trial.channels:
+            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, {what} needs it")
 
 
 def execute_time(trial: Trial) -> float:
@@ -70,6 +80,16 @@ def distance_sailed(trial: Trial) -> Floats:
     speed = np.hypot(trial["u"], trial["v"])
     steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(trial.t)
     return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def number_of_steps(duration: float, dt: float) -> int:
+    """Steps of dt in a duration, both s, checked."""
+    check_number(dt, "dt", above=0.0)
+    check_number(duration, "duration", above=0.0)
+    steps = round(duration / dt)
+    if steps < 2:
+        raise InputError(f"duration: {duration:g} s found, expected at least two steps of dt = {dt:g} s")
+    return steps
 
 
 def ship_length(trial: Trial, length: float | None) -> float:

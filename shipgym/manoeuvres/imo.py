@@ -10,7 +10,10 @@ import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of, worst
-from shipgym.manoeuvres.standard import Manoeuvre, speed_changes, turning_circles, zigzags
+from shipgym.manoeuvres.registry import Manoeuvre
+from shipgym.manoeuvres.stopping import standard_stops
+from shipgym.manoeuvres.turning import standard_circles
+from shipgym.manoeuvres.zigzags import standard_zigzags
 from shipgym.ships.ship_model import ShipModel
 
 DRAWS = 100  # of an identified ship
@@ -22,7 +25,7 @@ LARGE_DISPLACEMENT = (
 
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion, judged on the worse of both sides.
+    """One criterion; the worse of both sides counts.
 
     Attributes
     ----------
@@ -37,9 +40,9 @@ class Criterion:
     source : str
         Paragraph of the annex of MSC.137(76).
     drawn : IndexInterval or None
-        The value over models drawn from the posterior of an identified ship.
+        The value over models drawn from the covariance of an identified ship.
     note : str
-        What else is to be known.
+        Remarks.
     """
 
     value: float | None
@@ -64,7 +67,7 @@ class Criterion:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON knows it."""
-        told: dict[str, Any] = {
+        fields: dict[str, Any] = {
             "value": self.value,
             "limit": self.limit,
             "passed": self.passed,
@@ -72,20 +75,20 @@ class Criterion:
             "source": self.source,
         }
         if self.note:
-            told["note"] = self.note
+            fields["note"] = self.note
         if self.drawn is not None and len(self.drawn.values):
             low, median, high = self.drawn.quantiles(0.05, 0.5, 0.95)
-            told |= {"probability": self.share_passed, "interval_95": self.interval}
-            told |= {"quantile_05": low, "median": median, "quantile_95": high}
-            told |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
-            told |= {"without_value": int(np.isnan(self.drawn.values).sum())}
-        return told
+            fields |= {"probability": self.share_passed, "interval_95": self.interval}
+            fields |= {"quantile_05": low, "median": median, "quantile_95": high}
+            fields |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
+            fields |= {"without_value": int(np.isnan(self.drawn.values).sum())}
+        return fields
 
 
 def imo_assessment(
     model: ShipModel, n_draws: int | None = None, seed: int | np.random.Generator = 0
 ) -> dict[str, Criterion]:
-    """Judge a ship by MSC.137(76): turning, initial turning, yaw checking, course keeping and stopping.
+    """Assess a ship by MSC.137(76): turning, initial turning, yaw checking, course keeping and stopping.
 
     Simulated from service speed in deep water: turning circles with 35 degrees of rudder, or the
     rudder's limit where that is less, and zigzags 10/10 and 20/20, each to both sides; a full astern stop
@@ -96,7 +99,7 @@ def imo_assessment(
     model : ShipModel
         The ship.
     n_draws : int, optional
-        Models drawn from the covariance of an identified ship, to tell how certain each verdict is; by
+        Models drawn from the covariance of an identified ship, to show how certain each verdict is; by
         default 100, and none for a ship without covariance.
     seed : int or Generator
         Of the draw.
@@ -121,39 +124,40 @@ def imo_assessment(
 def assess_draws(
     model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
 ) -> dict[str, Criterion]:
-    """The criteria of a model, with their spread over models drawn; `progress` is told the draws done."""
+    """The criteria of a model and of models drawn from it; `progress` is told the number of draws done."""
     needed = imo_manoeuvres(model)
-    own = {name: attempt(test.judge, model)[0] or test.nothing for name, test in needed.items()}
-    judged = {name: test.judge for name, test in needed.items()}
-    return judge_imo(model, intervals_of(own, draws, judged, progress))
+    own = {name: attempt(test.evaluate, model)[0] or test.no_indices for name, test in needed.items()}
+    evaluated = {name: test.evaluate for name, test in needed.items()}
+    return imo_criteria(model, intervals_of(own, draws, evaluated, progress))
 
 
 def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
     """The standard manoeuvres that the criteria need."""
-    stops = {name: stop for name, stop in speed_changes(model).items() if name == "crash stop"}
-    return turning_circles(model) | zigzags(model) | stops
+    stops = {name: stop for name, stop in standard_stops(model).items() if name == "crash stop"}
+    return standard_circles(model) | standard_zigzags(model) | stops
 
 
-def judge_imo(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]) -> dict[str, Criterion]:
+def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]) -> dict[str, Criterion]:
     """The criteria of a ship from the indices of her standard manoeuvres, by their names.
 
     A manoeuvre that never got so far fails its criteria.
     """
+    needed = imo_manoeuvres(model)
     first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
 
-    def judged(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
-        runs = [run for name, run in found.items() if name.startswith(manoeuvre)]
-        return _judge(runs, index, limit, unit, paragraph)
+    def worst_of(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
+        runs = [run for name, run in found.items() if name in needed and name.startswith(manoeuvre)]
+        return _criterion(runs, index, limit, unit, paragraph)
 
     return {
-        "advance": judged("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
-        "tactical_diameter": judged(
+        "advance": worst_of("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
+        "tactical_diameter": worst_of(
             "turning circle", "tactical_diameter_lengths", 5.0, "ship lengths", "5.3.1"
         ),
-        "initial_turning": judged("zigzag 10/10", "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
-        "overshoot_1_10_10": judged("zigzag 10/10", "overshoot_1_deg", first, "deg", "5.3.3.1"),
-        "overshoot_2_10_10": judged("zigzag 10/10", "overshoot_2_deg", second, "deg", "5.3.3.2"),
-        "overshoot_1_20_20": judged("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
+        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
+        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "deg", "5.3.3.1"),
+        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "deg", "5.3.3.2"),
+        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
         "stopping": _stopping(model, found.get("crash stop")),
     }
 
@@ -165,7 +169,7 @@ def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
     return float(first), float(second)
 
 
-def _judge(
+def _criterion(
     runs: Sequence[Mapping[str, IndexInterval]],
     index: str,
     limit: float,
@@ -182,7 +186,7 @@ def _judge(
 def _stopping(model: ShipModel, stop: Mapping[str, IndexInterval] | None) -> Criterion:
     """The full astern stopping test."""
     if stop is not None:
-        return _judge(
+        return _criterion(
             [stop], "track_reach_lengths", STOPPING_LIMIT, "ship lengths", "5.3.4", LARGE_DISPLACEMENT
         )
     why = "its equations hold for a shaft turning ahead only"

@@ -1,4 +1,4 @@
-"""How certain the indices of an identified ship are: its manoeuvres with models drawn from the posterior."""
+"""How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ Bools = NDArray[np.bool_]
 LEVELS = (0.025, 0.975)  # of the 95 % interval
 
 #: From a ship to the indices of one of her manoeuvres, a dataclass such as `ZigzagIndices`.
-Judged = Callable[[ShipModel], Any]
+Evaluation = Callable[[ShipModel], Any]
 
 
 @dataclass(frozen=True, eq=False)
 class IndexInterval:
-    """One index of a model and of models drawn from its posterior.
+    """One index of a model and of models drawn from its covariance.
 
     Attributes
     ----------
@@ -92,11 +92,11 @@ class IndexInterval:
 
 def index_intervals(
     model: ShipModel,
-    manoeuvre: str | Judged = "zigzag 20/20, starboard first",
+    manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
     n_draws: int = 200,
     seed: int | np.random.Generator = 0,
 ) -> dict[str, IndexInterval]:
-    """Indices of a manoeuvre with their 95 % intervals over the posterior of an identified model.
+    """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
 
     Parameters
     ----------
@@ -134,18 +134,18 @@ def index_intervals(
     """
     if isinstance(manoeuvre, str):
         known = standard_manoeuvres(model)
-        judged: Judged = known[check_choice(manoeuvre, tuple(known), "manoeuvre")].judge
+        evaluate: Evaluation = known[check_choice(manoeuvre, tuple(known), "manoeuvre")].evaluate
     else:
-        judged = manoeuvre
+        evaluate = manoeuvre
     check_number(n_draws, "n_draws", at_least=2)
-    own = {"": asdict(judged(model))}
-    return intervals_of(own, model.sample(int(n_draws), seed), {"": judged})[""]
+    own = {"": asdict(evaluate(model))}
+    return intervals_of(own, model.sample(int(n_draws), seed), {"": evaluate})[""]
 
 
 def intervals_of(
     own: Mapping[str, Mapping[str, float | None]],
     draws: Sequence[ShipModel],
-    judged: Mapping[str, Judged],
+    evaluations: Mapping[str, Evaluation],
     progress: Callable[[int], None] | None = None,
 ) -> dict[str, dict[str, IndexInterval]]:
     """Indices of several manoeuvres over the same draws.
@@ -156,10 +156,10 @@ def intervals_of(
         Of the model itself, by manoeuvre.
     draws : sequence of ShipModel
         Sailed one after the other; with none, the values stand alone.
-    judged : mapping of str to callable
+    evaluations : mapping of str to callable
         From a ship to the indices, by manoeuvre.
     progress : callable, optional
-        Told the number of draws done.
+        Called with the number of draws done.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def intervals_of(
     values = {name: {index: np.full(len(draws), np.nan) for index in own[name]} for name in own}
     for k, draw in enumerate(draws):
         for name in own:
-            indices, ran_away[name][k] = attempt(judged[name], draw)
+            indices, ran_away[name][k] = attempt(evaluations[name], draw)
             for index, value in indices.items():
                 if value is not None:
                     values[name][index][k] = value
@@ -185,14 +185,14 @@ def intervals_of(
     }
 
 
-def attempt(judged: Judged, model: ShipModel) -> tuple[dict[str, float | None], bool]:
+def attempt(evaluate: Evaluation, model: ShipModel) -> tuple[dict[str, float | None], bool]:
     """Indices of a manoeuvre, none where it never got so far, and whether the ship ran away.
 
     A spiral of a draw that turns to one side only, or whose rudder has the wrong sign, has no indices either:
     there the error lies in the draw and not in what the user gave.
     """
     try:
-        return asdict(judged(model)), False
+        return asdict(evaluate(model)), False
     except UnstableModelError:
         return {}, True
     except (ManoeuvreError, InputError):

@@ -6,22 +6,27 @@ As described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.execution import require, rudder
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.trials.trial import Trial
 
+TURN_DEG = 20.0  # of the standard pull-out, or the rudder's limit where that is less
+CAPTION = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on a straight course."
+
 
 @dataclass(frozen=True)
 class PullOutIndices:
-    """What a pull-out tells of a ship.
+    """Indices of a pull-out.
 
     Attributes
     ----------
@@ -55,16 +60,8 @@ def pull_out(
         Rudder of the turn, degrees; negative turns to port.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -101,8 +98,7 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     InputError
         If a channel is missing, or the rudder was never put amidships.
     """
-    if "r" not in trial.channels:
-        raise InputError(f"trial {trial.name!r}: channel 'r' is missing, a pull-out needs the yaw rate")
+    require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))
     over = np.flatnonzero(delta > 0.5 * delta.max())
     release = int(over[-1]) + 1 if len(over) else 0
@@ -114,3 +110,15 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
     turn, rest = np.degrees(trial["r"][int(over[0]) : release]), np.degrees(trial["r"][release:])
     last = [float(part[-max(len(part) // 10, 1) :].mean()) for part in (turn, rest)]
     return PullOutIndices(*last)
+
+
+def standard_pull_outs(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Pull-outs from turns to both sides."""
+    angle = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return {
+        f"pull-out from {side}": Manoeuvre(
+            partial(pull_out, rudder_deg=sign * angle, water_depth=water_depth),
+            pull_out_indices, PullOutIndices, CAPTION,
+        )
+        for side, sign in SIDES
+    }  # fmt: skip

@@ -39,19 +39,10 @@ class Steady:
 
 
 class Voyage:
-    """A manoeuvre in the making: one leg after the other, from straight ahead at service speed.
+    """A manoeuvre in the making: one leg after the other, from service speed or a given state.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    dt : float or None
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    conditions : Conditions
-        Depth of the water and weather. In weather the motion is never steady: legs that wait for it last
-        their longest.
-    state : array of shape (n_state,), optional
-        Where to start.
+    Samples are dt apart, s; by default a fortieth of the time to travel one ship length. In weather the
+    motion is never steady: legs that wait for it last their longest.
     """
 
     def __init__(
@@ -98,14 +89,15 @@ class Voyage:
     def rate_helmsman(self) -> Callable[[float], Sail]:
         """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
 
-        He is designed from the rudder's effect at service speed, and remembers his integral part.
+        The helmsman is designed from the rudder's effect at service speed; the integral part
+        carries over from leg to leg.
         """
         model, memory, passage = self.model, np.zeros(1), self.passage
         steer, shaft = passage.kernel("rate_steering").steer_rate, model.service_shaft_speed
         gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
         reset_time = HELMSMAN_RESET * self.length_time
 
-        def held(rate: float) -> Sail:
+        def at_rate(rate: float) -> Sail:
             def sail(states: Floats, commands: Floats) -> int:
                 orders = np.empty(len(commands))
                 reached: int = steer(
@@ -117,7 +109,7 @@ class Voyage:
 
             return sail
 
-        return held
+        return at_rate
 
     def settle(self, sail: Sail) -> Steady:
         """Sail until the motion no longer changes, 300 ship lengths at most."""

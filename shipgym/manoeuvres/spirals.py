@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -14,17 +15,19 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import rudder
+from shipgym.manoeuvres.execution import require, rudder
+from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
+from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]
 
-#: Rudder angles of the direct spiral, degrees, from starboard to port: fine where the loop is.
+#: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps where the loop is.
 DIRECT_RUDDER_DEG = (
     20.0, 15.0, 10.0, 5.0, 4.0, 3.0, *(0.25 * k for k in range(8, -9, -1)), -3.0, -4.0, -5.0, -10.0, -15.0,
     -20.0,
@@ -32,6 +35,8 @@ DIRECT_RUDDER_DEG = (
 #: Yaw rates of the reverse spiral by U0 / L, from starboard to port.
 REVERSE_RATES = (0.2, 0.15, *(0.01 * k for k in range(12, -13, -1)), -0.15, -0.2)
 STEADY_PART = 1.0 / 3.0  # of a measured plateau, its last part
+DIRECT_CAPTION = "Each point a steady turn, with rudder angles there and back."
+REVERSE_CAPTION = "Each point a yaw rate held by a helmsman, with the mean rudder that it took."
 SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on its way
 
 
@@ -57,7 +62,7 @@ class Spiral:
 
 @dataclass(frozen=True)
 class SpiralIndices:
-    """What a spiral tells of a ship.
+    """Indices of a spiral.
 
     Attributes
     ----------
@@ -94,16 +99,8 @@ def direct_spiral(
         known to within their steps.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Spiral
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -144,12 +141,8 @@ def reverse_spiral(
         From one side to the other, degrees per second; by default from 0.2 to -0.2 times U0 / L.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Returns
     -------
@@ -208,17 +201,12 @@ def spiral_from_trial(
     tolerance_deg : float
         Degrees.
 
-    Returns
-    -------
-    Spiral
-
     Raises
     ------
     InputError
         If a channel is missing, or there are fewer than four steady turns.
     """
-    if "r" not in trial.channels:
-        raise InputError(f"trial {trial.name!r}: channel 'r' is missing, a spiral needs the yaw rate")
+    require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
     delta, rate = np.degrees(rudder(trial)), np.degrees(trial["r"])
     allowed = 1e-9 if "delta_command" in trial.channels else tolerance
@@ -251,10 +239,6 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
     ----------
     spiral : Spiral
         Simulated, or measured (`spiral_from_trial`).
-
-    Returns
-    -------
-    SpiralIndices
 
     Raises
     ------
@@ -302,13 +286,31 @@ def _reverse_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
     from scipy.interpolate import Akima1DInterpolator
 
     order = np.argsort(rates)
-    fine = np.linspace(rates.min(), rates.max(), 4001)
-    curve = np.asarray(Akima1DInterpolator(rates[order], angles[order])(fine))
+    grid = np.linspace(rates.min(), rates.max(), 4001)
+    curve = np.asarray(Akima1DInterpolator(rates[order], angles[order])(grid))
     highest = np.maximum.accumulate(curve)
     low = int(np.argmax(highest - curve))
     width = float(highest[low] - curve[low])
     if width == 0.0:
-        return 0.0, 0.0, float(np.interp(0.0, fine, curve))
+        return 0.0, 0.0, float(np.interp(0.0, grid, curve))
     middle = 0.5 * (highest[low] + curve[low])
-    inside = fine[np.flatnonzero(np.diff(np.sign(curve - middle)))]
+    inside = grid[np.flatnonzero(np.diff(np.sign(curve - middle)))]
     return width, float(np.ptp(inside)), float(middle)
+
+
+def standard_spirals(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
+    angles = [a for a in DIRECT_RUDDER_DEG if abs(a) <= model.steering.rudder_limit_deg]
+    direct = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
+    reverse = partial(reverse_spiral, water_depth=water_depth)
+    spirals = {"direct spiral": Manoeuvre(direct, spiral_indices, SpiralIndices, DIRECT_CAPTION)}
+    if not _is_stable(model):
+        spirals["reverse spiral"] = Manoeuvre(reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION)
+    return spirals
+
+
+def _is_stable(model: ShipModel) -> bool:
+    try:
+        return is_course_stable(model)
+    except InputError:  # there is no straight course at all
+        return False

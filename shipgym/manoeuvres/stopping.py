@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
-from shipgym.manoeuvres.execution import distance_sailed, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
+from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions
@@ -20,10 +22,16 @@ from shipgym.trials.trial import Trial
 LONGEST = 300.0  # of a stopping trial, L / U0
 ACCELERATION = 40.0  # duration of an acceleration, L / U0
 
+STOP_CAPTION = "The shaft stopped at service speed, the rudder amidships, until a tenth of it is left."
+CRASH_CAPTION = (
+    "The shaft ordered full astern at service speed, the rudder amidships, until dead in the water."
+)
+ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to service speed."
+
 
 @dataclass(frozen=True)
 class StoppingIndices:
-    """What a stopping trial tells of a ship.
+    """Indices of a stopping trial.
 
     Attributes
     ----------
@@ -46,7 +54,7 @@ class StoppingIndices:
 
 @dataclass(frozen=True)
 class AccelerationIndices:
-    """What an acceleration tells of a ship.
+    """Indices of an acceleration.
 
     Attributes
     ----------
@@ -90,16 +98,8 @@ def stopping(
         shaft astern brings about.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -111,13 +111,7 @@ def stopping(
     UnstableModelError
         If the ship runs away.
     """
-    order = _stopping_order(model, shaft_speed)
-    check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0, hint="part of the service speed")
-    if speed_ratio == 0.0 and order >= 0.0:
-        raise InputError(
-            "speed_ratio: 0 found, but a ship without an order astern is never dead in the water; expected "
-            "a number > 0, such as 0.1"
-        )
+    order = _stopping_order(model, shaft_speed, speed_ratio)
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     sail, n_steps = voyage.hold(0.0, order), max(round(voyage.length_time / voyage.dt), 2)
     target = speed_ratio * model.particulars["speed"]
@@ -134,8 +128,8 @@ def stopping(
     )
 
 
-def _stopping_order(model: ShipModel, shaft_speed: float) -> float:
-    """The order for the shaft, 1/s, checked."""
+def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) -> float:
+    """The order for the shaft, 1/s, after checking it and the ratio of speeds."""
     service = shaft_of(model)
     order = check_number(
         shaft_speed, "shaft_speed", at_least=-1.5 * service, below=service, hint="less than at service speed"
@@ -144,6 +138,12 @@ def _stopping_order(model: ShipModel, shaft_speed: float) -> float:
         raise InputError(
             f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r} holds for a "
             "shaft turning ahead only; expected a number >= 0, or a ship like 'tanker'"
+        )
+    check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0, hint="part of the service speed")
+    if speed_ratio == 0.0 and order >= 0.0:
+        raise InputError(
+            "speed_ratio: 0 found, but a ship without an order astern is never dead in the water; expected "
+            "a number > 0, such as 0.1"
         )
     return order
 
@@ -156,17 +156,7 @@ def goes_astern(model: ShipModel) -> bool:
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    water_depth : float
-        m, for ships that know shallow water.
-
-    Raises
-    ------
-    InputError
-        For a ship whose equations do not hold astern.
+    InputError for a ship whose equations do not hold astern; `water_depth` as in `zigzag`.
     """
     return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
@@ -186,10 +176,6 @@ def stopping_indices(
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
 
-    Returns
-    -------
-    StoppingIndices
-
     Raises
     ------
     InputError
@@ -197,9 +183,7 @@ def stopping_indices(
     ManoeuvreError
         If the speed is never reached.
     """
-    for name in ("u", "v", "x", "y", "psi"):
-        if name not in trial.channels:
-            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, a stopping trial needs it")
+    require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp, u = ship_length(trial, length), trial["u"]
     end = float(trial.t[-1])
     if speed_ratio is not None:
@@ -242,16 +226,8 @@ def acceleration(
         s; by default 40 times the time to travel one ship length.
     dt : float, optional
         Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth : float
-        m, for ships that know shallow water.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -285,18 +261,12 @@ def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None =
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
 
-    Returns
-    -------
-    AccelerationIndices
-
     Raises
     ------
     InputError
         If a channel or the length is missing, or the ship does not become faster.
     """
-    for name in ("u", "v"):
-        if name not in trial.channels:
-            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, an acceleration needs it")
+    require(trial, ("u", "v"), "an acceleration")
     check_number(part, "part", above=0.0, below=1.0)
     u = trial["u"]
     if not u[-1] > u[0]:
@@ -319,3 +289,17 @@ def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
         )
     k = max(int(reached[0]), 1)
     return float(np.interp(threshold, values[k - 1 : k + 1], trial.t[k - 1 : k + 1]))
+
+
+def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
+    if "n" not in model.command_names:
+        return {}
+    stop, crash, faster = (
+        partial(sail, water_depth=water_depth) for sail in (stopping, crash_stop, acceleration)
+    )
+    found = {"inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)}
+    if goes_astern(model):
+        found["crash stop"] = Manoeuvre(crash, stopping_indices, StoppingIndices, CRASH_CAPTION)
+    found["acceleration"] = Manoeuvre(faster, acceleration_indices, AccelerationIndices, ACCELERATION_CAPTION)
+    return found

@@ -1,7 +1,8 @@
 """A virtual towing tank: captive tests of any ship model, its motion prescribed and its forces measured.
 
-The tests are those of the planar motion mechanism (Gertler 1967, The DTMB
-planar-motion-mechanism system; ITTC 7.5-02-06-02, Captive model test).
+Each test returns a Trial with the motion and the forces X, Y (N) and N (N m); a number out of range is an
+InputError. The tests are those of the planar motion mechanism (Gertler 1967, The DTMB
+planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
 from __future__ import annotations
@@ -158,16 +159,6 @@ def pure_surge(
         s; by default 10 times the time to travel one ship length.
     tank : Tank, optional
         Speed, rudder, shaft, noise, ...
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
     """
     tank = tank or Tank()
     speed = tank.carriage_speed(model)
@@ -188,16 +179,6 @@ def pure_sway(
         Of the sway speed, m/s.
     period_s, tank
         As in `pure_surge`.
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
     """
     tank = tank or Tank()
     check_number(amplitude, "amplitude", above=0.0)
@@ -218,16 +199,6 @@ def pure_yaw(
         Of the yaw rate, degrees per second.
     period_s, tank
         As in `pure_surge`.
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
     """
     return yaw_with_drift(model, amplitude_deg_s, 0.0, period_s, tank)
 
@@ -251,16 +222,6 @@ def yaw_with_drift(
         Drift angle at midship, degrees: v = -U sin(drift).
     period_s, tank
         As in `pure_surge`.
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m).
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
     """
     tank = tank or Tank()
     rate = float(np.radians(check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0)))

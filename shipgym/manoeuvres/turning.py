@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, ship_length
-from shipgym.manoeuvres.zigzags import number_of_steps
+from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import Seed, ShipModel
 from shipgym.ships.simulate import simulate
@@ -18,10 +19,13 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
+TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
+CAPTION = "Path from above, from the position and along the heading at which the rudder was ordered."
+
 
 @dataclass(frozen=True)
 class TurningIndices:
-    """What a turning circle tells of a ship; None where the ship did not turn so far.
+    """Indices of a turning circle; None where the ship did not turn so far.
 
     Lengths are measured from the position and along the heading at which the rudder was ordered.
 
@@ -66,16 +70,8 @@ def turning_circle(
         Rudder ordered at the start, degrees; negative turns to port.
     duration, dt : float
         s. The samples are dt apart.
-    water_depth : float
-        m.
-    weather : Weather or str, optional
-        A weather or the name of a sea state; by default calm.
-    seed : int or Generator
-        Of the weather.
-
-    Returns
-    -------
-    Trial
+    water_depth, weather, seed
+        As in `zigzag`.
 
     Raises
     ------
@@ -103,18 +99,12 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     length : float, optional
         Ship length between perpendiculars, m; by default the trial's own.
 
-    Returns
-    -------
-    TurningIndices
-
     Raises
     ------
     InputError
         If a channel or the length is missing.
     """
-    for name in ("x", "y", "psi"):
-        if name not in trial.channels:
-            raise InputError(f"trial {trial.name!r}: channel {name!r} is missing, a turning circle needs it")
+    require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
     start = execute_time(trial)
     x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
@@ -157,3 +147,18 @@ def _steady(
     drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
     diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
     return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)
+
+
+def standard_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Turning circles with full rudder to both sides."""
+    duration, dt = standard_time(model)
+    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return {
+        f"turning circle {full:.0f} deg to {side}": Manoeuvre(
+            partial(
+                turning_circle, rudder_deg=sign * full, duration=duration, dt=dt, water_depth=water_depth
+            ),
+            turning_indices, TurningIndices, CAPTION,
+        )
+        for side, sign in SIDES
+    }  # fmt: skip

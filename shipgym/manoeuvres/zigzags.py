@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError, ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, reversals, ship_length
+from shipgym.errors import ManoeuvreError
+from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
+from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import Seed, ShipModel
@@ -20,10 +22,13 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
+STANDARD_DEG = (10.0, 20.0)
+CAPTION = "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed."
+
 
 @dataclass(frozen=True)
 class ZigzagIndices:
-    """What a zigzag tells of a ship; None where the manoeuvre did not get so far.
+    """Indices of a zigzag; None where the manoeuvre ended before.
 
     Attributes
     ----------
@@ -56,6 +61,8 @@ def zigzag(
 ) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
+    The trial has the rudder ordered from each sample on in `delta_command`.
+
     Parameters
     ----------
     model : ShipModel
@@ -79,11 +86,6 @@ def zigzag(
     seed : int or Generator
         Of the weather.
 
-    Returns
-    -------
-    Trial
-        With the rudder ordered from each sample on in `delta_command`.
-
     Raises
     ------
     InputError
@@ -97,12 +99,40 @@ def zigzag(
     threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
-    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    conditions = Conditions(water_depth, weather, seed)
+    first = -angle if port_first else angle
+    trial, turns = _sail(model, conditions, first, threshold, n_steps, dt, switch == "inside")
+    if must_reverse and turns == 0:
+        raise _never_reversed(f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}", trial, heading_deg)
+    return trial
+
+
+def _never_reversed(what: str, trial: Trial, heading_deg: float) -> ManoeuvreError:
+    side = np.sign(trial["delta_command"][0])
+    gained = np.degrees(side * (trial["psi"] - trial["psi"][0])).max()
+    return ManoeuvreError(
+        f"{what}: the heading changed by at most {gained:.3g} deg to the side of the rudder in "
+        f"{trial.duration:g} s, expected {heading_deg:g} deg, where the rudder is reversed; sail longer, or "
+        "order more rudder or less heading",
+        trial,
+    )
+
+
+def _sail(
+    model: ShipModel,
+    conditions: Conditions,
+    first: float,
+    threshold: float,
+    n_steps: int,
+    dt: float,
+    inside: bool,
+) -> tuple[Trial, int]:
+    """The trial with a first order and a heading to reverse at, rad, and how often it was reversed."""
+    passage = Passage(model, conditions, dt)
     states = passage.states(model.kernel_states(model.service_state[None])[0], n_steps)
     commands = np.empty(n_steps + 1)
-    first = -angle if port_first else angle
     reached, turns = passage.kernel("zigzag").zigzag(
-        states, commands, first, threshold, model.service_shaft_speed, dt, switch == "inside",
+        states, commands, first, threshold, model.service_shaft_speed, dt, inside,
         passage.sky, passage.words, passage.ship,
     )  # fmt: skip
     times = dt * np.arange(n_steps + 1, dtype=float)
@@ -110,26 +140,7 @@ def zigzag(
         raise unstable(model, times[reached], states[reached])
     orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
     orders[:, 0] = commands
-    trial = as_trial(model, times, states, orders, kind="zigzag")
-    if must_reverse and turns == 0:
-        gained = np.degrees(np.sign(first) * (trial["psi"] - trial["psi"][0])).max()
-        raise ManoeuvreError(
-            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by at most "
-            f"{gained:.3g} deg to the side of the rudder in {duration:g} s, expected {heading_deg:g} deg, "
-            "where the rudder is reversed; sail longer, or order more rudder or less heading",
-            trial,
-        )
-    return trial
-
-
-def number_of_steps(duration: float, dt: float) -> int:
-    """Steps of dt in a duration, both s, checked."""
-    check_number(dt, "dt", above=0.0)
-    check_number(duration, "duration", above=0.0)
-    steps = round(duration / dt)
-    if steps < 2:
-        raise InputError(f"duration: {duration:g} s found, expected at least two steps of dt = {dt:g} s")
-    return steps
+    return as_trial(model, times, states, orders, kind="zigzag"), int(turns)
 
 
 def zigzag_indices(
@@ -145,10 +156,6 @@ def zigzag_indices(
         Ship length between perpendiculars, m; by default the trial's own.
     heading_deg : float, optional
         Heading change at which the rudder had to be reversed, degrees; by default `switch_heading_deg`.
-
-    Returns
-    -------
-    ZigzagIndices
 
     Raises
     ------
@@ -231,3 +238,19 @@ def _overshoot_deg(
     if np.argmax(beyond) == len(beyond) - 1:
         return None
     return float(beyond.max())
+
+
+def standard_zigzags(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
+    duration, dt = standard_time(model)
+    return {
+        f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
+            partial(
+                zigzag, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0, duration=duration, dt=dt,
+                water_depth=water_depth, must_reverse=False,
+            ),
+            zigzag_indices, ZigzagIndices, CAPTION,
+        )
+        for angle in STANDARD_DEG
+        for side, sign in SIDES
+    }  # fmt: skip

@@ -40,6 +40,11 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.0f} %"
 
 
+def counted(count: int, noun: str) -> str:
+    """So many of something, with the plural in s."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def degrees(value: float | None) -> float | None:
     """An angle in degrees of one in radians."""
     return None if value is None else float(np.degrees(value))

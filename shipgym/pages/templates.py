@@ -12,7 +12,7 @@ from markupsafe import Markup
 
 import shipgym
 from shipgym.errors import InputError
-from shipgym.pages.numbers import NONE, degrees, fixed, number, percent
+from shipgym.pages.numbers import NONE, counted, degrees, fixed, number, percent
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -49,8 +49,8 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     made.filters |= {
-        "degrees": degrees, "fixed": fixed, "number": number, "percent": percent, "plotted": plotted,
-        "sentence": sentence,
+        "counted": counted, "degrees": degrees, "fixed": fixed, "number": number, "percent": percent,
+        "plotted": plotted, "sentence": sentence,
     }  # fmt: skip
     made.globals |= {"plotly_script": plotly_script, "dash": NONE, "version": shipgym.__version__}
     made.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}

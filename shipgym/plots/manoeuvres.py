@@ -245,7 +245,7 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
         trace = line(x[part], y[part], name, colour, showlegend=column != 2)
         figure.add_trace(trace, row=1, col=column)
         label(figure, below, axis(beside, zero=True), row=1, col=column)
-    figure.update_layout(layout(height, titled=True, hovermode="closest"))
+    figure.update_layout(layout(height, hovermode="closest"))
     return figure
 
 

@@ -31,7 +31,7 @@ import numpy as np
 
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 from shipgym.ships.envelope import CHANNELS, Envelope
 from shipgym.ships.equations import EQUATIONS, Equations
 from shipgym.ships.grey_box import GreyBox

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table, check_text
@@ -13,48 +13,22 @@ from shipgym.errors import InputError
 #: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
 ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
-_LIMITS: dict[str, tuple[float | None, float | None]] = {  # open bounds
-    "length": (0.0, None),
-    "beam": (0.0, None),
-    "draught": (0.0, None),
-    "mass": (0.0, None),
-    "xg": (None, None),
-    "yaw_gyradius": (0.0, None),
-    "block_coefficient": (0.0, 1.0),
-    "speed": (0.0, 50.0),
-    "rudder_area": (0.0, None),
-    "propeller_diameter": (0.0, None),
-    "length_overall": (0.0, None),
-    "frontal_area": (0.0, None),
-    "lateral_area": (0.0, None),
-    "lateral_centroid": (None, None),
-    "lateral_centroid_height": (0.0, None),
-    "metacentric_height": (0.0, None),
-    "roll_period": (0.0, 200.0),
-    "water_density": (500.0, 1500.0),
-    "X_udot": (-1.0, 0.0),
-    "Y_vdot": (-1.0, 0.0),
-    "Y_rdot": (-1.0, 1.0),
-    "N_vdot": (-1.0, 1.0),
-    "N_rdot": (-1.0, 0.0),
-}
+_PRIME = "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the added mass"
 
-_HINTS: dict[str, str] = {
-    "speed": "in m/s (a knot is 0.514 m/s)",
-    "water_density": "in kg/m3 (fresh water 1000, sea water 1025)",
-    **dict.fromkeys(
-        ADDED_MASSES,
-        "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the added mass",
-    ),
-}
 
-#: Largest share of the length that each of these can be.
-_SHARES_OF_LENGTH = {
-    "beam": 1.0, "draught": 0.5, "xg": 0.5, "yaw_gyradius": 0.7, "propeller_diameter": 0.5,
-    "length_overall": 2.0, "lateral_centroid": 0.5, "lateral_centroid_height": 0.5, "metacentric_height": 0.2,
-}  # fmt: skip
-#: Largest share of length * length that each of these areas can be.
-_SHARES_OF_SQUARE = {"frontal_area": 0.5, "lateral_area": 0.5}
+@dataclass(frozen=True)
+class _Bounds:
+    """Open bounds of a value, its largest share of the length or of the length squared, and a hint."""
+
+    above: float | None = None
+    below: float | None = None
+    of_length: float | None = None
+    of_square: float | None = None
+    hint: str = ""
+
+
+def _optional(above: float | None = 0.0, below: float | None = None, **bounds: Any) -> Any:
+    return field(default=None, metadata={"bounds": _Bounds(above, below, **bounds)})
 
 
 @dataclass(frozen=True)
@@ -111,30 +85,30 @@ class Particulars(Mapping[str, Any]):
         For values that no ship has.
     """
 
-    length: float
+    length: float = field(metadata={"bounds": _Bounds(above=0.0)})
     name: str = "ship"
-    beam: float | None = None
-    draught: float | None = None
-    mass: float | None = None
-    xg: float | None = None
-    yaw_gyradius: float | None = None
-    block_coefficient: float | None = None
-    speed: float | None = None
-    rudder_area: float | None = None
-    propeller_diameter: float | None = None
-    length_overall: float | None = None
-    frontal_area: float | None = None
-    lateral_area: float | None = None
-    lateral_centroid: float | None = None
-    lateral_centroid_height: float | None = None
-    metacentric_height: float | None = None
-    roll_period: float | None = None
-    water_density: float | None = None
-    X_udot: float | None = None
-    Y_vdot: float | None = None
-    Y_rdot: float | None = None
-    N_vdot: float | None = None
-    N_rdot: float | None = None
+    beam: float | None = _optional(of_length=1.0)
+    draught: float | None = _optional(of_length=0.5)
+    mass: float | None = _optional()
+    xg: float | None = _optional(None, of_length=0.5)
+    yaw_gyradius: float | None = _optional(of_length=0.7)
+    block_coefficient: float | None = _optional(below=1.0)
+    speed: float | None = _optional(below=50.0, hint="in m/s (a knot is 0.514 m/s)")
+    rudder_area: float | None = _optional()
+    propeller_diameter: float | None = _optional(of_length=0.5)
+    length_overall: float | None = _optional(of_length=2.0)
+    frontal_area: float | None = _optional(of_square=0.5)
+    lateral_area: float | None = _optional(of_square=0.5)
+    lateral_centroid: float | None = _optional(None, of_length=0.5)
+    lateral_centroid_height: float | None = _optional(of_length=0.5)
+    metacentric_height: float | None = _optional(of_length=0.2)
+    roll_period: float | None = _optional(below=200.0)
+    water_density: float | None = _optional(500.0, 1500.0, hint="in kg/m3 (fresh water 1000, sea water 1025)")
+    X_udot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
+    Y_vdot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
+    Y_rdot: float | None = _optional(-1.0, 1.0, hint=_PRIME)
+    N_vdot: float | None = _optional(-1.0, 1.0, hint=_PRIME)
+    N_rdot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
     estimated: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
@@ -196,13 +170,7 @@ class Particulars(Mapping[str, Any]):
         return {**{name: getattr(self, name) for name in FIELDS}, "estimated": sorted(self.estimated)}
 
     def require(self, name: str) -> float:
-        """Return a value that must be known.
-
-        Raises
-        ------
-        InputError
-            Where it is None.
-        """
+        """Return a value that must be known; InputError where it is None."""
         value = self[name]
         if value is None:
             raise InputError(f"particulars of {self.name}: {name} is needed and not known; give it in [ship]")
@@ -247,27 +215,20 @@ class Particulars(Mapping[str, Any]):
 
 
 #: Names of all values, in the order of the ship file.
-FIELDS: tuple[str, ...] = tuple(field.name for field in fields(Particulars) if field.name != "estimated")
+FIELDS: tuple[str, ...] = tuple(item.name for item in fields(Particulars) if item.name != "estimated")
+
+_BOUNDS: dict[str, _Bounds] = {
+    item.name: item.metadata["bounds"] for item in fields(Particulars) if "bounds" in item.metadata
+}
 
 
 def clarke_added_masses(
     length: float, beam: float, draught: float, block_coefficient: float
 ) -> dict[str, float]:
-    """Estimate added masses in sway and yaw from a hull's proportions.
+    """Added masses in sway and yaw from a hull's proportions, in the prime system, about midship.
 
-    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2 in the prime system, about midship.
-
-    Parameters
-    ----------
-    length, beam, draught : float
-        m.
-    block_coefficient : float
-        Displaced volume by length * beam * draught.
-
-    Returns
-    -------
-    dict of str to float
-        ``Y_vdot``, ``Y_rdot``, ``N_vdot``, ``N_rdot``, prime system.
+    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the block coefficient is
+    the displaced volume by length * beam * draught.
     """
     scale = -math.pi * (draught / length) ** 2
     fullness = block_coefficient * beam / draught
@@ -314,7 +275,7 @@ def _clarke(name: str) -> Callable[[Particulars], float]:
 
 def _check_known(ship: Particulars, name: str, remedy: str) -> None:
     """Refuse to estimate `name` from proportions of the hull that are not all known."""
-    absent = [field for field in ("beam", "draught", "block_coefficient") if ship[field] is None]
+    absent = [other for other in ("beam", "draught", "block_coefficient") if ship[other] is None]
     if absent:
         raise InputError(
             f"particulars of {ship.name}: {name} is not given and cannot be estimated without "
@@ -340,9 +301,9 @@ def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
     for name, value in checked.items():
         if name == "name" or (value is None and name != "length"):
             continue
-        above, below = _LIMITS[name]
+        bounds = _BOUNDS[name]
         place = f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
-        checked[name] = check_number(value, place, above=above, below=below, hint=_HINTS.get(name, ""))
+        checked[name] = check_number(value, place, above=bounds.above, below=bounds.below, hint=bounds.hint)
     _check_together({k: v for k, v in checked.items() if k != "name" and v is not None}, where)
     return checked
 
@@ -350,18 +311,14 @@ def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
 def _check_together(values: Mapping[str, float], where: str) -> None:
     """Refuse values that do not fit each other: most often a wrong unit."""
     length = values["length"]
-    for name, share in _SHARES_OF_LENGTH.items():
-        if name in values and abs(values[name]) > share * length:
-            raise InputError(
-                f"{where} {name}: {values[name]:g} found with length {length:g}, expected at most {share:g} "
-                "of the length; check the units (m)"
-            )
-    for name, share in _SHARES_OF_SQUARE.items():
-        if name in values and values[name] > share * length * length:
-            raise InputError(
-                f"{where} {name}: {values[name]:g} found with length {length:g}, expected at most {share:g} "
-                "of the length squared; check the units (m2)"
-            )
+    for name, value in values.items():
+        bounds = _BOUNDS[name]
+        for share, power, unit in ((bounds.of_length, 1, "m"), (bounds.of_square, 2, "m2")):
+            if share is not None and abs(value) > share * length**power:
+                raise InputError(
+                    f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
+                    f"the length{' squared' * (power - 1)}; check the units ({unit})"
+                )
     if "mass" in values:
         low, high, reason = _mass_range(values)
         if not low <= values["mass"] <= high:

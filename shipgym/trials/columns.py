@@ -17,15 +17,7 @@ from shipgym.trials.units import QUANTITIES, check_channel, si_factor, si_unit
 
 @dataclass(frozen=True)
 class Column:
-    """Where a channel stands in a file.
-
-    Attributes
-    ----------
-    name : str
-        Name of the column.
-    unit : str
-        Its unit, one of the channel's in :data:`shipgym.trials.units.UNITS`.
-    """
+    """Where a channel stands in a file: the name of the column, and its unit in :data:`UNITS` of `units`."""
 
     name: str
     unit: str
@@ -60,24 +52,10 @@ class Source:
 
 
 def parse_columns(columns: Mapping[str, Any], where: str = "columns") -> dict[str, Column]:
-    """Check a table of columns and fill in the SI units.
+    """Check a table of columns by channel and fill in the SI units.
 
-    Parameters
-    ----------
-    columns : mapping of str to str or mapping
-        For each channel its column, or ``{"column": name, "unit": unit}``.
-    where : str, optional
-        Start of the messages.
-
-    Returns
-    -------
-    dict of str to Column
-        By channel.
-
-    Raises
-    ------
-    InputError
-        For an unknown channel, key or unit, or a unit of another quantity.
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``; `where` begins the messages. An
+    unknown channel, key or unit, or a unit of another quantity, is an InputError.
     """
     parsed: dict[str, Column] = {}
     for channel, entry in check_table(columns, where).items():
@@ -98,20 +76,10 @@ def parse_columns(columns: Mapping[str, Any], where: str = "columns") -> dict[st
 
 
 def choose_columns(table: CsvTable, columns: Mapping[str, Any] | None) -> dict[str, Column]:
-    """Return the columns to read from a file, ``t`` first.
+    """The columns to read from a file, ``t`` first.
 
-    Parameters
-    ----------
-    table : CsvTable
-        The file.
-    columns : mapping, or None
-        As :func:`parse_columns` takes it, ``t`` being column "t" where it is not given. None: every column
-        that is named like a channel, in SI units.
-
-    Raises
-    ------
-    InputError
-        Where a column is missing, or none is named like a channel.
+    The table is as :func:`parse_columns` takes it, ``t`` being column "t" where it is not given; None stands
+    for every column that is named like a channel, in SI units. A missing column is an InputError.
     """
     if columns is None:
         named = {name: name for name in QUANTITIES if name in table.header}

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import read_bytes
 
 #: Cells that stand for "no value".
 MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
@@ -50,17 +51,7 @@ class CsvTable:
         return f"line {self.line_numbers[row]} (data row {row + 1})"
 
     def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
-        """Return some columns as numbers.
-
-        Parameters
-        ----------
-        names : sequence of str
-            Columns, each of which must be in the header.
-
-        Returns
-        -------
-        ndarray of shape (n_rows, n_names)
-            The values; nan where a cell is empty or says nan or NA.
+        """Some columns as numbers, shape (n_rows, n_names); nan where a cell is empty or says nan or NA.
 
         Raises
         ------
@@ -125,18 +116,13 @@ class CsvTable:
 
 
 def read_table(path: str | Path) -> CsvTable:
-    """Read a CSV file with one header line; delimiter comma, semicolon or tab.
-
-    Parameters
-    ----------
-    path : str or Path
-        The file, in UTF-8.
+    """Read a CSV file in UTF-8 with one header line; delimiter comma, semicolon or tab.
 
     Raises
     ------
     InputError
-        For a missing file, a folder, an empty or binary file, and a header without names or with a
-        name twice.
+        For a missing file, a folder, an empty or binary file, and a header without names or with a name
+        twice.
     """
     path = Path(path)
     lines = _read_lines(path)
@@ -160,52 +146,6 @@ def read_table(path: str | Path) -> CsvTable:
     )
 
 
-def read_bytes(path: Path, what: str) -> bytes:
-    """Return the contents of a file, which must be there and readable.
-
-    Raises
-    ------
-    InputError
-        As :func:`check_readable`.
-    """
-    check_readable(path, what)
-    return path.read_bytes()
-
-
-def check_readable(path: Path, what: str) -> None:
-    """Refuse a file that cannot be read.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    what : str
-        What is expected there, such as ``"a CSV file"``.
-
-    Raises
-    ------
-    InputError
-        For a missing file, a folder, or one that cannot be opened.
-    """
-    try:
-        with path.open("rb"):
-            return
-    except FileNotFoundError:
-        near = did_you_mean(path.name, _names_beside(path))
-        raise InputError(f"{path}: no such file, expected {what}.{near}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder, expected {what}") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}), expected {what}") from None
-
-
-def _names_beside(path: Path) -> list[str]:
-    try:
-        return [other.name for other in path.parent.iterdir()]
-    except OSError:
-        return []
-
-
 def _split(path: Path, line: str, delimiter: str) -> list[str]:
     try:
         return next(csv.reader([line], delimiter=delimiter))
@@ -216,7 +156,7 @@ def _split(path: Path, line: str, delimiter: str) -> list[str]:
 
 
 def _read_lines(path: Path) -> list[str]:
-    data = read_bytes(path, "a CSV file")
+    data = read_bytes(path, "CSV file")
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(f"{path}: the file is in UTF-16, expected UTF-8; {_REMEDY_TEXT}")
     if b"\x00" in data:

@@ -15,7 +15,7 @@ _STEEPEST_GROWTH = 0.8
 
 
 def time_derivative(t: Array, values: Array) -> Array:
-    """Differentiate a sampled signal, smoothing it as far as its noise asks for.
+    """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
 
     Quintic splines are fitted by least squares with a knot at every second, third, fifth, ... sample. While
     the knots resolve the motion, the residual is the noise and hardly grows from one fit to the next, whether
@@ -29,11 +29,6 @@ def time_derivative(t: Array, values: Array) -> Array:
         Time, s, strictly increasing; the steps may differ.
     values : ndarray of shape (n_samples,)
         The signal, finite.
-
-    Returns
-    -------
-    ndarray of shape (n_samples,)
-        The derivative at the samples, in units of the signal per second.
     """
     from scipy.interpolate import make_interp_spline, make_lsq_spline
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,6 @@ import numpy.typing as npt
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
-
-if TYPE_CHECKING:
-    from shipgym.ships.particulars import Particulars
-    from shipgym.trials.trial import Trial
 
 Array = npt.NDArray[np.float64]
 _DEGREE = math.pi / 180.0
@@ -35,28 +31,14 @@ LIMITS: dict[str, float] = {
 }
 
 _FASTEST_TURN = 60.0 * _DEGREE
-_MOST = 0.95  # share of the samples that count: the others may be outliers
-_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
-_FASTEST_TIP = 100.0  # m/s at the propeller's tip
-_SPEEDS = (0.2, 2.0)  # of a trial, by the service speed
 _LARGEST_JUMP = 30.0 * _DEGREE
 _WINDOWS = 30
 
 
 def check_ranges(channels: Mapping[str, Array], source: Source) -> None:
-    """Refuse values beyond :data:`LIMITS`.
+    """Refuse values beyond :data:`LIMITS`, and name the unit that would make them plausible.
 
-    Parameters
-    ----------
-    channels : mapping of str to ndarray of shape (n_samples,)
-        In SI units.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming line, column, value, limit, and the unit that would make the values plausible.
+    The channels are in SI units, of shape (n_samples,); the source is the file, for messages.
     """
     for channel, limit in LIMITS.items():
         if channel not in channels:
@@ -79,19 +61,7 @@ def check_heading(t: Array, psi: Array, raw_psi: Array, source: Source) -> None:
     """Refuse a heading that turns faster than any ship.
 
     Single outliers of a noisy sensor pass; a jump of more than 30 degrees, or steps most of which are too
-    fast, do not.
-
-    Parameters
-    ----------
-    t, psi, raw_psi : ndarray of shape (n_samples,)
-        Time, s; heading without and with the jumps at north, rad.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming line, values and remedy.
+    fast, do not. Time in s; heading without and with the jumps at north, rad; each of shape (n_samples,).
     """
     step = np.diff(psi)
     fast = np.abs(step) > _FASTEST_TURN * np.diff(t)
@@ -119,23 +89,8 @@ def check_consistency(t: Array, channels: Mapping[str, Array], frame: str, sourc
     """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
 
     Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
-    heading, and velocities with the change of position.
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    channels : mapping of str to ndarray of shape (n_samples,)
-        As recorded, in SI units; the heading without jumps.
-    frame : {"body", "earth"}
-        Declared frame of u and v.
-    source : Source
-        The file, for messages.
-
-    Raises
-    ------
-    InputError
-        Naming the channels, the factor or angle between them, and the remedy.
+    heading, and velocities with the change of position. The channels are as recorded, in SI units, the
+    heading without jumps; `frame`, "body" or "earth", is the declared one of u and v.
     """
     if "psi" in channels and "r" in channels:
         _check_yaw_rate(t, channels["psi"], channels["r"], source)
@@ -240,54 +195,3 @@ def _angle_remedy(gain: float, source: Source) -> str:
     }
     nearest = min(options.values())
     return "declare " + " or ".join(text for text, distance in options.items() if distance < nearest + 0.01)
-
-
-def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
-    """Refuse what no ship of this size and speed does: the trial is another's, or in another unit.
-
-    Parameters
-    ----------
-    trial : Trial
-        In SI units.
-    ship : Particulars
-        Length, and service speed and propeller diameter where given.
-    where : str
-        Start of messages.
-
-    Raises
-    ------
-    InputError
-        For yaw rates and speeds of another scale, and a propeller's tip beyond 100 m/s.
-    """
-    speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
-    if speeds is not None and "r" in trial:
-        _check_turning(trial, float(speeds.max()), ship.length, where)
-    if speeds is not None and ship.speed is not None and "speed" not in ship.estimated:
-        fastest = float(np.quantile(speeds, _MOST))
-        low, high = (share * ship.speed for share in _SPEEDS)
-        if not low <= fastest <= high:
-            raise InputError(
-                f"{where}: up to {fastest:.4g} m/s found, expected {low:.4g} to {high:.4g} m/s of a ship "
-                f"with a service speed of {ship.speed:g} m/s; likely the trial of another ship or scale, "
-                "or a wrong unit of u; if it is this ship's, give its speed as sailed"
-            )
-    if "n" in trial and ship.propeller_diameter is not None:
-        fastest = float(np.quantile(np.abs(trial["n"]), _MOST))
-        limit = _FASTEST_TIP / (math.pi * ship.propeller_diameter)
-        if fastest > limit:
-            raise InputError(
-                f"{where}: shaft speed up to {fastest:.4g} rps found, expected at most {limit:.4g} rps for a "
-                f"propeller of {ship.propeller_diameter:g} m; likely a wrong unit: "
-                'declare n = { column = "...", unit = "rpm" } in [columns]'
-            )
-
-
-def _check_turning(trial: Trial, speed: float, length: float, where: str) -> None:
-    fastest, limit = float(np.quantile(np.abs(trial["r"]), _MOST)), _FASTEST_TURN_PRIME * speed / length
-    if fastest > limit:
-        raise InputError(
-            f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
-            f"expected at most {math.degrees(limit):.4g} deg/s for a length of {length:g} m; likely the "
-            "trial of another ship or scale, or a wrong unit of r, psi, u or v in [columns], or of [ship] "
-            "length"
-        )

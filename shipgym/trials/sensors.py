@@ -1,4 +1,4 @@
-"""What the sensors of a ship make of her motion: noise, resolution, outliers, gaps, delay and drift."""
+"""Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.kernels.weather_rows import CHANNEL_NAMES
 from shipgym.trials.trial import Trial
@@ -43,7 +43,7 @@ class Sensor:
     outlier_size : float
         Standard deviation of what an outlier adds.
     latency_s : float
-        Age of the signal at the time its reading is written down, s.
+        Age of the signal at the time its reading is logged, s.
 
     Raises
     ------
@@ -77,22 +77,10 @@ class Sensor:
 
 
 def gauss_markov(t: Floats, correlation_time_s: float, rng: np.random.Generator) -> Floats:
-    """First-order Gauss-Markov process of unit variance, stationary from the first sample on.
+    """First-order Gauss-Markov process of unit variance at times in s, stationary from the first sample on.
 
     Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb 1974, Applied Optimal
     Estimation, 3.8).
-
-    Parameters
-    ----------
-    t : array of shape (n_samples,)
-        s, increasing.
-    correlation_time_s : float
-        s.
-    rng : Generator
-
-    Returns
-    -------
-    array of shape (n_samples,)
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     shocks = rng.standard_normal(len(t))
@@ -182,15 +170,14 @@ class Sensors:
         InputError
             If the seed is not a whole number >= 0, or sampling and gaps leave fewer than three samples.
         """
-        if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-            raise InputError(f"seed: {seed!r} found, expected a whole number >= 0")
+        check_whole(seed, "seed", at_least=0)
         t = self._sampled(trial)
         readings = {
             name: self.by_channel.get(name, PERFECT).read(
                 t, trial.t, values, np.random.default_rng([seed, CHANNELS.index(name)])
             )
             if name not in ORDERS
-            else held(t, trial.t, values)
+            else orders_at(t, trial.t, values)
             for name, values in on_board(trial).items()
         }
         kept = self._logged(len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])]))
@@ -247,7 +234,7 @@ def on_board(trial: Trial) -> dict[str, Floats]:
     }
 
 
-def held(times: Floats, t: Floats, orders: Floats) -> Floats:
+def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
     """Orders, each given at a time t and held until the next, at other times; all in s."""
     given: Floats = orders[np.searchsorted(t, times + 1e-9, side="right") - 1]
     return given

@@ -11,12 +11,12 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.files import check_readable, read_bytes
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
-from shipgym.trials.csv_reader import check_readable, read_bytes
 from shipgym.trials.identify_table import check_options
-from shipgym.trials.plausibility import check_scale
+from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
 from shipgym.trials.trial_import import Conventions
 
@@ -27,33 +27,15 @@ _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
 
 @dataclass(frozen=True)
 class TrialEntry:
-    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables.
+    """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables."""
 
-    Attributes
-    ----------
-    file : str
-        As written; the trial's name.
-    path : Path
-        The CSV file.
-    kind : str or None
-        The manoeuvre.
-    use : {"fit", "validate", "skip"}
-        What the trial is for.
-    columns : mapping or None
-        Columns by channel as written; None: those named like channels.
-    conventions : Conventions
-        Signs, frame, origin and repair.
-    where : str
-        Start of messages: ``"ship.toml: [[trials]] 2"``.
-    """
-
-    file: str
-    path: Path
+    file: str  # as written; the trial's name
+    path: Path  # of the CSV file
     kind: str | None
     use: str
-    columns: Mapping[str, Any] | None
+    columns: Mapping[str, Any] | None  # by channel as written; None: those named like channels
     conventions: Conventions
-    where: str
+    where: str  # start of messages: "ship.toml: [[trials]] 2"
 
 
 @dataclass(frozen=True)
@@ -113,30 +95,19 @@ class ShipFile:
         return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:
-        """Return the particulars with what is absent estimated and marked (:meth:`Particulars.completed`).
-
-        Raises
-        ------
-        InputError
-            Naming the ship file and what is missing, where it cannot be estimated.
-        """
+        """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
         try:
             return self.particulars.completed()
         except InputError as error:
             raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
-        """Read the trials.
+        """Read the trials, in the order of the file, each named by its ``file``.
 
         Parameters
         ----------
         use : {"fit", "validate", "skip"}, optional
             Only trials of this use; by default all but those to skip.
-
-        Returns
-        -------
-        list of Trial
-            In the order of the file, each named by its ``file``.
 
         Raises
         ------
@@ -149,18 +120,7 @@ class ShipFile:
         return [self._read(entry) for entry in wanted]
 
     def trial(self, file: str) -> Trial:
-        """Read one trial, whatever its use.
-
-        Parameters
-        ----------
-        file : str
-            As written in the ship file.
-
-        Raises
-        ------
-        InputError
-            If no trial has that file, and for anything wrong with it.
-        """
+        """Read one trial by its ``file``, whatever its use; as :meth:`trials`."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
         return self._read(self.entries[files.index(file)])
@@ -188,7 +148,7 @@ class ShipFile:
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
-    data = read_bytes(path, "a ship file (TOML)")
+    data = read_bytes(path, "ship file (TOML)")
     try:
         return tomllib.loads(data.decode("utf-8-sig"))
     except UnicodeDecodeError as error:
@@ -247,7 +207,7 @@ def _entry(
     csv_path = path.parent / file
     if use != "skip":
         try:
-            check_readable(csv_path, "a CSV file")
+            check_readable(csv_path, "CSV file")
         except InputError as error:
             raise InputError(f"{where} file: {error}") from None
     return TrialEntry(

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
+from collections import Counter
 from collections.abc import Collection, Mapping
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -13,14 +13,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.checks import check_choice, check_number, check_text, did_you_mean, quoted
+from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import write_text
+from shipgym.trials.trial_import import Conventions, import_csv
 from shipgym.trials.units import CHANNELS, check_channel
 
 Array = npt.NDArray[np.float64]
 
-#: Kinds of manoeuvre that have indices or a meaning of their own.
-KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random")
+#: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
+KINDS = ["zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"]
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
@@ -53,7 +55,7 @@ class Trial:
     derived : collection of str, optional
         Names of the channels that were not measured but computed from others.
     length : float, optional
-        Length of the ship between perpendiculars, m; indices of manoeuvres are told in it.
+        Length of the ship between perpendiculars, m; indices of manoeuvres are given in it.
     repaired : mapping of str to int, optional
         How many values of a channel were filled in, because they were missing or outliers.
     raw : Trial, optional
@@ -65,7 +67,14 @@ class Trial:
         For unknown channels, lengths that differ, values that are not finite, or time that goes back.
     """
 
-    __slots__ = ("_channels", "_derived", "_kind", "_length", "_name", "_raw", "_repaired", "_t", "_use")
+    t: Array
+    channels: Mapping[str, Array]
+    name: str
+    kind: str | None
+    use: str
+    derived: frozenset[str]
+    length: float | None
+    repaired: Mapping[str, int]
 
     def __init__(
         self,
@@ -80,151 +89,88 @@ class Trial:
         repaired: Mapping[str, int] | None = None,
         raw: Trial | None = None,
     ) -> None:
-        self._name = check_text(name, "trial: name")
+        check_text(name, "trial: name")
         where = f"trial '{name}'"
-        self._kind = None if kind is None else check_choice(kind, KINDS, f"{where}: kind")
-        self._use = check_choice(use, USES, f"{where}: use")
-        self._length = None if length is None else check_number(length, f"{where}: length", above=0.0)
-        self._t = _frozen_array(t, f"{where}: t")
-        _check_time(self._t, where)
-        if not channels:
-            raise InputError(f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}")
-        arrays: dict[str, Array] = {}
-        for channel, values in channels.items():
-            check_channel(channel, where, time=False)
-            arrays[channel] = _frozen_array(values, f"{where}: {channel}")
-            if arrays[channel].shape != self._t.shape:
-                raise InputError(
-                    f"{where}: {channel} has {arrays[channel].size} samples, expected {self._t.size} as in t"
-                )
-        self._channels = arrays
-        self._derived = frozenset(derived)
-        if not self._derived <= arrays.keys():
-            unknown = quoted(sorted(self._derived - arrays.keys()))
+        times = _frozen_array(t, f"{where}: t")
+        _check_time(times, where)
+        arrays = _frozen_channels(channels, times.shape, where)
+        if not arrays.keys() >= set(derived):
+            unknown = quoted(sorted(set(derived) - arrays.keys()))
             raise InputError(f"{where}: derived: {unknown} found, expected some of {quoted(arrays)}")
-        self._repaired = dict(repaired or {})
-        self._raw = raw
+        vars(self).update(
+            t=times,
+            channels=MappingProxyType(arrays),
+            name=name,
+            kind=None if kind is None else check_choice(kind, KINDS, f"{where}: kind"),
+            use=check_choice(use, USES, f"{where}: use"),
+            derived=frozenset(derived),
+            length=None if length is None else check_number(length, f"{where}: length", above=0.0),
+            repaired=MappingProxyType(dict(repaired or {})),
+            _raw=raw,
+        )
 
-    @property
-    def t(self) -> Array:
-        """Time, s, of shape (n_samples,), read-only."""
-        return self._t
-
-    @property
-    def channels(self) -> Mapping[str, Array]:
-        """The channels by name, without time, read-only; each of shape (n_samples,)."""
-        return MappingProxyType(self._channels)
-
-    @property
-    def name(self) -> str:
-        """Name of the trial; for one of a ship file its file name as written there."""
-        return self._name
-
-    @property
-    def kind(self) -> str | None:
-        """The manoeuvre, or None where it is not known."""
-        return self._kind
-
-    @property
-    def use(self) -> str:
-        """``"fit"``, ``"validate"`` or ``"skip"``."""
-        return self._use
-
-    @property
-    def derived(self) -> frozenset[str]:
-        """Names of the channels that were computed from others."""
-        return self._derived
-
-    @property
-    def length(self) -> float | None:
-        """Length of the ship between perpendiculars, m, or None where it is not known."""
-        return self._length
-
-    @property
-    def repaired(self) -> Mapping[str, int]:
-        """How many values were filled in, by channel, where any were."""
-        return MappingProxyType(self._repaired)
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"a trial is immutable: {name} cannot be set; `with_` returns a changed copy")
 
     @property
     def raw(self) -> Trial:
         """The trial as it was recorded: before it was smoothed or repaired, itself where it was not."""
-        return self if self._raw is None else self._raw.raw
+        raw: Trial | None = vars(self)["_raw"]
+        return self if raw is None else raw.raw
 
     @property
     def duration(self) -> float:
         """Time from the first to the last sample, s."""
-        return float(self._t[-1] - self._t[0])
+        return float(self.t[-1] - self.t[0])
 
     @property
     def sha256(self) -> str:
         """Hash of time and channels, independent of the file's formatting and of name, kind and use."""
         digest = hashlib.sha256()
-        for channel, values in (("t", self._t), *sorted(self._channels.items())):
+        for channel, values in (("t", self.t), *sorted(self.channels.items())):
             digest.update(channel.encode() + b"\0" + values.astype("<f8").tobytes())
         return digest.hexdigest()
 
     def __len__(self) -> int:
-        return int(self._t.size)
+        return int(self.t.size)
 
     def __contains__(self, channel: object) -> bool:
-        return channel == "t" or channel in self._channels
+        return channel == "t" or channel in self.channels
 
     def __reduce__(self) -> tuple[Any, ...]:
-        settings = {
-            "name": self._name,
-            "kind": self._kind,
-            "use": self._use,
-            "derived": self._derived,
-            "length": self._length,
-            "repaired": self._repaired,
-            "raw": self._raw,
-        }
-        return _restore, (self._t, self._channels, settings)
+        return partial(Trial, **self._settings()), (self.t, dict(self.channels))
 
     def __getitem__(self, channel: str) -> Array:
         if channel == "t":
-            return self._t
+            return self.t
         try:
-            return self._channels[channel]
+            return self.channels[channel]
         except KeyError:
             raise InputError(
-                f"trial '{self._name}': no channel '{channel}'.{did_you_mean(str(channel), self._channels)} "
-                f"Channels present: {quoted(self._channels)}"
+                f"trial '{self.name}': no channel '{channel}'.{did_you_mean(str(channel), self.channels)} "
+                f"Channels present: {quoted(self.channels)}"
             ) from None
 
     def __repr__(self) -> str:
         return (
-            f"Trial(name={self._name!r}, kind={self._kind!r}, use={self._use!r}, samples={len(self)}, "
-            f"duration={self.duration:g} s, channels={list(self._channels)})"
+            f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r}, samples={len(self)}, "
+            f"duration={self.duration:g} s, channels={list(self.channels)})"
         )
+
+    def _settings(self) -> dict[str, Any]:
+        """The keyword arguments that make this trial of its channels."""
+        names = ("name", "kind", "use", "derived", "length")
+        own = {name: getattr(self, name) for name in names}
+        return own | {"repaired": dict(self.repaired), "raw": vars(self)["_raw"]}
 
     def with_(self, **changes: Any) -> Trial:
-        """Return a copy with another ``name``, ``kind``, ``use`` or ``length``.
-
-        Raises
-        ------
-        InputError
-            For anything else.
-        """
-        settings: dict[str, Any] = {
-            "name": self._name,
-            "kind": self._kind,
-            "use": self._use,
-            "length": self._length,
-        }
-        unknown = changes.keys() - settings.keys()
+        """Return a copy with another ``name``, ``kind``, ``use`` or ``length``."""
+        unknown = changes.keys() - {"name", "kind", "use", "length"}
         if unknown:
             raise InputError(
-                f"trial '{self._name}': cannot change {quoted(sorted(unknown))}, only name, kind, use, length"
+                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only name, kind, use, length"
             )
-        return Trial(
-            self._t,
-            self._channels,
-            derived=self._derived,
-            repaired=self._repaired,
-            raw=self._raw,
-            **(settings | changes),
-        )
+        return Trial(self.t, self.channels, **(self._settings() | changes))
 
     def with_channels(
         self,
@@ -249,20 +195,9 @@ class Trial:
         InputError
             As for a new trial.
         """
-        counts = dict(self._repaired)
-        for name, count in (repaired or {}).items():
-            counts[name] = counts.get(name, 0) + count
-        return Trial(
-            self._t if t is None else t,
-            {**self._channels, **channels},
-            name=self._name,
-            kind=self._kind,
-            use=self._use,
-            derived=self._derived,
-            length=self._length,
-            repaired=counts,
-            raw=self,
-        )
+        counts = Counter(self.repaired) + Counter(repaired or {})
+        settings = self._settings() | {"repaired": counts, "raw": self}
+        return Trial(self.t if t is None else t, {**self.channels, **channels}, **settings)
 
     @classmethod
     def from_csv(
@@ -282,9 +217,8 @@ class Trial:
     ) -> Trial:
         """Read a trial from a CSV file and convert it to SI units and the project's signs.
 
-        Channels that are absent and follow from others are derived and listed in :attr:`derived`: ``r`` from
-        ``psi``; ``u`` and ``v`` from ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position
-        (heading relative to the start).
+        Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
+        ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position (relative to the start).
 
         Parameters
         ----------
@@ -312,27 +246,11 @@ class Trial:
         InputError
             For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
-        from shipgym.trials.trial_import import Conventions, import_csv
-
-        conventions = Conventions(
-            rudder_positive=rudder_positive,
-            velocity_frame=velocity_frame,
-            origin=origin,
-            xg=xg,
-            repair=repair,
-            where=f"{path}:",
-        )
+        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, where=f"{path}:")
         t, channels, derived, repaired = import_csv(Path(path), columns, conventions)
-        return cls(
-            t,
-            channels,
-            name=Path(path).name if name is None else name,
-            kind=kind,
-            use=use,
-            derived=derived,
-            length=length,
-            repaired=repaired,
-        )
+        name = Path(path).name if name is None else name
+        facts: dict[str, Any] = {"derived": derived, "repaired": repaired, "length": length}
+        return cls(t, channels, name=name, kind=kind, use=use, **facts)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
@@ -349,52 +267,35 @@ class Trial:
         InputError
             Where the file cannot be written.
         """
-        path = Path(path)
-        names = ["t", *self._channels]
+        names = ["t", *self.channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
         text = "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]) + "\n"
-        try:
-            handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".tmp", dir=path.parent)
-        except OSError as error:
+        write_text(text, Path(path))
+
+
+def _frozen_channels(
+    channels: Mapping[str, npt.ArrayLike], shape: tuple[int, ...], where: str
+) -> dict[str, Array]:
+    """The channels as read-only arrays, after checking names and lengths."""
+    if not channels:
+        raise InputError(f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}")
+    arrays = {}
+    for channel, values in channels.items():
+        check_channel(channel, where, time=False)
+        arrays[channel] = _frozen_array(values, f"{where}: {channel}")
+        if arrays[channel].shape != shape:
             raise InputError(
-                f"{path}: cannot be written ({error.strerror}); choose a folder that exists"
-            ) from None
-        try:
-            with os.fdopen(handle, "w", encoding="utf-8", newline="\n") as file:
-                file.write(text)
-            Path(temporary).chmod(0o666 & ~_umask())  # mkstemp makes the file private
-            Path(temporary).replace(path)
-        except OSError as error:
-            Path(temporary).unlink(missing_ok=True)
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from None
-
-
-def _restore(t: Array, channels: Mapping[str, Array], settings: Mapping[str, Any]) -> Trial:
-    return Trial(t, channels, **settings)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+                f"{where}: {channel} has {arrays[channel].size} samples, expected {shape[0]} as in t"
+            )
+    return arrays
 
 
 def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
     """Return `values` as a read-only copy of shape (n_samples,), all finite."""
-    try:
-        array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{where}: expected an array of numbers") from None
+    hint = 'leave such samples out, or import the file with repair = "interpolate"'
+    array = check_finite(values, where, hint)
     if array.ndim != 1:
         raise InputError(f"{where}: array of shape {array.shape} found, expected (n_samples,)")
-    bad = ~np.isfinite(array)
-    if bad.any():
-        index = int(np.argmax(bad))
-        raise InputError(
-            f"{where}: {array[index]} found at sample {index}, expected finite numbers; leave such samples "
-            'out, or import the file with repair = "interpolate"'
-        )
-    array.setflags(write=False)
     return array
 
 

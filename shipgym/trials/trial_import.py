@@ -32,28 +32,10 @@ LONGEST_HOLE_STEPS = 20.0
 
 @dataclass(frozen=True)
 class Conventions:
-    """Signs, frame and origin of a file, and how missing values are treated.
+    """Signs, frame and origin of a file, and how missing values are treated: as in `Trial.from_csv`.
 
-    Parameters
-    ----------
-    rudder_positive : {"starboard", "port"}
-        Side to which a positive rudder angle of the file steers.
-    velocity_frame : {"body", "earth"}
-        Frame of columns u and v; "earth": north and east.
-    origin : {"midship", "cg"}
-        Point whose position and velocity the file holds.
-    xg : float, optional
-        Centre of gravity forward of midship, m; needed with origin "cg".
-    repair : {"interpolate"}, optional
-        How missing values are filled; None: they are refused. Holes of more than 10 rows and 20 time
-        steps are refused in any case.
-    where : str, optional
-        Start of the messages, such as ``"ship.toml: [conventions]"``.
-
-    Raises
-    ------
-    InputError
-        For an unknown word, or origin "cg" without `xg`.
+    With `repair`, holes of more than 10 rows and 20 time steps are refused all the same; `where` begins the
+    messages, such as ``"ship.toml: [conventions]"``.
     """
 
     rudder_positive: str = "starboard"
@@ -81,32 +63,11 @@ class Conventions:
 def import_csv(
     path: Path, columns: Mapping[str, Any] | None, conventions: Conventions
 ) -> tuple[Array, dict[str, Array], frozenset[str], dict[str, int]]:
-    """Read a CSV file into channels.
+    """Read a CSV file: time, channels, names of the derived channels and counts of the repaired values.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    columns : mapping of str to str or mapping, or None
-        As :func:`shipgym.trials.columns.choose_columns` takes it.
-    conventions : Conventions
-        Signs, frame and origin of the file.
-
-    Returns
-    -------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    channels : dict of str to ndarray of shape (n_samples,)
-        In SI units, with the project's signs, in the body frame, at midship.
-    derived : frozenset of str
-        Channels that were computed from others.
-    repaired : dict of str to int
-        How many values were filled in, by recorded channel, where any were.
-
-    Raises
-    ------
-    InputError
-        For anything wrong with the file, naming line, column, value and remedy.
+    The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels are in SI
+    units, with the project's signs, in the body frame, at midship; each has shape (n_samples,). Anything
+    wrong with the file is an InputError that names line, column, value and remedy.
     """
     table = read_table(path)
     chosen = choose_columns(table, columns)
@@ -134,29 +95,11 @@ def import_csv(
 def to_project_conventions(
     t: Array, recorded: Mapping[str, Array], conventions: Conventions, where: str
 ) -> tuple[dict[str, Array], frozenset[str]]:
-    """Convert signs, frame and origin, and derive the channels that follow from others.
+    """Convert signs, frame and origin, and derive the channels that follow from others; also their names.
 
-    The yaw rate is derived from the heading, surge and sway from position and heading, the heading (relative
-    to the start) from the yaw rate where no position is recorded. Derivatives in time are those of
-    :func:`shipgym.trials.derivatives.time_derivative`.
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s.
-    recorded : mapping of str to ndarray of shape (n_samples,)
-        In SI units with the file's conventions; the heading without jumps.
-    conventions : Conventions
-        The file's conventions.
-    where : str
-        Start of the messages.
-
-    Returns
-    -------
-    channels : dict of str to ndarray of shape (n_samples,)
-        With the project's conventions.
-    derived : frozenset of str
-        Names of those derived.
+    The recorded channels are in SI units with the file's conventions, the heading without jumps, of shape
+    (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
+    heading, the heading (relative to the start) from the yaw rate where no position is recorded.
     """
     channels = dict(recorded)
     derived: set[str] = set()
@@ -184,20 +127,7 @@ def to_project_conventions(
 
 
 def rotate_to_body(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:
-    """Rotate velocities from the earth to the body frame.
-
-    Parameters
-    ----------
-    north, east : ndarray of shape (n_samples,)
-        Velocity, m/s.
-    psi : ndarray of shape (n_samples,)
-        Heading, rad.
-
-    Returns
-    -------
-    u, v : ndarray of shape (n_samples,)
-        Surge and sway, m/s.
-    """
+    """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s
 
@@ -240,17 +170,7 @@ def _antiderivative(t: Array, values: Array) -> Array:
 
 
 def _repaired(values: Array, source: Source, repair: str | None) -> tuple[Array, Source]:
-    """Refuse or fill missing values, and check the time.
-
-    Parameters
-    ----------
-    values : ndarray of shape (n_rows, n_columns)
-        As read, time first.
-    source : Source
-        The file behind them.
-    repair : {"interpolate"} or None
-        None refuses missing values.
-    """
+    """Refuse or fill missing values of shape (n_rows, n_columns), time first, and check the time."""
     names = list(source.columns)
     missing = ~np.isfinite(values)
     rows, columns = np.nonzero(missing)

@@ -54,13 +54,7 @@ CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name != "t")
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
-    """Return `name`, which must be that of a channel (or ``t``, unless `time` is false).
-
-    Raises
-    ------
-    InputError
-        Naming the nearest channel and all there are.
-    """
+    """Return `name`, which must be that of a channel (or ``t``, unless `time` is false)."""
     known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:
         hint = did_you_mean(str(name), known)
@@ -74,22 +68,7 @@ def si_unit(channel: str) -> str:
 
 
 def si_factor(channel: str, unit: str, where: str = "unit") -> float:
-    """Return the factor that takes values in `unit` to SI.
-
-    Parameters
-    ----------
-    channel : str
-        Name of the channel (``t`` included).
-    unit : str
-        One of the units of the channel's quantity in :data:`UNITS`.
-    where : str, optional
-        Start of the message.
-
-    Raises
-    ------
-    InputError
-        For an unknown unit, or one that measures another quantity.
-    """
+    """The factor from `unit` to the SI unit of a channel; `where` begins the message about a wrong unit."""
     quantity = QUANTITIES[channel]
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:

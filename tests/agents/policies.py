@@ -24,7 +24,7 @@ def random_network(*sizes, seed=0, activation="relu", output="linear"):
 
 def random_policy(model=MARINER, seed=0, **more):
     """Of course keeping, with hidden layers of 16."""
-    inputs = max(more.get("history", 1), 1) * 8 + ("base" in more)
+    inputs = max(more.get("frame_stack", 1), 1) * 8 + ("base" in more)
     outputs = {"rudder-discrete": 9, "rudder-shaft": 2}.get(more.get("action"), 1)
     given = {
         "network": random_network(inputs, 16, 16, outputs, seed=seed),

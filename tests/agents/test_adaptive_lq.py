@@ -8,8 +8,8 @@ import pytest
 
 from agents import LQ, AdaptiveLQ, check_controller, fly, load_agent
 from agents.controllers.adaptive_lq import GAINS
-from agents.controllers.batched_lq import lq_rows, sampled_ships
-from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship
+from agents.controllers.batched_lq import lq_rows
+from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
 from agents.controllers.lq import lq_gain
 from shipgym.envs.course_keeping import CourseKeepingEngine
 from shipgym.envs.course_keeping_task import CourseKeepingTask

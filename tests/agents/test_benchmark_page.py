@@ -68,7 +68,7 @@ def unpacked(page, name):
 def test_the_worst_come_first_and_the_hardest_is_hard_for_all(result):
     costs = result.figures("pid", "mariner-calm")[0]
     worst = worst_of(result, "pid", "mariner-calm", N)
-    assert [flight.seed - FIRST for flight in worst] == np.argsort(-costs).tolist()
+    assert [episode.seed - FIRST for episode in worst] == np.argsort(-costs).tolist()
     medians = np.median([result.figures(name, "mariner-calm")[0] for name in result.ranking], axis=0)
     assert hardest_of(result, "mariner-calm") == FIRST + np.argmax(medians)
 
@@ -81,41 +81,41 @@ def test_each_is_shown_beside_the_best_in_the_same_episode(result):
     best = bests_of(result, "mariner-calm")[0]
     (nobody, everybody), *others = entries_of(result, "mariner-calm", 2)
     assert nobody == ""
-    assert {flight.contestant for flight in everybody} == set(result.ranking)
+    assert {episode.contestant for episode in everybody} == set(result.ranking)
     assert len(others) == 2 * 3
-    for who, flights in others:
-        assert flights[0].contestant == who
-        assert [flight.contestant for flight in flights[1:]] == ([] if who == best else [best])
-        assert len({flight.seed for flight in flights}) == 1
+    for who, episodes in others:
+        assert episodes[0].contestant == who
+        assert [episode.contestant for episode in episodes[1:]] == ([] if who == best else [best])
+        assert len({episode.seed for episode in episodes}) == 1
 
 
 def test_too_many_runs_are_cut_down(result, monkeypatch):
-    count, flights = replayable(result, 3)
+    count, episodes = replayable(result, 3)
     assert count == 3
-    monkeypatch.setattr("agents.benchmarking.page_replays.MOST_RUNS", len(flights) - 1)
-    fewer, fewer_flights = replayable(result, 3)
+    monkeypatch.setattr("agents.benchmarking.page_replays.MOST_RUNS", len(episodes) - 1)
+    fewer, fewer_episodes = replayable(result, 3)
     assert fewer < 3
-    assert set(fewer_flights) < set(flights)
+    assert set(fewer_episodes) < set(episodes)
 
 
-def test_what_is_flown_again_costs_the_same(result):
-    flights = [EpisodeId("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
-    reflown = rerun(result, flights)
-    assert (reflown.different, reflown.refused) == ((), {})
-    for flight in flights:
-        flown = reflown.episodes[flight]
-        cost = result.figures("pid", flight.task)[0, flight.seed - FIRST]
-        lost = result.figures("pid", flight.task, "terminated")[0, flight.seed - FIRST]
-        assert flown.rewards.sum() == pytest.approx(-cost)
-        assert (flown.seed, flown.terminated) == (flight.seed, bool(lost) or bool(flown.success))
-        assert (flown.waypoints is None) == (flight.task == "mariner-calm")
+def test_what_is_run_again_costs_the_same(result):
+    episodes = [EpisodeId("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
+    again = rerun(result, episodes)
+    assert (again.different, again.refused) == ((), {})
+    for episode in episodes:
+        found = again.episodes[episode]
+        cost = result.figures("pid", episode.task)[0, episode.seed - FIRST]
+        lost = result.figures("pid", episode.task, "terminated")[0, episode.seed - FIRST]
+        assert found.rewards.sum() == pytest.approx(-cost)
+        assert (found.seed, found.terminated) == (episode.seed, bool(lost) or bool(found.success))
+        assert (found.waypoints is None) == (episode.task == "mariner-calm")
 
 
-def test_an_episode_flown_again_is_that_of_the_single_environment():
+def test_an_episode_run_again_is_that_of_the_single_environment():
     task = load_suite().task("mariner-calm")
     pilot = PID.from_model(task.ship, dt=task.task.interval(task.ship))
-    (flown,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
-    env = gymnasium.make(flown.environment, **flown.arguments).unwrapped
+    (found,), (cost,) = recorded(pilot, task, [FIRST], samples=200)
+    env = gymnasium.make(found.environment, **found.arguments).unwrapped
     observation, _ = env.reset(seed=FIRST)
     rewards, states, over = [], [env.physical_state()], False
     while not over:
@@ -123,11 +123,11 @@ def test_an_episode_flown_again_is_that_of_the_single_environment():
         rewards.append(reward)
         states.append(env.physical_state())
         over = terminated or truncated
-    assert (len(rewards), flown.n_steps, flown.dt) == (600, 200, 3.0 * env.dt)
-    assert flown.rewards == pytest.approx(np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9)
+    assert (len(rewards), found.n_steps, found.dt) == (600, 200, 3.0 * env.dt)
+    assert found.rewards == pytest.approx(np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9)
     assert cost == pytest.approx(-sum(rewards))
     for name in ("x", "y", "psi", "u", "delta", "set_point"):
-        assert flown.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
+        assert found.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
 
 
 def test_the_last_interval_is_filled_up():
@@ -138,7 +138,7 @@ def test_the_last_interval_is_filled_up():
         [FIRST],
         samples=task.task.episode_steps,
     )
-    (flown,), _ = recorded(
+    (found,), _ = recorded(
         PID.from_model(task.ship, dt=task.task.interval(task.ship)),
         task,
         [FIRST],
@@ -146,10 +146,10 @@ def test_the_last_interval_is_filled_up():
     )
     assert whole.success
     assert whole.n_steps < task.task.episode_steps
-    assert flown.n_steps == -(-whole.n_steps // 7)
-    assert flown.states["x"][-1] == whole.states["x"][-1]
-    assert flown.rewards.sum() == pytest.approx(whole.rewards.sum())
-    assert (flown.success, flown.terminated) == (True, True)
+    assert found.n_steps == -(-whole.n_steps // 7)
+    assert found.states["x"][-1] == whole.states["x"][-1]
+    assert found.rewards.sum() == pytest.approx(whole.rewards.sum())
+    assert (found.success, found.terminated) == (True, True)
 
 
 def test_a_controller_that_fails_is_shown_up_to_then():
@@ -161,27 +161,27 @@ def test_a_controller_that_fails_is_shown_up_to_then():
                 raise ValueError
             return super().predict(observation)[0], (state or 0) + 1
 
-    (flown,), (cost,) = recorded(Fails(), task, [FIRST], samples=300)
-    assert (flown.n_steps, flown.terminated, flown.truncated) == (5, False, False)
+    (found,), (cost,) = recorded(Fails(), task, [FIRST], samples=300)
+    assert (found.n_steps, found.terminated, found.truncated) == (5, False, False)
     assert np.isnan(cost)
 
 
-def test_a_changed_result_is_told(result):
+def test_a_changed_result_is_reported(result):
     costs = result.episodes["cost"].copy()
     result.episodes["cost"] = costs * 1.001
     try:
-        flight = EpisodeId("pid", "mariner-calm", 0, FIRST)
-        assert rerun(result, [flight]).different == (flight,)
+        episode = EpisodeId("pid", "mariner-calm", 0, FIRST)
+        assert rerun(result, [episode]).different == (episode,)
     finally:
         result.episodes["cost"] = costs
 
 
 def test_objects_are_replayed_where_they_are_given(result):
-    flight = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
-    assert "given as an object" in rerun(result, [flight]).refused[Lazy.name, "mariner-calm"]
-    given = rerun(result, [flight], {Lazy.name: Lazy()})
+    episode = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
+    assert "given as an object" in rerun(result, [episode]).refused[Lazy.name, "mariner-calm"]
+    given = rerun(result, [episode], {Lazy.name: Lazy()})
     assert (given.refused, given.different) == ({}, ())
-    assert not given.episodes[flight].actions.any()
+    assert not given.episodes[episode].actions.any()
 
 
 def test_differences_add_up():

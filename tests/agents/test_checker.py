@@ -102,7 +102,7 @@ def test_a_user_s_own_passes():
     ("controller", "message"),
     [
         (Moody(), "asked again with the same state it answers"),
-        (Herd(), "ship 0 alone: .* rows of a batch and episodes must not know of each other"),
+        (Herd(), "ship 0 alone: .* rows of a batch and episodes must be independent of each other"),
         (Hanger(), "with episode_start True and the state of another episode"),
         (Vandal(), "the observation was changed"),
         (Divider(), "step 0: action .*nan.* found"),

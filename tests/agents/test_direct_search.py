@@ -26,7 +26,7 @@ from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
 from agents.training.bases import design_base
 from shipgym.errors import InputError
-from shipgym.json_file import write_json
+from shipgym.files import write_json
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 

@@ -71,7 +71,7 @@ def test_a_policy_adds_to_a_controller_by_default_where_there_can_be_one(algorit
         assert load_settings(algorithm, "path-following", task.name).base == "tuned"
     for asked in ({"given": {"base": "none"}}, {"action": "rudder-discrete"}, {"action": "rudder-shaft"}):
         settings = load_settings(algorithm, "path-following", "container-path", **asked)
-        assert (settings.base, settings.hold) == ("none", 1)
+        assert (settings.base, settings.action_repeat) == ("none", 1)
         assert settings == load_settings(algorithm, given={"base": "none"})
 
 

@@ -20,10 +20,10 @@ POLICIES = {
     "tanh": random_policy(network=random_network(8, 16, 1, activation="tanh", output="tanh")),
     "discrete": random_policy(action="rudder-discrete"),
     "shaft": random_policy(action="rudder-shaft"),
-    "history": random_policy(history=3),
-    "residual": random_policy(base=LQ_MARINER, authority=0.6, history=2),
+    "frame_stack": random_policy(frame_stack=3),
+    "residual": random_policy(base=LQ_MARINER, authority=0.6, frame_stack=2),
 }
-HELD = random_policy(base=LQ_MARINER, authority=0.6, hold=2)
+HELD = random_policy(base=LQ_MARINER, authority=0.6, action_repeat=2)
 
 
 @pytest.mark.parametrize("name", POLICIES)
@@ -37,7 +37,7 @@ def test_the_graph_commands_what_the_policy_does(name, tmp_path):
         for step in range(4):
             seen = random.uniform(-1.0, 1.0, (n, 8)).astype(np.float32)
             expected, state = policy.predict(seen, state, np.full(n, step == 0))
-            past = [seen] * policy.history if past is None else [*past[1:], seen]
+            past = [seen] * policy.frame_stack if past is None else [*past[1:], seen]
             inputs = {"observations": np.concatenate(past, axis=1)}
             if policy.base is not None:
                 inputs["base_action"] = policy.base.predict(seen)[0]
@@ -48,13 +48,13 @@ def test_the_graph_commands_what_the_policy_does(name, tmp_path):
 def test_between_decisions_the_part_of_the_last_one_is_added_to_the_base(tmp_path):
     export_onnx(HELD, tmp_path / "policy.onnx")
     session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
-    hold = json.loads(session.get_modelmeta().custom_metadata_map["hold"])
+    repeat = json.loads(session.get_modelmeta().custom_metadata_map["action_repeat"])
     random, state, part = np.random.default_rng(0), None, None
     for step in range(5):
         seen = random.uniform(-1.0, 1.0, (3, 8)).astype(np.float32)
         expected, state = HELD.predict(seen, state, np.full(3, step == 0))
         base = LQ_MARINER.predict(seen)[0]
-        if step % hold == 0:
+        if step % repeat == 0:
             (part,) = session.run(["part"], {"observations": seen, "base_action": base})
         np.testing.assert_allclose(np.clip(base + part, -1.0, 1.0), expected, rtol=0.0, atol=1e-6)
 
@@ -68,7 +68,7 @@ def test_the_metadata_say_what_it_observes(tmp_path):
     assert tuple(found["observation_scales"]) == policy.observation_scales
     assert found["model"] == {"name": "mariner", "sha256": policy.model_sha256}
     assert found["environment"]["id"] == "shipgym/CourseKeeping-v0"
-    assert (found["history"], found["authority"], found["base"]["kind"]) == (2, 0.6, "lq")
+    assert (found["frame_stack"], found["authority"], found["base"]["kind"]) == (2, 0.6, "lq")
 
 
 def test_the_command_writes_it(tmp_path):

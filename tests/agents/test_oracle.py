@@ -15,7 +15,7 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.path_following_task import PathFollowingTask
 from shipgym.envs.variety import Variety
 from shipgym.errors import InputError
-from shipgym.json_file import read_json, write_json
+from shipgym.files import read_json, write_json
 from shipgym.ships import load_model
 
 MARINER = load_model("mariner")

@@ -18,10 +18,10 @@ RNG = np.random.default_rng(1)
 SEEN = RNG.uniform(-1.0, 1.0, (30, 8)).astype(np.float32)
 LQ_MARINER = LQ.from_model(MARINER)
 WITH_MEMORY = {
-    "history": {"history": 3},
+    "frame_stack": {"frame_stack": 3},
     "base": {"base": LQ_MARINER, "authority": 0.3},
-    "stateful base": {"base": LQG.from_model(MARINER), "authority": 0.3, "history": 2},
-    "held": {"base": LQ_MARINER, "hold": 3},
+    "stateful base": {"base": LQG.from_model(MARINER), "authority": 0.3, "frame_stack": 2},
+    "held": {"base": LQ_MARINER, "action_repeat": 3},
 }
 
 
@@ -61,7 +61,7 @@ def test_rudder_and_shaft_are_two_commands():
 
 
 def test_the_history_begins_with_the_first_observation_and_is_kept_oldest_first():
-    policy = random_policy(history=3)
+    policy = random_policy(frame_stack=3)
     state, rows = None, [SEEN[:4], SEEN[4:8], SEEN[8:12], SEEN[12:16]]
     shown = [[0, 0, 0], [0, 0, 1], [0, 1, 2], [1, 2, 3]]
     for step, numbers in enumerate(shown):
@@ -72,12 +72,15 @@ def test_the_history_begins_with_the_first_observation_and_is_kept_oldest_first(
     actions, _ = policy.predict(SEEN[16:20], state, begins)
     np.testing.assert_allclose(actions[1], policy.predict(SEEN[17])[0], rtol=0.0, atol=1e-6)
     np.testing.assert_allclose(
-        actions[0], policy.predict(SEEN[16], Memory(state.seen[0], None, state.held[0]))[0], atol=1e-6
+        actions[0], policy.predict(SEEN[16], Memory(state.seen[0], None, state.repeated[0]))[0], atol=1e-6
     )
 
 
 def test_an_output_is_held_while_the_base_goes_on():
-    policy, silent = random_policy(base=LQ_MARINER, authority=0.3, hold=3), random_policy(hold=2)
+    policy, silent = (
+        random_policy(base=LQ_MARINER, authority=0.3, action_repeat=3),
+        random_policy(action_repeat=2),
+    )
     bases = [LQ_MARINER.predict(rows)[0] for rows in (SEEN[:2], SEEN[2:4], SEEN[4:6], SEEN[6:8])]
     begins = [[True, True], [False, False], [False, True], [False, False]]
     decided = [[0, 0], [0, 0], [0, 2], [3, 2]]  # the step whose output each ship steers with
@@ -98,7 +101,7 @@ def test_an_output_is_held_while_the_base_goes_on():
 
 
 def test_what_was_no_number_is_not_held():
-    policy = random_policy(hold=4)
+    policy = random_policy(action_repeat=4)
     broken, state = policy.predict(np.where(np.arange(8) == 2, np.nan, SEEN[0]))
     assert np.isnan(broken).all()
     np.testing.assert_array_equal(policy.predict(SEEN[1], state)[0], policy.predict(SEEN[1])[0])
@@ -107,7 +110,7 @@ def test_what_was_no_number_is_not_held():
 @pytest.mark.parametrize("state", [3, (1, 2), "state"])
 def test_a_state_that_is_none_is_refused(state):
     with pytest.raises(InputError, match=r"state: .* found, expected what the last predict returned"):
-        random_policy(history=2).predict(SEEN, state)
+        random_policy(frame_stack=2).predict(SEEN, state)
 
 
 def test_the_network_adds_its_part_to_the_base():
@@ -167,8 +170,8 @@ def test_another_environment_is_refused_with_the_difference():
         ({"network": random_network(7, 4, 1)}, "network: 7 inputs found, expected 8: 1 x 8 observations"),
         ({"network": random_network(8, 4, 2)}, "network: 2 outputs found, expected 1: for action 'rudder'"),
         ({"action": "rudders"}, "action: 'rudders' found.*Did you mean 'rudder'"),
-        ({"history": 0}, "history: 0 found, expected a whole number of at least 1"),
-        ({"hold": 1.5}, "hold: 1.5 found, expected a whole number of at least 1"),
+        ({"frame_stack": 0}, "frame_stack: 0 found, expected a whole number of at least 1"),
+        ({"action_repeat": 1.5}, "action_repeat: 1.5 found, expected a whole number of at least 1"),
         ({"authority": 0.5}, "authority: 0.5 found without a base"),
         ({"base": LQ_MARINER, "authority": -1.0}, "authority: -1 found"),
         ({"base": LQ_MARINER, "action": "rudder-shaft"}, "'rudder-shaft' found beside a base"),
@@ -183,7 +186,7 @@ def test_a_field_that_does_not_fit_is_named(more, message):
 
 
 def test_a_state_of_other_ships_is_refused():
-    policy = random_policy(history=2)
+    policy = random_policy(frame_stack=2)
     _, state = policy.predict(SEEN)
     with pytest.raises(InputError, match=r"state: shape \(30, 1, 8\) found, expected \(4, 1, 8\)"):
         policy.predict(SEEN[:4], state)

@@ -107,10 +107,10 @@ def test_with_base_and_history_it_steers_as_in_training(history):
     """Step by step what the agent commands through the wrapper, over the ends of episodes."""
     base = LQ.from_model(MARINER)
     options = {"episode_steps": 15, "action": "rudder"}
-    env = ResidualVecEnv(ships(**options), base, authority=0.5, history=history)
+    env = ResidualVecEnv(ships(**options), base, authority=0.5, frame_stack=history)
     agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32, policy_kwargs=dict(NETS)))
     policy = LearnedPolicy.from_sb3(agent)
-    assert (policy.history, policy.base, policy.authority) == (history, base, 0.5)
+    assert (policy.frame_stack, policy.base, policy.authority) == (history, base, 0.5)
     bare = ships(**options)
     theirs, ours = env.reset(), bare.reset()
     state, starts = None, np.ones(4, bool)

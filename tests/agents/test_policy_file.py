@@ -20,8 +20,8 @@ from tests.agents.policies import MARINER, random_policy
 IDENTIFIED = load_model("mariner-tls-svm")
 POLICIES = {
     "plain": random_policy(),
-    "history": random_policy(history=3),
-    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, hold=2),
+    "frame_stack": random_policy(frame_stack=3),
+    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, action_repeat=2),
     "discrete": random_policy(action="rudder-discrete"),
     "shielded": Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)),
     "shielded pid": Shielded.from_model(MARINER, PID.from_model(MARINER)),
@@ -140,8 +140,8 @@ NAMES = list(POLICIES["plain"].observation_names)
         ("observation_scales", [1.0], "observation_scales: 1 found, expected 8 numbers"),
         ("observation_scales", [-1.0] * 8, r"observation_scales\[0\] \('heading_error_sin'\): -1 found"),
         ("action", "helm", "action: 'helm' found"),
-        ("history", 1.5, "history: 1.5 found"),
-        ("history", 2, "network: 8 inputs found, expected 16: 2 x 8 observations"),
+        ("frame_stack", 1.5, "frame_stack: 1.5 found"),
+        ("frame_stack", 2, "network: 8 inputs found, expected 16: 2 x 8 observations"),
         ("authority", "1", "authority: '1' .* found"),
         ("base", {"kind": "lq"}, "base: field 'format' is missing"),
         ("environment__id", "", "environment.id: '' found"),
@@ -251,9 +251,12 @@ def test_what_is_loaded_passes_the_conformance_suite(tmp_path):
     assert isinstance(load_agent(tmp_path / "agent.json").fallback, LQ)
 
 
-def test_a_file_of_before_there_was_hold_is_read_and_a_run_s_folder_names_its_agent(tmp_path):
-    POLICIES["plain"].save(tmp_path / "agent.json")
-    content = json.loads((tmp_path / "agent.json").read_text())
-    del content["hold"]
-    (tmp_path / "agent.json").write_text(json.dumps(content))
-    np.testing.assert_array_equal(steered(load_agent(tmp_path)), steered(POLICIES["plain"]))
+def test_older_files_are_read_and_a_run_s_folder_names_its_agent(tmp_path):
+    for name, repeats in (("plain", None), ("residual", 2)):
+        POLICIES[name].save(tmp_path / "agent.json")
+        content = json.loads((tmp_path / "agent.json").read_text())
+        content["history"] = content.pop("frame_stack")
+        assert content.pop("action_repeat") == (repeats or 1)
+        content |= {} if repeats is None else {"hold": repeats}
+        (tmp_path / "agent.json").write_text(json.dumps(content))
+        np.testing.assert_array_equal(steered(load_agent(tmp_path)), steered(POLICIES[name]))

@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
+from agents.cli.standard_trials import StandardTrials
+from agents.cli.trials_page import write_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
-from shipgym import Trial
+from shipgym import Trial, load_model
+from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
 from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
@@ -153,6 +156,17 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)
+
+
+def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
+    name = f"zigzag {HOSTILE}"
+    zigzags = {name: standard_manoeuvres(load_model("mariner"))["zigzag 20/20, port first"]}
+    index = IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))
+    found = StandardTrials({"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0)
+    write_page(replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html")
+    source = (tmp_path / "trials.html").read_text()
+    assert Page(source).scripts == 1
+    assert " ".join(Page(source).text).count(HOSTILE) == 5  # window, title, head, and why it was refused
 
 
 def test_a_figure_cannot_end_the_script_it_stands_in():

@@ -50,7 +50,7 @@ def by_hand(env, base, seed, outputs):
 def test_shows_and_does_what_is_worked_out_by_hand(name):
     env, base = BASES[name]
     outputs = np.random.default_rng(1).uniform(-1.0, 1.0, (STEPS, SHIPS, 1)).astype(np.float32)
-    residual = ResidualVecEnv(ships(env), base, authority=AUTHORITY, history=HISTORY)
+    residual = ResidualVecEnv(ships(env), base, authority=AUTHORITY, frame_stack=HISTORY)
     seen, shown, rewards, last = residual.reset(), [], [], [{} for _ in range(SHIPS)]
     for step in range(STEPS):
         shown.append(seen)
@@ -79,7 +79,7 @@ def test_an_agent_that_adds_nothing_steers_as_the_base():
 
 
 def test_only_history():
-    residual, bare = ResidualVecEnv(ships(COURSE), history=2), ships(COURSE)
+    residual, bare = ResidualVecEnv(ships(COURSE), frame_stack=2), ships(COURSE)
     first = bare.reset()
     np.testing.assert_array_equal(residual.reset(), np.hstack([first, first]))
     action = np.full((SHIPS, 1), 0.3, np.float32)
@@ -92,7 +92,7 @@ def test_only_history():
 @pytest.mark.parametrize("name", BASES)
 def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_end(name):
     env, base = BASES[name]
-    long, short = ResidualVecEnv(ships(env), base, hold=3), ResidualVecEnv(ships(env), base)
+    long, short = ResidualVecEnv(ships(env), base, action_repeat=3), ResidualVecEnv(ships(env), base)
     np.testing.assert_array_equal(long.reset(), short.reset())
     random, endings = np.random.default_rng(2), 0
     for _ in range(STEPS):
@@ -123,14 +123,14 @@ def test_an_output_beyond_its_limits_counts_as_the_limit():
 
 def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tmp_path):
     torch.set_num_threads(1)
-    env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, history=2)
+    env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, frame_stack=2)
     scaled = VecNormalize(env, norm_obs=False, gamma=0.9)
     agent = PPO("MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu")
     before = agent.predict(scaled.reset(), deterministic=True)[0]
     agent.learn(128)
     LearnedPolicy.from_sb3(agent, scaled).save(tmp_path / "agent.json")
     policy, bare = load_agent(tmp_path / "agent.json", MARINER), ships(COURSE, 8)
-    twin = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, history=2)
+    twin = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, frame_stack=2)
     seen, shown, state, starts = bare.reset(), twin.reset(), None, np.ones(8, bool)
     assert not np.array_equal(agent.predict(shown, deterministic=True)[0], before)
     for _ in range(STEPS):
@@ -146,8 +146,8 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tm
     [
         (lambda: ResidualVecEnv(ships(COURSE), authority=0.5), "authority: 0.5 found without a base"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0), "authority: 3"),
-        (lambda: ResidualVecEnv(ships(COURSE), history=0), "history: 0"),
-        (lambda: ResidualVecEnv(ships(COURSE), hold=0), "hold: 0"),
+        (lambda: ResidualVecEnv(ships(COURSE), frame_stack=0), "frame_stack: 0"),
+        (lambda: ResidualVecEnv(ships(COURSE), action_repeat=0), "action_repeat: 0"),
         (lambda: ResidualVecEnv(ships(COURSE), "lq"), "base: str found"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
         (lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))), "base: the scale of"),

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agents import LQ, LQG, PID, margin_spread
-from agents.controllers.robustness import MarginSpread
+from agents import LQ, LQG, PID, margin_uncertainty
+from agents.controllers.robustness import MarginUncertainty
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 
@@ -25,19 +25,19 @@ def test_the_gain_margin_is_the_rudder_effect_at_which_the_loop_becomes_unstable
     controller = kind.from_model(MARINER)
     margin = controller.margins.gain_margin
     factors = [1.0, 0.9 * margin, 1.1 * margin]
-    spread = margin_spread(controller, [with_rudder_effect(factor) for factor in factors])
-    assert spread.stable.tolist() == [True, True, False]
-    assert spread.by_name["gain_margin"][0] == pytest.approx(margin)
-    assert spread.by_name["gain_margin"][1] == pytest.approx(1.0 / 0.9, rel=0.05)
-    assert np.isnan(spread.by_name["gain_margin"][2])
+    found = margin_uncertainty(controller, [with_rudder_effect(factor) for factor in factors])
+    assert found.stable.tolist() == [True, True, False]
+    assert found.by_name["gain_margin"][0] == pytest.approx(margin)
+    assert found.by_name["gain_margin"][1] == pytest.approx(1.0 / 0.9, rel=0.05)
+    assert np.isnan(found.by_name["gain_margin"][2])
 
 
 def test_quantiles_are_over_the_stable_loops():
     values = {"gain_margin": np.array([2.0, np.inf, np.nan, 3.0])}
-    spread = MarginSpread(LQ.from_model(MARINER).margins, values, np.array([True, True, False, True]))
-    assert spread.quantiles((0.0, 0.5, 1.0))["gain_margin"].tolist() == [2.0, 3.0, np.inf]
+    found = MarginUncertainty(LQ.from_model(MARINER).margins, values, np.array([True, True, False, True]))
+    assert found.quantiles((0.0, 0.5, 1.0))["gain_margin"].tolist() == [2.0, 3.0, np.inf]
 
 
 def test_no_models_are_refused():
     with pytest.raises(InputError, match="models: none found"):
-        margin_spread(LQ.from_model(MARINER), [])
+        margin_uncertainty(LQ.from_model(MARINER), [])

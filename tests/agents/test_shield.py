@@ -159,7 +159,7 @@ def test_random_policies_never_lose_the_ship_under_it(seed):
 
 
 def test_it_keeps_the_promises_of_a_controller():
-    check_controller(Shielded.from_model(MARINER, random_policy(history=2)), n_steps=30)
+    check_controller(Shielded.from_model(MARINER, random_policy(frame_stack=2)), n_steps=30)
     shield = Shielded.from_model(MARINER, LQ.from_model(MARINER))
     check_controller(shield, MARINER, PathFollowingTask(), n_steps=5)
     assert shield.name == "lq-shielded"

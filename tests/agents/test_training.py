@@ -83,7 +83,7 @@ def stopping_at(steps):
 @pytest.mark.parametrize(
     ("algorithm", "settings"),
     [
-        ("ppo", {"history": 2, "base": "lqg", "authority": 0.5, "hold": 3}),
+        ("ppo", {"frame_stack": 2, "base": "lqg", "authority": 0.5, "action_repeat": 3}),
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
@@ -215,6 +215,9 @@ def test_the_command_trains_and_resumes(tmp_path):
     assert written["configuration"] == told["configuration"]
     assert {path.suffix for path in run.iterdir() if path.is_file()} == {".json", ".safetensors"}
     before = learned(run)
+    settings = written["configuration"]["settings"]
+    settings |= {"hold": settings.pop("action_repeat"), "history": settings.pop("frame_stack")}
+    (run / "run.json").write_text(json.dumps(written))  # as older versions wrote it
     code, printed = shipgym("train", "ppo", "--resume", "--out", run)
     assert (code, learned(run)) == (0, before)
     assert "resumed at step 768" in printed
@@ -236,7 +239,10 @@ def test_the_command_trains_and_resumes(tmp_path):
         (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
         (["train", "ppo", "--set", "base=none", "--set", "authority=0.5"], "without a base"),
         (["train", "ppo", "--set", "base=tuned"], "base: 'tuned' found without a task of the suite"),
-        (["train", "ppo", "--set", "hold=1000"], "hold: 1000 found, expected at most an episode's 600 steps"),
+        (
+            ["train", "ppo", "--set", "action_repeat=1000"],
+            "action_repeat: 1000 found, expected at most an episode's 600 steps",
+        ),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),
         (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),

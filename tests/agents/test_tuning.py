@@ -107,7 +107,7 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
         parameters = {}
         for name, dimension in SPACES[algorithm].items():
             if isinstance(dimension, Choice):
-                parameters[name] = draw.choice(dimension.options)
+                parameters[name] = draw.choice(dimension.choices)
             elif isinstance(dimension, Wholes):
                 parameters[name] = draw.randint(dimension.low, dimension.high)
             else:
@@ -132,7 +132,7 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path):
     tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
     with pytest.raises(InputError, match=r"configuration\.settings\.gamma is 0\.99 there, 0\.9 here"):
         tune(plan(gamma=0.9), tmp_path / "study", 1, training=trainings.bowl)
-    with pytest.raises(InputError, match="exists and is no study"):
+    with pytest.raises(InputError, match="exists and is not a tuning study"):
         tune(plan(), tmp_path, 1, training=trainings.bowl)
     (tmp_path / "study" / "study.db").write_text("no database " * 100)
     with pytest.raises(InputError, match="not a study of Optuna"):
@@ -173,10 +173,12 @@ def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
     assert not (tmp_path / "study").exists()
 
 
-def test_missing_optuna_is_told_with_its_extra(tmp_path, monkeypatch):
-    monkeypatch.setattr("agents.training.tuning.find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"pip install 'shipgym\[tune\]'"):
-        tune(plan(), tmp_path / "study", 1)
+def test_missing_optuna_is_reported_with_its_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "optuna", None)
+    monkeypatch.delitem(sys.modules, "agents.training.tuning")
+    answer = CliRunner().invoke(app, ["tune", "ppo", "--out", str(tmp_path / "study")])
+    assert answer.exit_code == 2
+    assert "pip install 'shipgym[tune]'" in answer.stderr.replace("\n", " ")
 
 
 def test_what_a_base_does_before_anything_is_learned_does_not_count():

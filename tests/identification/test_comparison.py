@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from identification import Comparison, compare_methods
+from identification.report.comparison import comparison_page
 from identification.validation.comparison import COMPARISON_FILES
 from shipgym import InputError, ShipModel, Trial
 
@@ -58,6 +60,17 @@ def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) 
     told = json.loads((tmp_path / "comparison.json").read_text())
     assert [row["method"] for row in told["ranking"]] == [s.method for s in comparison.standings]
     assert ShipModel.load(tmp_path / "model-ls.json").coefficients == comparison.results["ls"].coefficients
+
+
+def test_no_name_or_message_becomes_html(comparison: Comparison) -> None:
+    hostile = "<script>alert(1)</script>\"'&{{ 7 * 7 }}"
+    first = replace(comparison.standings[0], errors={hostile: 0.1}, method=hostile)
+    results = {hostile: comparison.best}
+    changed = replace(comparison, standings=(first,), results=results, refused={hostile: hostile})
+    page = comparison_page(changed)
+    assert "<script>alert" not in page
+    assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;&#34;&#39;&amp;{{ 7 * 7 }}") == 4
+    assert page.count("</script>") == 3  # plotly.js and two figures
 
 
 def test_without_trials_to_validate_each_is_held_out_in_turn(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, load_model, manoeuvres
-from shipgym.manoeuvres.imo import assess_draws, judge_imo
+from shipgym.manoeuvres.imo import assess_draws, imo_criteria
 from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, worst
 
 
@@ -31,7 +31,7 @@ def test_the_interval_is_that_of_the_linearised_index(identified):
     model = replace(identified, covariance=covariance)
     found = manoeuvres.index_intervals(model, "turning circle 35 deg to starboard", n_draws=300, seed=0)
     names, deviations = list(model.coefficients), np.sqrt(np.diag(covariance))
-    judged = manoeuvres.standard_manoeuvres(model)["turning circle 35 deg to starboard"].judge
+    judged = manoeuvres.standard_manoeuvres(model)["turning circle 35 deg to starboard"].evaluate
 
     def advance(name, change):
         moved = {**model.coefficients, name: model.coefficients[name] + change}
@@ -60,8 +60,10 @@ def test_draws_that_run_away_or_never_reach_are_counted():
     )
     name = "turning circle 35 deg to starboard"
     manoeuvre = manoeuvres.standard_manoeuvres(ship)[name]
-    own = {name: {"advance_lengths": manoeuvre.judge(ship).advance_lengths}}
-    found = intervals_of(own, [ship, wild, numb, ship], {name: lambda s: _only_advance(manoeuvre.judge(s))})
+    own = {name: {"advance_lengths": manoeuvre.evaluate(ship).advance_lengths}}
+    found = intervals_of(
+        own, [ship, wild, numb, ship], {name: lambda s: _only_advance(manoeuvre.evaluate(s))}
+    )
     index = found[name]["advance_lengths"]
     assert (index.n_ran_away, index.n_never_reached) == (1, 1)
     assert "1 of 4 draws ran away, 1 of 4 draws never got so far" in str(index)
@@ -109,13 +111,13 @@ def test_stopping_is_judged_where_the_ship_goes_astern(name, passed, said):
     """Track reach of a full astern stop, MSC.137(76) 5.3.4: the tanker's 8.95 lengths are within 15."""
     ship = load_model(name)
     needed = {n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n}
-    own = {n: m.nothing for n, m in needed.items()}
+    own = {n: m.no_indices for n, m in needed.items()}
     stops = intervals_of(own, [], {})
     if passed:
         reach = manoeuvres.stopping_indices(manoeuvres.crash_stop(ship)).track_reach_lengths
         stops["crash stop"] = {"track_reach_lengths": IndexInterval(reach, np.empty(0), np.empty(0, bool))}
         assert reach == pytest.approx(8.95, abs=0.01)
-    criterion = judge_imo(ship, stops)["stopping"]
+    criterion = imo_criteria(ship, stops)["stopping"]
     assert criterion.passed is passed
     assert said in criterion.note
     assert criterion.limit == 15.0

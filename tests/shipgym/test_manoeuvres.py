@@ -171,7 +171,7 @@ def test_the_standard_manoeuvres_in_shallow_water():
     """The tanker turns wider and later where there is little water under her keel."""
     tanker = load_model("tanker")
     name = "turning circle 35 deg to starboard"
-    deep, shallow = (manoeuvres.standard_manoeuvres(tanker, h)[name].judge(tanker) for h in (np.inf, 25.0))
+    deep, shallow = (manoeuvres.standard_manoeuvres(tanker, h)[name].evaluate(tanker) for h in (np.inf, 25.0))
     assert shallow.tactical_diameter_lengths > 1.2 * deep.tactical_diameter_lengths
     by_hand = manoeuvres.turning_circle(tanker, 35.0, 1500.0, 0.5, water_depth=25.0)
     assert shallow.advance_lengths == pytest.approx(

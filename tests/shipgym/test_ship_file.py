@@ -239,7 +239,7 @@ def test_a_ship_file_without_ship_or_trials_is_refused(folder):
 
 
 def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
-    with pytest.raises(InputError, match="no such file, expected a ship file"):
+    with pytest.raises(InputError, match="there is no such ship file"):
         ShipFile.load(tmp_path / "ship.toml")
     with pytest.raises(InputError, match="this is a folder"):
         ShipFile.load(tmp_path)
@@ -252,7 +252,7 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
 def test_a_missing_trial_is_refused_on_loading(folder, file):
     assert refusal(folder, '"a.csv"', f'"{file}"').startswith(": [[trials]] 1 file: ")
     (folder / "a.csv").rename(folder / "a_.csv")
-    assert "a.csv: no such file, expected a CSV file. Did you mean 'a_.csv'?" in refusal(folder)
+    assert "a.csv: there is no such CSV file. Did you mean 'a_.csv'?" in refusal(folder)
 
 
 def test_what_is_wrong_in_a_trial_names_ship_file_and_csv_file(folder):

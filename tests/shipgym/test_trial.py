@@ -478,8 +478,8 @@ def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "run_1.csv").write_text("t,u\n")
-    assert "no such file, expected a CSV file. Did you mean 'run_1.csv'?" in refusal(tmp_path / "run1.csv")
-    assert "no such file" in refusal(tmp_path / "nowhere" / "run.csv")
+    assert "there is no such CSV file. Did you mean 'run_1.csv'?" in refusal(tmp_path / "run1.csv")
+    assert "no such CSV file" in refusal(tmp_path / "nowhere" / "run.csv")
     assert "this is a folder" in refusal(tmp_path)
 
 

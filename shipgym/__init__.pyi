@@ -1,0 +1,35 @@
+from . import manoeuvres as manoeuvres
+from . import plots as plots
+from . import weather as weather
+from .envs.checker import check_vector_env as check_vector_env
+from .envs.episode import Episode as Episode
+from .envs.recording import RecordEpisode as RecordEpisode
+from .envs.sb3 import ShipVecEnv as ShipVecEnv
+from .errors import InputError as InputError
+from .errors import ManoeuvreError as ManoeuvreError
+from .errors import UnstableModelError as UnstableModelError
+from .examples import example_ship as example_ship
+from .manoeuvres import towing_tank as towing_tank
+from .sea.conditions import Current as Current
+from .sea.conditions import Waves as Waves
+from .sea.conditions import Weather as Weather
+from .sea.conditions import Wind as Wind
+from .sea.conditions import sea_states as sea_states
+from .ships import ShipModel as ShipModel
+from .ships import list_models as list_models
+from .ships import list_structures as list_structures
+from .ships import load_model as load_model
+from .ships import register_structure as register_structure
+from .ships.checker import ModelCheck as ModelCheck
+from .ships.checker import check_ship_model as check_ship_model
+from .ships.particulars import Particulars as Particulars
+from .ships.scaling import scale_model as scale_model
+from .ships.stability import StraightLineStability as StraightLineStability
+from .ships.stability import straight_line_stability as straight_line_stability
+from .ships.steering import SteeringGear as SteeringGear
+from .trials.sensors import Sensor as Sensor
+from .trials.sensors import Sensors as Sensors
+from .trials.ship_file import ShipFile as ShipFile
+from .trials.trial import Trial as Trial
+
+__version__: str

@@ -1,0 +1,65 @@
+"""Bare ships through time in calm water, 64 at once: physics without a task around it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shipgym.engine.motion import Push, sail
+from shipgym.engine.records import LANES
+
+SIGNATURE = "void(float64[:, ::1], float64[:, ::1], float64, int64, float64[:, ::1])"
+
+
+def common_ship(ships: Any) -> Any:
+    """The ship that all lanes share, or nothing; a part."""
+
+
+def ship_at(common: Any, ships: Any, lane: int) -> Any:
+    """Ship and coefficients of one lane; a part."""
+
+
+def load_motion(tile: Any, lane: int) -> Any:
+    """A part."""
+
+
+def store_motion(tile: Any, lane: int, motion: Any) -> None:
+    """A part."""
+
+
+def advance_tile(state: Any, command: Any, h: float, ships: Any) -> None:
+    """Move the ships of one tile by h seconds, the commands held."""
+    common = common_ship(ships)
+    for lane in range(LANES):
+        ship, coefficients = ship_at(common, ships, lane)
+        motion = load_motion(state, lane)
+        after = sail(
+            motion,
+            command[lane],
+            command[LANES + lane],
+            h,
+            Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            coefficients,
+            ship,
+        )
+        store_motion(state, lane, after)
+
+
+def advance_batch(states: Any, commands: Any, h: float, steps: int, ships: Any) -> None:
+    """Some Runge-Kutta steps of h seconds of all ships, the commands held.
+
+    Parameters
+    ----------
+    states : array of shape (n_tiles, n_state * 64)
+        Changed in place.
+    commands : array of shape (n_tiles, 2 * 64)
+        Rudder angle, rad, and shaft speed, 1/s, of each lane.
+    h : float
+        Step, s.
+    steps : int
+        Number of steps.
+    ships : array of shape (n_ships, n_rows * 64)
+        One tile of ships for all, or one for each tile of states.
+    """
+    for _ in range(steps):
+        for tile in range(states.shape[0]):
+            advance_tile(states[tile], commands[tile], h, ships[tile % ships.shape[0]])

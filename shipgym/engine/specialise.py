@@ -1,0 +1,153 @@
+"""Plain functions compiled together: the same Python that a debugger runs becomes one loop.
+
+A ship, a sea, a task is written as plain functions on named tuples, without decorators. `specialise` takes a
+loop over many ships, puts such functions in the places that it names, and hands loop and functions to Numba:
+functions are copied with the globals that they name replaced, so that nothing is generated as text, and the
+originals stay what they are, to be called from Python.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import platform
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+from shipgym.engine.records import is_record
+from shipgym.errors import InputError
+
+Parts = Mapping[str, Any]
+
+# Of functions that loops call: without entries for Python and C, which take longer to compile than many of them.
+INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+# error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
+# the others would optimise NaN checks away and make results depend on the batch size.
+PHYSICS = {"error_model": "numpy", "fastmath": {"contract"}}
+# What is also stored as it is summed could be contracted in one form of a loop and not in another; so costs and
+# observations, which are, would depend on the batch size.
+EXACT = {"error_model": "numpy"}
+
+
+@dataclass(frozen=True)
+class Part:
+    """How a function that is put in a place is compiled.
+
+    Attributes
+    ----------
+    function : callable
+        A plain Python function on numbers and records.
+    exact : bool
+        Without contraction of products and sums, like all functions that it calls.
+    inline : bool
+        Whether it becomes part of the loop; if not, it is called, as befits what comes seldom.
+    """
+
+    function: Callable[..., Any]
+    exact: bool = False
+    inline: bool = True
+
+
+@dataclass
+class Specialisation:
+    """Functions made for one set of parts, each once."""
+
+    parts: Parts
+    tag: str
+    jit: Callable[..., Any] | None
+    made: dict[tuple[Any, bool, bool], Any] = field(default_factory=dict)
+
+    def inner(self, part: Part) -> Any:
+        """A function that others call, with all that it calls."""
+        key = (part.function, part.exact, part.inline)
+        if key not in self.made:
+            copy = self.copy(part.function, part.exact)
+            if self.jit is not None:
+                semantics = EXACT if part.exact else PHYSICS
+                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **semantics)(copy)
+            self.made[key] = copy
+        return self.made[key]
+
+    def copy(self, function: Any, exact: bool = False) -> FunctionType:
+        """A function with its globals replaced: parts by their place, plain functions by their copies."""
+        namespace: dict[str, Any] = {"__name__": function.__module__, "__builtins__": __builtins__}
+        for name, value in named_globals(function, self.parts):
+            if isinstance(value, Part):
+                value = self.inner(value)
+            elif isinstance(value, FunctionType):
+                value = self.inner(Part(value, exact))
+            namespace[name] = value
+        copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
+        copy.__qualname__ = f"{function.__name__}_{self.tag}"  # symbols of all that is compiled differ
+        copy.__module__ = function.__module__
+        return copy
+
+
+def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
+    """Globals that a function names, those of `parts` in place of its own."""
+    if function.__closure__:
+        raise InputError(
+            f"{function.__module__}.{function.__name__}: uses variables of the function around it "
+            f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
+        )
+    for name in function.__code__.co_names:
+        if name in parts:
+            yield name, parts[name]
+        elif name in function.__globals__:
+            yield name, function.__globals__[name]
+
+
+def fingerprint(function: Any, parts: Parts) -> str:
+    """Hash of all that the machine code of a specialised function depends on."""
+    digest = hashlib.sha256(_machine().encode())
+    seen: set[Any] = set()
+
+    def add(text: object) -> None:
+        digest.update(repr(text).encode() + b"\0")
+
+    def visit(value: Any) -> None:
+        if isinstance(value, Part):
+            add((value.exact, value.inline))
+            visit(value.function)
+        elif isinstance(value, FunctionType):
+            if value not in seen:
+                seen.add(value)
+                visit_code(value.__code__, value.__doc__)
+                add(value.__defaults__)
+                for name, other in named_globals(value, parts):
+                    add(name)
+                    visit(other)
+        elif is_record(value):
+            add((value.__name__, value._fields))
+        elif isinstance(value, ModuleType):
+            add(value.__name__)
+        elif isinstance(value, type) or callable(value):
+            add(getattr(value, "__qualname__", str(type(value))))
+        else:
+            add(value)
+
+    def visit_code(code: CodeType, doc: str | None) -> None:
+        digest.update(code.co_code)
+        add((code.co_names, code.co_varnames))
+        for constant in code.co_consts:
+            if isinstance(constant, CodeType):
+                visit_code(constant, None)
+            elif doc is None or constant != doc:
+                add(constant)
+
+    visit(function)
+    return digest.hexdigest()[:24]
+
+
+@cache
+def _machine() -> str:
+    """Versions and processor that machine code is made for."""
+    import llvmlite.binding as llvm
+    import numba
+
+    features = sorted(llvm.get_host_cpu_features().items())
+    return repr(
+        (platform.python_version(), numba.__version__, platform.machine(), llvm.get_host_cpu_name(), features)
+    )

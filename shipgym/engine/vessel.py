@@ -1,0 +1,113 @@
+"""A ship as loops take her: her functions, what she has, and where her numbers stand."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.records import LANES, Layout, Record, Rows
+from shipgym.engine.specialise import Part
+
+
+@dataclass(frozen=True, eq=False)
+class Vessel:
+    """What is compiled of a ship; ships that share it differ in numbers only.
+
+    Attributes
+    ----------
+    name : str
+        For messages.
+    state_names : tuple of str
+        Numbers of `Motion` that she has, in its order.
+    coefficients : type
+        `NamedTuple` of the numbers that her functions read.
+    functions : mapping of str to Part or other global
+        `accelerations`, `shaft_acceleration`, and what these name in turn (see `shipgym.engine.motion`).
+    lag : bool
+        Whether her steering gear has a time constant.
+    """
+
+    name: str
+    state_names: tuple[str, ...]
+    coefficients: Record
+    functions: Mapping[str, Any]
+    lag: bool
+
+    @cached_property
+    def motion(self) -> Rows:
+        """Rows of her state."""
+        return Rows(Motion, 0, self.state_names)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Rows of her numbers: `Ship`, then her coefficients."""
+        return Layout(ship=Ship, coefficients=self.coefficients)
+
+    def parts(self, lanes: int = LANES, shared: bool = True) -> dict[str, Any]:
+        """What takes the place of the globals of `shipgym.engine.motion` and of the loops.
+
+        Parameters
+        ----------
+        lanes : int
+            Of a tile of states, 64, or 1 where states are vectors.
+        shared : bool
+            Whether all lanes have the same ship, so that her numbers are a vector and not a tile.
+        """
+        functions = self.layout.functions(1 if shared else LANES)
+        return {
+            "accelerations": Part(no_accelerations),
+            "shaft_acceleration": Part(no_shaft),
+            **self.functions,
+            "HAS_ROLL": "phi" in self.state_names,
+            "HAS_SHAFT": "n" in self.state_names,
+            "HAS_MEMORY": "q" in self.state_names,
+            "HAS_LAG": self.lag,
+            "HAS_SEA": False,
+            "load_motion": Part(self.motion.loader(lanes)),
+            "store_motion": Part(self.motion.storer(lanes)),
+            "load_ship": Part(functions["load_ship"]),
+            "load_coefficients": Part(functions["load_coefficients"]),
+            "common_ship": Part(read_ship if shared else nothing),
+            "ship_at": Part(the_common if shared else ship_of_lane),
+        }
+
+
+def no_accelerations(motion: Any, coefficients: Any, ship: Any) -> tuple[float, ...]:
+    """Those of a body without forces."""
+    return 0.0, 0.0, 0.0, 0.0, 0.0
+
+
+def no_shaft(n: float, command: float, coefficients: Any, ship: Any) -> float:
+    """A shaft without dynamics."""
+    return 0.0
+
+
+def load_ship(ships: Any, lane: int) -> Any:
+    """A part: the `Ship` of a lane."""
+
+
+def load_coefficients(ships: Any, lane: int) -> Any:
+    """A part: the coefficients of a lane."""
+
+
+def read_ship(ships: Any) -> Any:
+    """The ship of all lanes, read once before a loop."""
+    return load_ship(ships, 0), load_coefficients(ships, 0)
+
+
+def the_common(common: Any, ships: Any, lane: int) -> Any:
+    """The ship that was read before the loop."""
+    return common
+
+
+def nothing(ships: Any) -> int:
+    """Nothing is common to all lanes."""
+    return 0
+
+
+def ship_of_lane(common: Any, ships: Any, lane: int) -> Any:
+    """Ship and coefficients of one lane."""
+    return load_ship(ships, lane), load_coefficients(ships, lane)

@@ -1,0 +1,32 @@
+"""Ship files with recorded trials that come with the package, to try it out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shipgym.checks import check_choice
+
+FOLDER = Path(__file__).parent
+
+
+def example_ship(name: str = "mariner") -> Path:
+    """Path of a ship file with trials that comes with the package.
+
+    Parameters
+    ----------
+    name : {"mariner"}
+        The ship: "mariner" is a cargo ship of the Mariner class with three simulated zigzags as a sea trial
+        would log them, two to fit and one to validate.
+
+    Returns
+    -------
+    Path
+        For `shipgym.ShipFile.load` and the commands that take a ship file.
+
+    Raises
+    ------
+    InputError
+        For another name.
+    """
+    known = sorted(path.parent.name for path in FOLDER.glob("*/ship.toml"))
+    return FOLDER / check_choice(name, known, "example ship") / "ship.toml"

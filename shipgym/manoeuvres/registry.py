@@ -1,0 +1,142 @@
+"""The manoeuvres known by name: those of this package, and those that a user registers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from shipgym.checks import check_text
+from shipgym.errors import InputError
+from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.trial import KINDS
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+LENGTHS = 40.0  # duration of a standard zigzag or turning circle, in times to travel one ship length
+STEPS_PER_LENGTH = 50  # of their simulation
+SIDES = (("starboard", 1.0), ("port", -1.0))
+
+
+@dataclass(frozen=True)
+class Manoeuvre:
+    """One manoeuvre with all its settings, and the indices that are read from it.
+
+    Attributes
+    ----------
+    sail : callable
+        From a ship to the trial (to the spiral, for spirals).
+    indices : callable
+        From what was sailed to its indices.
+    outcome : type
+        The dataclass of its indices, units in the names of its fields.
+    caption : str
+        What its figure shows.
+    figure : callable, optional
+        From what was sailed to a plotly figure; by default what suits its kind
+        (`shipgym.plots.manoeuvre_figure`).
+    """
+
+    sail: Callable[[ShipModel], Any]
+    indices: Callable[[Any], Any]
+    outcome: type
+    caption: str = ""
+    figure: Callable[[Any], Figure] | None = None
+
+    @property
+    def no_indices(self) -> dict[str, float | None]:
+        """Its indices where it could not be completed: all None."""
+        return dict.fromkeys(field.name for field in fields(self.outcome))
+
+    def evaluate(self, model: ShipModel) -> Any:
+        """The indices of a ship in this manoeuvre."""
+        return self.indices(self.sail(model))
+
+
+class Variants(Protocol):
+    """From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name."""
+
+    def __call__(self, model: ShipModel, water_depth: float = np.inf) -> Mapping[str, Manoeuvre]:
+        """Her manoeuvres, none where they do not suit her."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """Manoeuvres of one kind, which share a section of the page that `shipgym trials` writes."""
+
+    title: str
+    variants: Variants
+
+
+#: All families by name, in the order in which they are sailed and reported.
+FAMILIES: dict[str, Family] = {}
+
+
+def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str | None = None) -> None:
+    """Make a family of manoeuvres known to `standard_manoeuvres`, `index_intervals` and `shipgym trials`.
+
+    Parameters
+    ----------
+    name : str
+        Of the family, such as ``"zigzags"``.
+    variants : callable
+        From a ship and the depth of the water, m, to a dict of `Manoeuvre` by name; empty for a ship that
+        the manoeuvre does not suit. Angles and durations are chosen for the ship there.
+    title : str
+        Heading on pages; by default the name.
+    kind : str, optional
+        A further ``kind`` that trials and ship files may name, such as ``"zigzag"``.
+
+    Raises
+    ------
+    InputError
+        If a family of that name is registered already.
+    """
+    check_text(name, "manoeuvre: name")
+    if name in FAMILIES:
+        raise InputError(f"manoeuvre: '{name}' is registered already; choose another name")
+    FAMILIES[name] = Family(title or name.capitalize(), variants)
+    if kind is not None and kind not in KINDS:
+        KINDS.append(check_text(kind, "manoeuvre: kind"))
+
+
+def families_of(model: ShipModel, water_depth: float = np.inf) -> dict[str, dict[str, Manoeuvre]]:
+    """The manoeuvres that suit a ship, by family and name; arguments and errors of `standard_manoeuvres`."""
+    model.check_depth(water_depth)
+    return {name: dict(family.variants(model, water_depth)) for name, family in FAMILIES.items()}
+
+
+def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+    """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
+
+    Parameters
+    ----------
+    model : ShipModel
+        Her length and speed give durations and steps, her rudder's limit the angles.
+    water_depth : float
+        m, for ships that know shallow water.
+
+    Returns
+    -------
+    dict of str to Manoeuvre
+        Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to both sides; a direct
+        spiral, and a reverse spiral where the ship is unstable on a straight course; with a shaft an inertia
+        stop and an acceleration, and a crash stop where her equations hold for a shaft astern; and what was
+        registered besides (`register_manoeuvre`).
+
+    Raises
+    ------
+    InputError
+        For water that is too shallow, or shallow water in a ship that knows none.
+    """
+    families = families_of(model, water_depth).values()
+    return {name: manoeuvre for family in families for name, manoeuvre in family.items()}
+
+
+def standard_time(model: ShipModel) -> tuple[float, float]:
+    """Duration and step of a standard zigzag or turning circle, s."""
+    travel = model.particulars["length"] / model.particulars["speed"]
+    return LENGTHS * travel, travel / STEPS_PER_LENGTH

@@ -1,0 +1,56 @@
+"""Whether a trial can be that of a ship of this size and speed."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from shipgym.errors import InputError
+from shipgym.ships.particulars import Particulars
+from shipgym.trials.trial import Trial
+
+_MOST = 0.95  # share of the samples that count: the others may be outliers
+_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
+_FASTEST_TIP = 100.0  # m/s at the propeller's tip
+_SPEEDS = (0.2, 2.0)  # of a trial, by the service speed
+
+
+def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
+    """Refuse what no ship of this size and speed does: the trial is another ship's, or in another unit.
+
+    These are yaw rates and speeds of another scale, and a propeller's tip beyond 100 m/s. Service speed and
+    propeller diameter count where they are given; `where` begins the messages.
+    """
+    speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
+    if speeds is not None and "r" in trial:
+        _check_turning(trial, float(speeds.max()), ship.length, where)
+    if speeds is not None and ship.speed is not None and "speed" not in ship.estimated:
+        fastest = float(np.quantile(speeds, _MOST))
+        low, high = (share * ship.speed for share in _SPEEDS)
+        if not low <= fastest <= high:
+            raise InputError(
+                f"{where}: up to {fastest:.4g} m/s found, expected {low:.4g} to {high:.4g} m/s of a ship "
+                f"with a service speed of {ship.speed:g} m/s; likely the trial of another ship or scale, "
+                "or a wrong unit of u; if it is this ship's, give its speed as sailed"
+            )
+    if "n" in trial and ship.propeller_diameter is not None:
+        fastest = float(np.quantile(np.abs(trial["n"]), _MOST))
+        limit = _FASTEST_TIP / (math.pi * ship.propeller_diameter)
+        if fastest > limit:
+            raise InputError(
+                f"{where}: shaft speed up to {fastest:.4g} rps found, expected at most {limit:.4g} rps for a "
+                f"propeller of {ship.propeller_diameter:g} m; likely a wrong unit: "
+                'declare n = { column = "...", unit = "rpm" } in [columns]'
+            )
+
+
+def _check_turning(trial: Trial, speed: float, length: float, where: str) -> None:
+    fastest, limit = float(np.quantile(np.abs(trial["r"]), _MOST)), _FASTEST_TURN_PRIME * speed / length
+    if fastest > limit:
+        raise InputError(
+            f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
+            f"expected at most {math.degrees(limit):.4g} deg/s for a length of {length:g} m; likely the "
+            "trial of another ship or scale, or a wrong unit of r, psi, u or v in [columns], or of [ship] "
+            "length"
+        )

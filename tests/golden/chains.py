@@ -1,0 +1,80 @@
+"""Golden sections `demo`, `pretrained` and `identification`: what whole chains come to."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import shipgym
+from agents import benchmark
+from identification import identify
+from tests.golden.store import Floats, numbers_in, vector
+
+ROOT = Path(__file__).parents[2]
+SHIP_FILE = ROOT / "examples" / "mariner" / "ship.toml"
+#: Parts of names in metrics.json that tell of the run, not of the ship.
+OF_THE_RUN = ("time", "duration", "version", "path", "software")
+
+CONTESTANTS = ("pid", "lq", "ppo")
+TASKS = (
+    "mariner-calm", "kvlcc2-large-turns", "mariner-rough", "kvlcc2-noise", "container-path",
+    "tanker-shallow-path", "mariner-current", "kvlcc2-current", "mariner-sharp-turns", "kvlcc2-sharp-turns",
+    "container-roll-path", "container-rough-path",
+)  # fmt: skip
+EPISODES = 3
+KEYS = ("contestant", "task", "run", "seed")
+
+METHODS: Mapping[str, Mapping[str, Any]] = {
+    "default": {},
+    "ls": {"method": "ls"},
+    "abc-lssvr": {"method": "abc-lssvr", "optimiser": {"name": "abc", "rounds": 10}, "seed": 1},
+    "rm-svm": {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"},
+    "output-error": {"method": "output-error"},
+    "tmils": {"method": "tmils"},
+    "prior": {"prior": "container"},
+    "nomoto euler": {"method": "ls", "samples": "euler", "structure": "nomoto"},
+    "cv-lssvr rts bootstrap": {"method": "cv-lssvr", "preprocessing": "rts", "uncertainty": "bootstrap"},
+}
+#: The refinement stops when a step is small, so that its last digits depend on the way.
+TOLERANCES = {"": 1e-7, "output-error: ": 1e-5}
+
+
+def record_demo(_: str) -> dict[str, Floats]:
+    """The numbers in the metrics of `make demo`."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "report"
+        words = ["autopilot", str(SHIP_FILE), "--agent", "mariner-calm-ppo", "--out", str(out)]
+        subprocess.run(
+            [sys.executable, "-m", "agents.cli", *words], cwd=ROOT, check=True, capture_output=True, text=True
+        )
+        metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
+    return numbers_in(metrics, left_out=OF_THE_RUN)
+
+
+def record_pretrained(task: str) -> dict[str, Floats]:
+    """All figures of a few scored episodes of a task, flown by PID, LQ and the pretrained agent."""
+    result = benchmark(list(CONTESTANTS), tasks=[task], episodes=EPISODES)
+    return {
+        f"{one} {name}": vector(result.figures(one, task, name))
+        for one in CONTESTANTS
+        for name in result.episodes
+        if name not in KEYS
+    }
+
+
+def record_identification(method: str) -> dict[str, Floats]:
+    """Coefficients of the example's ship, each with its standard error, and the errors of predictions."""
+    ship = shipgym.ShipFile.load(SHIP_FILE)
+    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering, **METHODS[method])
+    errors = result.standard_errors
+    found = {
+        f"coefficient {name}": np.array([value, errors[name]]) for name, value in result.coefficients.items()
+    }
+    return found | numbers_in(result.metrics, "metrics")
