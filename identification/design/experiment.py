@@ -146,21 +146,9 @@ class Advice:
 
 
 def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, float]) -> Floats:
-    """Information on the model's coefficients, for exact features and white errors.
+    """Information on the model's coefficients, for exact features and white errors; it adds up over samples.
 
-    Parameters
-    ----------
-    model : ShipModel
-        With a table of terms.
-    samples : Samples
-        Regression of its structure.
-    noise : mapping of str to float
-        Variance of the targets' errors, by equation.
-
-    Returns
-    -------
-    array of shape (n_coefficients, n_coefficients)
-        It adds up over samples and trials.
+    `noise` is the variance of the targets' errors, by equation. Shape (n_coefficients, n_coefficients).
     """
     table = _table(model)
     matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
@@ -178,15 +166,8 @@ def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, f
 def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
     """Manoeuvres that trials usually consist of, each of 40 ship lengths at service speed.
 
-    Parameters
-    ----------
-    model : ShipModel
-        Gives length, speed and the rudder's limit.
-
-    Returns
-    -------
-    dict of str to callable
-        Zigzags and turning circles of several angles and a pseudo-random binary rudder.
+    Zigzags and turning circles of several angles, up to the rudder's limit, and a pseudo-random binary
+    rudder.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     times = {"duration": DURATION * travel, "dt": travel / STEPS}

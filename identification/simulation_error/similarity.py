@@ -41,22 +41,10 @@ def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats
 
 
 def correlations(target: ArrayLike, candidates: Mapping[str, ArrayLike]) -> dict[str, float]:
-    """Pearson correlation of each candidate's features with the target's.
+    """Pearson correlation of each candidate's features with the target's, of shape (n_features,).
 
     Each feature is first divided by its 2-norm over all ships. Features that are nan for any ship are left
     out.
-
-    Parameters
-    ----------
-    target : array-like of shape (n_features,)
-        Features of the target (`similarity_vector`).
-    candidates : mapping of str to array-like of shape (n_features,)
-        Of the candidates.
-
-    Returns
-    -------
-    dict of str to float
-        By candidate.
 
     Raises
     ------
