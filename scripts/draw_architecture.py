@@ -1,4 +1,4 @@
-"""Draw the pictures of `docs/architecture.md` from the code: the rooms with their imports, and a step of the engine.
+"""Draw the pictures of `docs/architecture.md` from the code: rooms with their imports, and a step.
 
 `python scripts/draw_architecture.py`; a test compares the pictures with what this draws.
 """
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 PACKAGES = ("agents", "identification", "shipgym")
 
-#: Column, row and contents of each room, package by package: a room is expected to import those that are named
+#: Column, row and contents of each room, package by package: a room is expected to import those named
 #: behind it, and not those before it.
 ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.cli": (2, 0, "the command shipgym"),
@@ -137,7 +137,7 @@ def reached(edges: Edges, start: str) -> set[str]:
 
 
 def arrows(edges: Iterable[tuple[str, str]]) -> tuple[Edges, Edges]:
-    """Arrows within the packages: those that go down, less those that follow from others, and those that go up."""
+    """Arrows within packages: down, less those that follow from others, and up."""
     order = {name: i for i, name in enumerate(ROOMS)}
     inside = {(a, b) for a, b in room_imports(edges) if a.partition(".")[0] == b.partition(".")[0]}
     down = {(a, b) for a, b in inside if order[a] < order[b]}
@@ -241,7 +241,7 @@ EPISODES = ROOT / "shipgym" / "engine" / "episodes.py"
 
 
 def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
-    """What a step does, in order: each function's docstring and the functions that it calls, with their givers."""
+    """What a step does, in order: docstring of each function, and what it calls, with the givers."""
     functions = {
         node.name: node
         for node in ast.parse(EPISODES.read_text(encoding="utf-8")).body
@@ -257,11 +257,10 @@ def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
 
 def _called(function: ast.FunctionDef) -> list[str]:
     """Names of the functions that a function calls, in the order of its lines."""
-    calls = [
-        node for node in ast.walk(function) if isinstance(node, ast.Call) and isinstance(node.func, ast.Name)
-    ]
-    calls.sort(key=lambda call: (call.lineno, call.col_offset))
-    return list(dict.fromkeys(call.func.id for call in calls if isinstance(call.func, ast.Name)))
+    calls = [node.func for node in ast.walk(function) if isinstance(node, ast.Call)]
+    names = [call for call in calls if isinstance(call, ast.Name)]
+    names.sort(key=lambda name: (name.lineno, name.col_offset))
+    return list(dict.fromkeys(name.id for name in names))
 
 
 def _given(name: str, functions: Mapping[str, ast.FunctionDef]) -> Iterator[tuple[str, str]]:
@@ -320,9 +319,7 @@ def _compiler() -> Iterator[str]:
     yield '<rect x="20" y="138" width="920" height="44" rx="5" fill="white" stroke="#456"/>'
     told = "specialise.py puts these plain functions in the places that the loop names"
     yield text(480, 157, told, anchor="middle", weight="bold", size=12)
-    kept = (
-        "compiling.py makes machine code of the whole, or reads it from the cache, where it lies under a hash"
-    )
+    kept = "compiling.py makes machine code of the whole, or reads it from the cache"
     yield text(480, 173, kept, anchor="middle", size=11)
     yield line_to("M480 182 L480 212")
 
@@ -338,7 +335,8 @@ def _stage(name: str, about: str, given: list[tuple[str, str]], y: float, last: 
     x = 262.0
     for giver, one in dict.fromkeys(given):
         width = 7.0 * len(one) + 18
-        yield f'<rect x="{x:g}" y="{y + 23}" width="{width - 6:g}" height="20" rx="9" fill="{GIVERS[giver]}"/>'
+        size = f'width="{width - 6:g}" height="20" rx="9"'
+        yield f'<rect x="{x:g}" y="{y + 23}" {size} fill="{GIVERS[giver]}"/>'
         yield text(x + width / 2 - 3, y + 37, one, size=11, anchor="middle", family="monospace")
         x += width
     if not last:
