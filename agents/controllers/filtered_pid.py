@@ -192,14 +192,8 @@ def _rate(value: float, name: str) -> float:
 def notch_band(turn: float) -> tuple[float, float, float]:
     """Band-pass that a notch takes away, discretised bilinearly at `turn` rad an interval.
 
-    Parameters
-    ----------
-    turn : float
-
-    Returns
-    -------
-    band, once, twice : float
-        taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice taken[k - 2].
+    Returns `band, once, twice`: taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice
+    taken[k - 2].
     """
     k = np.tan(0.5 * turn)
     per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)

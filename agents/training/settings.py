@@ -239,22 +239,11 @@ def load_settings(
 ) -> Settings:
     """The tuned settings of an algorithm, with those that are given in their place.
 
-    Parameters
-    ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following"}
-    task : str
-        Name of a suite's task; one without settings of its own has those of its environment.
-    given : mapping of str to Any, optional
-        Settings by name that go before the tuned ones.
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        scratch.
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
+    `algorithm`: ppo, sac, td3 or tqc. `environment`: course-keeping or path-following. `task`: name of a
+    suite's task; one without settings of its own has those of its environment. `given`: settings by name that
+    go before the tuned ones. `action`: rudder, rudder-discrete or rudder-shaft. With others than rudder, or
+    `base` given as "none", a policy learns from scratch. Raises InputError for an unknown algorithm or
+    setting, with the nearest known one, or a value out of its range.
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     check_choice(environment, ENVIRONMENTS, "environment")
@@ -283,10 +272,7 @@ def _of(content: Mapping[str, Any], table: str, name: str, where: str) -> Any:
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     """Settings by name, all of them.
 
-    Raises
-    ------
-    InputError
-        For an unknown one, one that is missing, or a value out of its range.
+    Raises InputError for an unknown one, one that is missing, or a value out of its range.
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     table = _settings(values, kind, f"settings of {algorithm}")
@@ -299,10 +285,7 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
 def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
     """The settings with others in the place of some.
 
-    Raises
-    ------
-    InputError
-        For an unknown one, or a value out of its range.
+    Raises InputError for an unknown one, or a value out of its range.
     """
     return replace(settings, **_settings(given, type(settings), "settings"))
 
@@ -310,10 +293,7 @@ def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     """Settings in a TOML file of a user's own.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or names an unknown setting.
+    Raises InputError if it cannot be read, or names an unknown setting.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -328,10 +308,7 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:
     """Settings of the command line, `name=value` with a value as in TOML; anything else is text.
 
-    Raises
-    ------
-    InputError
-        For one that is written otherwise.
+    Raises InputError for one that is written otherwise.
     """
     found: dict[str, Any] = {}
     for text in texts:

@@ -48,29 +48,15 @@ Curve = Sequence[tuple[int, float]]
 
 @dataclass(frozen=True)
 class Trial:
-    """One training with settings of its own.
+    """One training with settings of its own."""
 
-    Attributes
-    ----------
-    number : int
-        From 0 on, in the order in which they were proposed.
-    parameters : dict
-        What was varied; none for the first, which has the settings as they are.
-    settings : dict
-        All settings.
-    cost : float or None
-        Mean cost of an episode held out of its best policy; None if it was stopped early or diverged.
-    curve : tuple of (int, float)
-        Cost of each evaluation, by its steps.
-    ended : {"finished", "stopped early", "diverged"}
-    """
-
-    number: int
-    parameters: Mapping[str, Any]
-    settings: Mapping[str, Any]
+    number: int  # from 0 on, in the order in which they were proposed
+    parameters: Mapping[str, Any]  # what was varied; none for the first, which has the settings as they are
+    settings: Mapping[str, Any]  # all settings
+    #: mean cost of an episode held out of its best policy; None if it was stopped early or diverged
     cost: float | None
-    curve: tuple[tuple[int, float], ...]
-    ended: str
+    curve: tuple[tuple[int, float], ...]  # cost of each evaluation, by its steps
+    ended: str  # "finished", "stopped early", "diverged"
 
 
 @dataclass(frozen=True)
@@ -93,29 +79,13 @@ def tune(
 ) -> Tuning:
     """Search the settings with which an agent learns a task best; a study that is there goes on.
 
-    Parameters
-    ----------
-    plan : Plan
-        What is learned, with the settings to begin from and the seed of every trial.
-    out : str or Path
-        Folder of the study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is
-        there as soon as a trial has finished and is settings for training.
-    trials : int
-        In all, those done before among them.
-    fixed : sequence of str
-        Settings that are left as they are.
-    where : JobEngine
-        Where trials are trained; the results are the same.
-    progress : callable, optional
-        Called with the trials done, their total and the best cost.
-    training : callable, optional
-        Used instead of `train_trial`: takes a job, returns cost, curve and how it ended.
-
-    Raises
-    ------
-    InputError
-        If Optuna is missing, the folder holds a study of something else or anything else, or every trial
-        of the first batch diverges.
+    `plan`: what is learned, with the settings to begin from and the seed of every trial; `out`: folder of the
+    study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is there as soon as a
+    trial has finished and is settings for training; `trials`: in all, those done before among them; `fixed`:
+    settings that are left as they are; `where`: where trials are trained; the results are the same;
+    `progress`: called with the trials done, their total and the best cost; `training`: used instead of
+    `train_trial`: takes a job, returns cost, curve and how it ended. Raises InputError if Optuna is missing,
+    the folder holds a study of something else or anything else, or every trial of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
     folder = Path(out)

@@ -32,24 +32,13 @@ DRAWS_A_JOB = 25
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """What became of the models drawn.
+    """What became of the models drawn."""
 
-    Attributes
-    ----------
-    draws : tuple of ShipModel
-        The models drawn.
-    manoeuvres : ManoeuvreUncertainty
-        Standard manoeuvres and IMO criteria over the draws.
-    course_unstable : bool array of shape (n_draws,)
-        Draws that do not keep a straight course with the rudder fixed.
-    episodes : tuple of Episodes
-        Of each controller, one episode on each draw.
-    """
-
-    draws: tuple[ShipModel, ...]
-    manoeuvres: ManoeuvreUncertainty
+    draws: tuple[ShipModel, ...]  # the models drawn
+    manoeuvres: ManoeuvreUncertainty  # standard manoeuvres and IMO criteria over the draws
+    #: draws that do not keep a straight course with the rudder fixed, shape (n_draws,)
     course_unstable: NDArray[np.bool_]
-    episodes: tuple[Episodes, ...]
+    episodes: tuple[Episodes, ...]  # of each controller, one episode on each draw
 
 
 def monte_carlo(
@@ -63,27 +52,11 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
-    Parameters
-    ----------
-    controllers : sequence of Controller
-        Each steers every draw; draw i with seed + i, the same episodes for all.
-    model : ShipModel
-        With a covariance.
-    draws : int
-        Models drawn, at least 2.
-    seed : int
-        Of the draws and of the episodes.
-    where : JobEngine
-        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
-    progress : callable, optional
-        Told the number of draws done.
-
-    Raises
-    ------
-    InputError
-        If the model has no covariance, or a controller is for another ship.
-    UnstableModelError
-        If the model itself runs away.
+    `controllers`: each steers every draw; draw i with seed + i, the same episodes for all; `model`: with a
+    covariance; `draws`: models drawn, at least 2; `seed`: of the draws and of the episodes; `where`: in this
+    process, in several, or on a ray cluster; the results are the same, bit for bit; `progress`: told the
+    number of draws done. Raises InputError if the model has no covariance, or a controller is for another
+    ship; UnstableModelError if the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)

@@ -183,18 +183,9 @@ def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
 def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
     """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
 
-    Parameters
-    ----------
-    regression : ForceRegression
-        Of captive tests.
-    estimator : Estimator
-        Without intercept; it is fitted.
-
-    Returns
-    -------
-    coefficients : array of shape (n_coefficients,)
-    covariance : array of shape (n_coefficients, n_coefficients)
-        For white errors, whose size is that of each force's own residuals.
+    `regression`: of captive tests; `estimator`: without intercept; it is fitted. Returns `coefficients`:
+    shape (n_coefficients,); `covariance`: for white errors, whose size is that of each force's own residuals,
+    shape (n_coefficients, n_coefficients).
     """
     scales = regression.scales()
     features, targets = regression.features / scales[:, None], regression.targets / scales
@@ -210,18 +201,9 @@ def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Float
 def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
     """Variances of the errors of X, Y and N, each by its residuals.
 
-    Parameters
-    ----------
-    equation : array of shape (n_rows,)
-        0, 1, 2 for X, Y, N.
-    residuals : array of shape (n_rows, ...)
-        Of the fit.
-    leverages : array of shape (n_rows,)
-        Diagonal of the matrix that maps targets to fitted values.
-
-    Returns
-    -------
-    array of shape (3, ...)
+    `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape (n_rows, ...);
+    `leverages`: diagonal of the matrix that maps targets to fitted values, shape (n_rows,). Returns an array
+    of shape (3, ...).
     """
     found = []
     for i in range(len(FORCES)):

@@ -44,12 +44,7 @@ def correlations(target: ArrayLike, candidates: Mapping[str, ArrayLike]) -> dict
     """Pearson correlation of each candidate's features with the target's, of shape (n_features,).
 
     Each feature is first divided by its 2-norm over all ships. Features that are nan for any ship are left
-    out.
-
-    Raises
-    ------
-    InputError
-        If fewer than three features are known of all ships.
+    out. Raises InputError if fewer than three features are known of all ships.
     """
     table = np.array([np.asarray(target, dtype=float), *map(np.asarray, candidates.values())], dtype=float)
     known = np.all(np.isfinite(table), axis=0)
@@ -73,28 +68,10 @@ def select_reference(
 ) -> tuple[str, dict[str, float]]:
     """The shipped reference ship most like a ship.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        Of the target.
-    channels : collection of str, optional
-        Recorded of the target: a reference ship that rolls needs p and phi.
-    candidates : collection of str
-        Names of models to choose from.
-    printed : bool
-        As in `similarity_vector`.
-
-    Returns
-    -------
-    name : str
-        Of the ship with the highest correlation; of hulls of one form that nearest in length.
-    correlations : dict of str to float
-        Of all candidates.
-
-    Raises
-    ------
-    InputError
-        If too little is known of the target.
+    `particulars`: of the target; `channels`: recorded of the target: a reference ship that rolls needs p and
+    phi; `candidates`: names of models to choose from; `printed`: as in `similarity_vector`. Returns `name`:
+    of the ship with the highest correlation; of hulls of one form that nearest in length; `correlations`: of
+    all candidates. Raises InputError if too little is known of the target.
     """
     ships = {name: load_model(name) for name in candidates}
     usable = {name: ship for name, ship in ships.items() if channels is None or _fits(ship, channels)}
