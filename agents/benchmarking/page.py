@@ -63,12 +63,25 @@ def write_page(
 ) -> None:
     """Write the page of a benchmark. The worst episodes are run again for it.
 
-    `result`: of `benchmark` or `load_results`. `path`: the HTML file; one that exists is replaced. It loads
-    nothing. `controllers`: as `benchmark` was given them; needed to replay contestants that were given as
-    objects. `worst`: how many episodes of each contestant in each task may be replayed; fewer if they are too
-    many. `workers`: processes that run them; None for as many as there are cores. `progress`: called with the
-    stage of the work, the number done and the total. Raises InputError if plotly is not installed or the page
-    cannot be written; nothing is written then.
+    Parameters
+    ----------
+    result : BenchmarkResult
+        Of `benchmark` or `load_results`.
+    path : str or Path
+        The HTML file; one that exists is replaced. It loads nothing.
+    controllers : optional
+        As `benchmark` was given them; needed to replay contestants that were given as objects.
+    worst : int
+        How many episodes of each contestant in each task may be replayed; fewer if they are too many.
+    workers : int or None
+        Processes that run them; None for as many as there are cores.
+    progress : callable, optional
+        Called with the stage of the work, the number done and the total.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed or the page cannot be written; nothing is written then.
     """
     target = Path(path)
     check_page(target)

@@ -82,9 +82,8 @@ class FilteredPID(Stateful):
         )
         interval = plain.design["dt"]
         frequency_share = _rate(reference_share, "reference_share")
-        tracking = _rate(tracking_lengths, "tracking_lengths") and 1.0 / (
-            tracking_lengths * length_time(model)
-        )
+        limited = _rate(tracking_lengths, "tracking_lengths") > 0.0
+        tracking = 1.0 / (tracking_lengths * length_time(model)) if limited else 0.0
         turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)

@@ -126,23 +126,17 @@ class LQG(Stateful):
             transition, effect, process, output = _with_waves(transition, effect, process, output, motion)
         deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
         kalman, deviations = kalman_gain(transition, process, output, np.diag(deviation**2))
-        return cls.designed(
-            model,
-            ship,
-            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
-            design={
-                "integral_lengths": float(integral_lengths),
-                "rate_weight_s2": weight,
-                "noise": float(noise),
-                "disturbance_deg": float(disturbance_deg),
-                "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
-                **({} if wave_period is None else {"wave_period": float(wave_period)}),
-            },
-            transition=transition,
-            input=effect,
-            kalman=kalman,
-            output=output,
-        )
+        design = {
+            "integral_lengths": float(integral_lengths),
+            "rate_weight_s2": weight,
+            "noise": float(noise),
+            "disturbance_deg": float(disturbance_deg),
+            "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
+            **({} if wave_period is None else {"wave_period": float(wave_period)}),
+        }
+        gains = dict(zip(SIGNALS, (-gain).tolist(), strict=True))
+        filters = {"transition": transition, "input": effect, "kalman": kalman, "output": output}
+        return cls.designed(model, ship, gains=gains, design=design, **filters)
 
     @property
     def memory_size(self) -> int:

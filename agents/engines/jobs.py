@@ -52,27 +52,44 @@ def run_jobs(
 ) -> list[Any]:
     """Do many independent jobs and return their results in the order of the jobs.
 
-    `function`: given a job, returns its result: numbers, texts, arrays, and lists and dicts of them. It is to
-    depend on nothing but the job, and to be at the top level of a module. `jobs`: what JSON can hold. Equal
-    jobs are done once. `engine`: processes of this computer, or ray (`pip install 'shipgym[ray]'`), `local`
-    or `ray`. `workers`: jobs done at once; None for as many as there are cores. One local worker is this
-    process itself. `address`: of a ray cluster, such as ``"10.0.0.1:6379"``, ``"ray://10.0.0.1:10001"`` or
-    ``"auto"``; by default ray is started on this computer. shipgym must be installed on the computers of the
-    cluster. `keep`: folder in which each result is kept as soon as it is there; such jobs are not done again.
-    `retries`: how often a job is done again whose worker died, the last time alone, so that it is the one at
-    fault. `progress`: called with the number of jobs done and their total. Returns one result each. Tuples
-    have become lists. Raises InputError for wrong arguments, a cluster that does not answer, or wrong input
-    that a job reports; JobError, WorkerDiedError naming the job, if it raises anything else, or its worker
-    dies more often than `retries`.
+    Parameters
+    ----------
+    function : callable
+        Top-level function of a module: of a job and nothing else, numbers, texts, arrays, lists or dicts.
+    jobs : sequence of dict
+        What JSON can hold. Equal jobs are done once.
+    engine : {"local", "ray"}
+        Processes of this computer, or ray (`pip install 'shipgym[ray]'`).
+    workers : int or None
+        Jobs done at once; None for as many as there are cores. One local worker is this process itself.
+    address : str, optional
+        Of a ray cluster, such as ``"10.0.0.1:6379"``, ``"ray://10.0.0.1:10001"`` or ``"auto"``; by default
+        ray is started on this computer. shipgym must be installed on the computers of the cluster.
+    keep : str or Path, optional
+        Folder in which each result is kept as soon as it is there; such jobs are not done again.
+    retries : int
+        How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
+    progress : callable, optional
+        Called with the number of jobs done and their total.
+
+    Returns
+    -------
+    list
+        One result each. Tuples have become lists.
+
+    Raises
+    ------
+    InputError
+        For wrong arguments, a cluster that does not answer, or wrong input that a job reports.
+    JobError, WorkerDiedError
+        Naming the job, if it raises anything else, or its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
-    check_whole(retries, "retries", at_least=0)
-    _check_function(function)
+    _check_work(function, retries)
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
     found = {} if kept is None else kept.load_all(copies)
-
     tell = progress or (lambda done, total: None)
     tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]
@@ -116,7 +133,8 @@ def check_engine(engine: str, workers: int | None, address: str | None) -> None:
         raise InputError(f"address: '{address}' found with engine '{engine}'; it is for engine 'ray'")
 
 
-def _check_function(function: JobFunction) -> None:
+def _check_work(function: JobFunction, retries: int) -> None:
+    check_whole(retries, "retries", at_least=0)
     name = getattr(function, "__qualname__", None)
     if name is None or "<" in name:
         raise InputError(

@@ -131,9 +131,21 @@ class Given:
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     """The run that a user asks for.
 
-    `stored`: the run that is resumed: what is not given is as it was. Raises InputError for an unknown
-    algorithm, environment, task, model, option or setting, with the nearest known one, or a value out of its
-    range.
+    Parameters
+    ----------
+    given : Given
+    stored : Plan, optional
+        The run that is resumed: what is not given is as it was.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
+        or a value out of its range.
     """
     check_choice(given.algorithm, ALGORITHMS, "algorithm")
     task = _task(given, stored)

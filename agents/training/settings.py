@@ -239,11 +239,22 @@ def load_settings(
 ) -> Settings:
     """The tuned settings of an algorithm, with those that are given in their place.
 
-    `algorithm`: ppo, sac, td3 or tqc. `environment`: course-keeping or path-following. `task`: name of a
-    suite's task; one without settings of its own has those of its environment. `given`: settings by name that
-    go before the tuned ones. `action`: rudder, rudder-discrete or rudder-shaft. With others than rudder, or
-    `base` given as "none", a policy learns from scratch. Raises InputError for an unknown algorithm or
-    setting, with the nearest known one, or a value out of its range.
+    Parameters
+    ----------
+    algorithm : {"ppo", "sac", "td3", "tqc"}
+    environment : {"course-keeping", "path-following"}
+    task : str
+        Name of a suite's task; one without settings of its own has those of its environment.
+    given : mapping of str to Any, optional
+        Settings by name that go before the tuned ones.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
+        scratch.
+
+    Raises
+    ------
+    InputError
+        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     check_choice(environment, ENVIRONMENTS, "environment")

@@ -97,12 +97,30 @@ def train(
 ) -> TrainingResult:
     """Let an agent learn.
 
-    `plan`: what is learned; `make_plan` reads it. `out`: folder of the run (`run_folder`); by default nothing
-    is written. `resume`: go on with the run in the folder. `max_seconds`: time after which the training stops
-    at the next boundary; it can be resumed. `tell`: called with the progress at each boundary. What it raises
-    ends the training. `command`: command line that is written into the run's folder. Raises InputError if the
-    folder holds something already, or, to resume, nothing or a run of another configuration; if the ship and
-    the settings do not go together; or if the networks diverge.
+    Parameters
+    ----------
+    plan : Plan
+        What is learned; `make_plan` reads it.
+    out : str or Path, optional
+        Folder of the run (`run_folder`); by default nothing is written.
+    resume : bool
+        Go on with the run in the folder.
+    max_seconds : float, optional
+        Time after which the training stops at the next boundary; it can be resumed.
+    tell : callable, optional
+        Called with the progress at each boundary. What it raises ends the training.
+    command : str, optional
+        Command line that is written into the run's folder.
+
+    Returns
+    -------
+    TrainingResult
+
+    Raises
+    ------
+    InputError
+        If the folder holds something already, or, to resume, nothing or a run of another configuration; if
+        the ship and the settings do not go together; or if the networks diverge.
     """
     folder = None if out is None else Path(out)
     if resume and folder is None:

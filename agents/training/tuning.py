@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.engines.jobs import HERE, JobEngine, run_jobs
+from agents.engines.jobs import HERE, JobEngine
 from agents.training.plan import Plan, check_same
 from agents.training.settings import changed
 from shipgym.checks import check_whole
@@ -79,13 +79,29 @@ def tune(
 ) -> Tuning:
     """Search the settings with which an agent learns a task best; a study that is there goes on.
 
-    `plan`: what is learned, with the settings to begin from and the seed of every trial; `out`: folder of the
-    study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is there as soon as a
-    trial has finished and is settings for training; `trials`: in all, those done before among them; `fixed`:
-    settings that are left as they are; `where`: where trials are trained; the results are the same;
-    `progress`: called with the trials done, their total and the best cost; `training`: used instead of
-    `train_trial`: takes a job, returns cost, curve and how it ended. Raises InputError if Optuna is missing,
-    the folder holds a study of something else or anything else, or every trial of the first batch diverges.
+    Parameters
+    ----------
+    plan : Plan
+        What is learned, with the settings to begin from and the seed of every trial.
+    out : str or Path
+        Folder of the study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is
+        there as soon as a trial has finished and is settings for training.
+    trials : int
+        In all, those done before among them.
+    fixed : sequence of str
+        Settings that are left as they are.
+    where : JobEngine
+        Where trials are trained; the results are the same.
+    progress : callable, optional
+        Called with the trials done, their total and the best cost.
+    training : callable, optional
+        Used instead of `train_trial`: takes a job, returns cost, curve and how it ended.
+
+    Raises
+    ------
+    InputError
+        If Optuna is missing, the folder holds a study of something else or anything else, or every trial
+        of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
     folder = Path(out)
@@ -93,18 +109,14 @@ def tune(
     found: list[Trial] = []
     for first in range(0, trials, BATCH):
         proposed = _proposed(plan, found, min(BATCH, trials - first), fixed)
+        best = min((trial.cost for trial in found if trial.cost is not None), default=None)
 
-        def tell(done: int, _: int, before: int = first) -> None:
+        def tell(done: int, _: int, before: int = first, best: float | None = best) -> None:
             if progress is not None:
-                best = min((trial.cost for trial in found if trial.cost is not None), default=None)
                 progress(before + done, trials, best)
 
-        results = run_jobs(
-            training or train_trial,
-            [_job(plan, settings, found) for _, settings in proposed],
-            engine=where.engine, workers=where.workers, address=where.address, keep=folder / KEPT,
-            progress=tell,
-        )  # fmt: skip
+        jobs = [_job(plan, settings, found) for _, settings in proposed]
+        results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
         for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
             found.append(_trial(first + k, parameters, settings, result))
         _record(study, found, plan, fixed)

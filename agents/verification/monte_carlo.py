@@ -52,11 +52,27 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
-    `controllers`: each steers every draw; draw i with seed + i, the same episodes for all; `model`: with a
-    covariance; `draws`: models drawn, at least 2; `seed`: of the draws and of the episodes; `where`: in this
-    process, in several, or on a ray cluster; the results are the same, bit for bit; `progress`: told the
-    number of draws done. Raises InputError if the model has no covariance, or a controller is for another
-    ship; UnstableModelError if the model itself runs away.
+    Parameters
+    ----------
+    controllers : sequence of Controller
+        Each steers every draw; draw i with seed + i, the same episodes for all.
+    model : ShipModel
+        With a covariance.
+    draws : int
+        Models drawn, at least 2.
+    seed : int
+        Of the draws and of the episodes.
+    where : JobEngine
+        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
+    progress : callable, optional
+        Told the number of draws done.
+
+    Raises
+    ------
+    InputError
+        If the model has no covariance, or a controller is for another ship.
+    UnstableModelError
+        If the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)

@@ -32,7 +32,7 @@ FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)
 JUMP = 20.0  # of the usual change of a velocity from sample to sample: another angle of a static test
 FEWEST = 4  # samples between jumps
-METHODS = ("ls", "tls-svm")
+METHODS = {"ls": "full", "tls-svm": "l-curve"}  # how each chooses the directions that it keeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +234,7 @@ def identify_forces(
     structure : str
         `pmm38`, `pmm18` or another table of shares.
     method : {"tls-svm", "ls"}
-        Truncated LS-SVM, or least squares. X, Y and N count alike, each by its root mean square.
+        Truncated LS-SVM, or least squares; each of X, Y and N is scaled by its root mean square.
     rank : int, optional
         Directions that `tls-svm` keeps; by default by its L-curve.
     steering, name : optional
@@ -256,8 +256,7 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, _captive_table(structure), particulars, model_inertia)
-    selection = "full" if method == "ls" else "l-curve"
-    estimator = TruncatedLSSVM(selection=selection, rank=rank, fit_intercept=False)
+    estimator = TruncatedLSSVM(selection=METHODS[method], rank=rank, fit_intercept=False)
     coefficients, covariance = fit_forces(regression, estimator)
     provenance = {
         "structure": structure,

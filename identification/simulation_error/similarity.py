@@ -68,10 +68,28 @@ def select_reference(
 ) -> tuple[str, dict[str, float]]:
     """The shipped reference ship most like a ship.
 
-    `particulars`: of the target; `channels`: recorded of the target: a reference ship that rolls needs p and
-    phi; `candidates`: names of models to choose from; `printed`: as in `similarity_vector`. Returns `name`:
-    of the ship with the highest correlation; of hulls of one form that nearest in length; `correlations`: of
-    all candidates. Raises InputError if too little is known of the target.
+    Parameters
+    ----------
+    particulars : Particulars
+        Of the target.
+    channels : collection of str, optional
+        Recorded of the target: a reference ship that rolls needs p and phi.
+    candidates : collection of str
+        Names of models to choose from.
+    printed : bool
+        As in `similarity_vector`.
+
+    Returns
+    -------
+    name : str
+        Of the ship with the highest correlation; of hulls of one form that nearest in length.
+    correlations : dict of str to float
+        Of all candidates.
+
+    Raises
+    ------
+    InputError
+        If too little is known of the target.
     """
     ships = {name: load_model(name) for name in candidates}
     usable = {name: ship for name, ship in ships.items() if channels is None or _fits(ship, channels)}
