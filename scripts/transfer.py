@@ -24,12 +24,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from direct_search import tune
 from numpy.typing import NDArray
 from real_ships.data import Data
 from real_ships.recipe import fitted
 
 from agents.agent_file import load_agent
-from agents.benchmarking.direct_search import tune
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.cli.terminal import progress_bars
 from agents.controllers.controller import Controller, Policy

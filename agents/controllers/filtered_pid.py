@@ -82,9 +82,8 @@ class FilteredPID(Stateful):
         )
         interval = plain.design["dt"]
         frequency_share = _rate(reference_share, "reference_share")
-        tracking = _rate(tracking_lengths, "tracking_lengths") and 1.0 / (
-            tracking_lengths * length_time(model)
-        )
+        limited = _rate(tracking_lengths, "tracking_lengths") > 0.0
+        tracking = 1.0 / (tracking_lengths * length_time(model)) if limited else 0.0
         turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
@@ -192,14 +191,8 @@ def _rate(value: float, name: str) -> float:
 def notch_band(turn: float) -> tuple[float, float, float]:
     """Band-pass that a notch takes away, discretised bilinearly at `turn` rad an interval.
 
-    Parameters
-    ----------
-    turn : float
-
-    Returns
-    -------
-    band, once, twice : float
-        taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice taken[k - 2].
+    Returns `band, once, twice`: taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice
+    taken[k - 2].
     """
     k = np.tan(0.5 * turn)
     per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)

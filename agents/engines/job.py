@@ -47,10 +47,7 @@ def do_job(function: JobFunction, text: str) -> Outcome:
 def check_outcome(outcome: dict[str, Any], job: str) -> dict[str, Any]:
     """Return the outcome of a job that was done.
 
-    Raises
-    ------
-    InputError, JobError
-        If it was not, naming the job.
+    Raises InputError, JobError if it was not, naming the job.
     """
     if "wrong" in outcome:
         raise InputError(f"{job}: {outcome['wrong']}")
