@@ -17,15 +17,7 @@ USUAL_BEAM = 0.15  # of the length, where the beam is not known
 
 
 class Artist:
-    """Draws one lane of an engine.
-
-    Parameters
-    ----------
-    mode : {"human", "rgb_array"}
-        See `Renderer`.
-    lane : int
-        Which lane.
-    """
+    """Draws one lane of an engine; modes as in `Renderer`."""
 
     def __init__(self, mode: str, lane: int = 0) -> None:
         self._renderer = Renderer(mode)

@@ -257,19 +257,10 @@ def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
-    """Current, gusts, drift force and first-order motion after a step of h seconds.
+    """Current, gusts, drift force and first-order motion after a step of h seconds (as of the filters).
 
-    Parameters
-    ----------
-    motion : Motion
-        The ship at the end of the step.
-    h : float
-        The step for which the filters were made, s.
-    sea : Sea
-        At its beginning.
-    word : uint64
-        State of its random numbers, which then goes on by `EVOLVE_WORDS`.
-    p : SeaParameters
+    `motion` is the ship at the end of the step, `sea` that at its beginning, `word` (uint64) the state of its
+    random numbers, which then goes on by `EVOLVE_WORDS`.
     """
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
@@ -410,16 +401,9 @@ def sea_functions(windy: bool) -> dict[str, Any]:
 def sea_parts(windy: bool, lanes: int = LANES, first: int = 0, shared: bool = True) -> dict[str, Any]:
     """`sea_functions`, and how state and parameters are loaded.
 
-    Parameters
-    ----------
-    windy : bool
-        Whether there is current, wind or waves.
-    lanes : int
-        Of a tile of states, 64, or 1 where they are vectors.
-    first : int
-        Row of the sea's first number in them.
-    shared : bool
-        Whether all lanes meet the same sea, so that its parameters are a vector and not a tile.
+    `lanes` are those of a tile of states, 64, or 1 where they are vectors, and `first` is the row of the
+    sea's first number in them. With `shared` all lanes meet the same sea: its parameters are a vector and not
+    a tile.
     """
     kinds = (Sea, SeaParameters) if windy else (CalmSea, CalmParameters)
     state, parameters = (

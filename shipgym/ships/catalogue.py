@@ -49,17 +49,7 @@ def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
 
 
 def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m.
-
-    Parameters
-    ----------
-    form : {"published", "shipmmg"}
-        The standard method as published, or the variant of the package shipmmg 0.0.11.
-
-    Returns
-    -------
-    ShipModel
-    """
+    """KVLCC2 at full scale, 320 m: the standard method as published, or the variant of shipmmg 0.0.11."""
     model = kvlcc2_l7(form)
     scale = kvlcc2_file.FULL_SCALE
     return replace(
@@ -102,10 +92,6 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
         The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
         from a file, or from one that cannot be imported, stays in this process.
 
-    Returns
-    -------
-    ShipEquations
-
     Raises
     ------
     InputError
@@ -132,10 +118,6 @@ def load_model(name: str | Path) -> ShipModel:
     name : str or Path
         A name of `list_models`, the path of a model file, or that of a Python file with the equations of a
         ship (`register_ship_equations`), which is run.
-
-    Returns
-    -------
-    ShipModel
 
     Raises
     ------

@@ -84,10 +84,6 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     model : ShipModel, str or Path
         A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
         coefficient is missing for instance, is a problem found.
-
-    Returns
-    -------
-    ModelCheck
     """
     if not isinstance(model, ShipModel):
         try:

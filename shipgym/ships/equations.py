@@ -202,10 +202,7 @@ def _vessel(
 def read_ship_equations(path: str | Path) -> ShipEquations:
     """The ship that a Python file defines as `SHIP`; the file is run.
 
-    Raises
-    ------
-    InputError
-        For a file that is not there, cannot be run, or defines no `SHIP`.
+    Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
     if not path.is_file():

@@ -28,32 +28,7 @@ FORMAT = 1  # of model files
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """A ship's structure and coefficients, how certain they are, and where they hold (see `ShipModel`).
-
-    Attributes
-    ----------
-    name : str
-        Name of the ship or of the model file.
-    structure : str
-        Name of its structure.
-    particulars : Particulars
-        Length, mass, added mass, service speed, ...; what was estimated is marked.
-    steering : SteeringGear
-        Rudder limit, rate and lag.
-    coefficients : dict of str to float
-        By name, in the normalisation of the structure, rudder positive to starboard.
-    covariance : array of shape (n_coefficients, n_coefficients) or None
-        Of the coefficients in their order; None where not identified.
-    envelope : Envelope or None
-        Of the data it was identified from.
-    provenance : dict or None
-        Method, settings, software version and trials it came from, or the source of a reference ship.
-    own_table : Structure, ShipEquations or None
-        The table of terms a model file came with, or a registered table or ship; by default what is shipped
-        under the structure's name.
-    service_shaft_speed : float
-        Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
-    """
+    """A ship's structure and coefficients, their uncertainty and envelope; fields as in `ShipModel`."""
 
     name: str
     structure: str
@@ -103,13 +78,7 @@ class ManoeuvringModel:
 
     @property
     def table(self) -> Structure:
-        """The table of terms of its structure.
-
-        Raises
-        ------
-        InputError
-            If the ship has equations written by hand instead.
-        """
+        """The table of terms of its structure; InputError for a ship with equations written by hand."""
         dynamics = self.dynamics
         return dynamics if isinstance(dynamics, Structure) else get_structure(self.structure)
 
@@ -126,10 +95,7 @@ class ManoeuvringModel:
     def ship_numbers(self, water_depth: float = np.inf) -> Floats:
         """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
 
-        Raises
-        ------
-        InputError
-            For water that is too shallow, and particulars that the structure cannot do with.
+        Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
         p, gear = self.particulars, self.steering
@@ -183,10 +149,6 @@ class ManoeuvringModel:
         water_depth : float
             In m; only deep water is known to identified structures.
 
-        Returns
-        -------
-        array of shape (..., n_state)
-
         Raises
         ------
         InputError
@@ -228,12 +190,7 @@ class ManoeuvringModel:
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """Refuse water that is too shallow, or shallow water in a ship that knows none.
-
-        Raises
-        ------
-        InputError
-        """
+        """InputError for water that is too shallow, or shallow water and a ship that knows none."""
         if water_depth == np.inf:
             return
         check_number(water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water")

@@ -36,17 +36,7 @@ N = {
 
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
-    """The Mariner class reference ship.
-
-    Parameters
-    ----------
-    service_speed : float
-        Speed U0 about which the polynomials are expanded, m/s.
-
-    Returns
-    -------
-    ShipModel
-    """
+    """The Mariner class reference ship, expanded about a service speed U0 in m/s."""
     coefficients = {
         f"{force}_{term}": value * 1e-5 * (-1.0) ** term.count("d")
         for force, table in (("X", X), ("Y", Y), ("N", N))

@@ -37,13 +37,8 @@ class Ordered(Protocol):
 def checked_orders(model: Ordered, commands: ArrayLike) -> Floats:
     """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
 
-    A rudder ordered beyond its limit is brought to the limit, as its gear would do; beyond a right angle
-    it was meant in other units.
-
-    Raises
-    ------
-    InputError
-        Naming the first row out of range.
+    A rudder ordered beyond its limit is brought to the limit, as its gear would do; beyond a right angle it
+    was meant in other units. InputError names the first row out of range.
     """
     orders = np.asarray(commands, dtype=float)
     names = model.command_names
@@ -60,13 +55,7 @@ def checked_orders(model: Ordered, commands: ArrayLike) -> Floats:
 
 
 def check_units(model: Ordered, orders: Floats, where: str = "commands") -> None:
-    """Refuse orders of shape (n, n_command) that are no numbers, or in other units than rad and 1/s.
-
-    Raises
-    ------
-    InputError
-        Naming the first row out of range.
-    """
+    """InputError for orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
     names = model.command_names
     if not np.all(np.isfinite(orders)):
         raise InputError(f"{where}: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite")

@@ -49,10 +49,6 @@ def scale_model(
     water_density : float, optional
         Of its water, kg/m3; by default as it was.
 
-    Returns
-    -------
-    ShipModel
-
     Raises
     ------
     InputError

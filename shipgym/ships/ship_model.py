@@ -103,10 +103,6 @@ class ShipModel(ManoeuvringModel):
         seed : int or Generator
             Of the draw.
 
-        Returns
-        -------
-        list of ShipModel
-
         Raises
         ------
         InputError

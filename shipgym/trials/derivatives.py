@@ -21,14 +21,7 @@ def time_derivative(t: Array, values: Array) -> Array:
     the knots resolve the motion, the residual is the noise and hardly grows from one fit to the next, whether
     the noise is white or not; once they are too far apart it grows with a high power of their distance. The
     last fit before that growth is differentiated. Where it sets in at once, the samples hold no noise to
-    speak of and a cubic spline through all of them is differentiated.
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s, strictly increasing; the steps may differ.
-    values : ndarray of shape (n_samples,)
-        The signal, finite.
+    speak of and a cubic spline through all of them is differentiated. Steps of the time, s, may differ.
     """
     from scipy.interpolate import make_interp_spline, make_lsq_spline
 

@@ -181,19 +181,8 @@ class Trial:
     ) -> Trial:
         """Return a copy with some channels replaced, of which this trial is the raw one.
 
-        Parameters
-        ----------
-        channels : mapping of str to array-like of shape (n_samples,)
-            Those that change; all of them where `t` is given.
-        t : array-like of shape (n_samples,), optional
-            Other times, s.
-        repaired : mapping of str to int, optional
-            How many values were filled in, by channel, on top of those filled before.
-
-        Raises
-        ------
-        InputError
-            As for a new trial.
+        With other times `t`, s, all channels are given. `repaired` counts filled values by channel, on top of
+        those filled before. Raises InputError as for a new trial.
         """
         counts = Counter(self.repaired) + Counter(repaired or {})
         settings = self._settings() | {"repaired": counts, "raw": self}
@@ -255,17 +244,8 @@ class Trial:
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
 
-        The file is written beside its target and then renamed, so that it is never there in part.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file to write; one that exists is replaced.
-
-        Raises
-        ------
-        InputError
-            Where the file cannot be written.
+        The file, replaced where it exists, is never there in part. Raises InputError where it cannot be
+        written.
         """
         names = ["t", *self.channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
