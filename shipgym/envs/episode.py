@@ -216,10 +216,7 @@ class Episode:
     def load(cls, path: str | Path) -> Episode:
         """Read an episode that was saved; its numbers are the very same.
 
-        Raises
-        ------
-        InputError
-            Naming the file and the field at fault.
+        Raises InputError, naming the file and the field at fault.
         """
         content = read_json(Path(path), "episode file", "record the episode again or take another copy")
         try:

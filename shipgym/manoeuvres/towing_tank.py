@@ -37,13 +37,7 @@ FORCES = ("X", "Y", "N")
 
 @dataclass(frozen=True)
 class Tank:
-    """How a captive test is run and measured.
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
-    """
+    """How a captive test is run and measured; InputError for a number out of range."""
 
     speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
     rudder_deg: float = 0.0  # Held, degrees

@@ -116,13 +116,7 @@ class WindTable:
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "wind table") -> WindTable:
-        """Read a table as it stands in JSON.
-
-        Raises
-        ------
-        InputError
-            For an unknown or missing row.
-        """
+        """Read a table as it stands in JSON; InputError for an unknown or missing row."""
         table = check_table(mapping, where)
         check_keys(table, ("angles_deg", "CX", "CY", "CN", "CK"), where)
         for name in ("angles_deg", "CX", "CY", "CN"):

@@ -132,23 +132,14 @@ class ShipModel(ManoeuvringModel):
 
     @classmethod
     def load(cls, path: str | Path) -> ShipModel:
-        """Read a model file.
-
-        Raises
-        ------
-        InputError
-            Naming the file and the field at fault.
-        """
+        """Read a model file; InputError, naming the file and the field at fault."""
         return load(Path(path), cls)
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> ShipModel:
         """The model of what `to_dict` gave, or a model file holds.
 
-        Raises
-        ------
-        InputError
-            Naming the field at fault, after `where`.
+        Raises InputError, naming the field at fault, after `where`.
         """
         return read_model(fields, where, cls)
 

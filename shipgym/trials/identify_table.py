@@ -74,12 +74,8 @@ _uncertainty, _prior = partial(_option, "uncertainty"), partial(_option, "prior"
 class Options:
     """The options of `identify`; each field says in its metadata what it is.
 
-    Settings of the method are None where they were not given: the method has defaults of its own.
-
-    Raises
-    ------
-    InputError
-        For an unknown uncertainty, and for settings of a prior without one.
+    Settings of the method are None where they were not given: the method has defaults of its own. Raises
+    InputError for an unknown uncertainty, and for settings of a prior without one.
     """
 
     structure: str = _model(TEXT, "terms of the model", "abkowitz", common=True)
