@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import (
     check_finite,
     check_flag,
@@ -24,8 +25,6 @@ from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
-
-Floats = NDArray[np.float64]
 
 #: What has to be recorded of any ship.
 REQUIRED_STATES = ("x", "y", "psi", "delta")

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 LEVELS = (0.025, 0.975)  # of the 95 % interval

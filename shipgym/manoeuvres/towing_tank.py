@@ -11,26 +11,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 __all__ = [
-    "Tank",
-    "inertia",
-    "pure_surge",
-    "pure_sway",
-    "pure_yaw",
-    "rigid_inertia",
-    "static_drift",
+    "Tank", "inertia", "pure_surge", "pure_sway", "pure_yaw", "rigid_inertia", "static_drift",
     "yaw_with_drift",
-]
+]  # fmt: skip
 
 FORCES = ("X", "Y", "N")
 

@@ -17,21 +17,13 @@ if TYPE_CHECKING:
 
 #: Axis title and factor from SI of each channel and of what u and v give; m/s and degrees.
 AXES: dict[str, tuple[str, float]] = {
-    "x": ("north, m", 1.0),
-    "y": ("east, m", 1.0),
-    "psi": ("heading, deg", 180.0 / np.pi),
-    "u": ("surge, m/s", 1.0),
-    "v": ("sway, m/s", 1.0),
-    "r": ("yaw rate, deg/s", 180.0 / np.pi),
-    "p": ("roll rate, deg/s", 180.0 / np.pi),
-    "phi": ("heel, deg", 180.0 / np.pi),
-    "delta": ("rudder, deg", 180.0 / np.pi),
-    "delta_command": ("rudder order, deg", 180.0 / np.pi),
-    "n": ("shaft, rev/s", 1.0),
-    "n_command": ("shaft order, rev/s", 1.0),
-    "speed": ("speed, m/s", 1.0),
+    "x": ("north, m", 1.0), "y": ("east, m", 1.0), "psi": ("heading, deg", 180.0 / np.pi),
+    "u": ("surge, m/s", 1.0), "v": ("sway, m/s", 1.0), "r": ("yaw rate, deg/s", 180.0 / np.pi),
+    "p": ("roll rate, deg/s", 180.0 / np.pi), "phi": ("heel, deg", 180.0 / np.pi),
+    "delta": ("rudder, deg", 180.0 / np.pi), "delta_command": ("rudder order, deg", 180.0 / np.pi),
+    "n": ("shaft, rev/s", 1.0), "n_command": ("shaft order, rev/s", 1.0), "speed": ("speed, m/s", 1.0),
     "drift": ("drift angle, deg", 180.0 / np.pi),
-}
+}  # fmt: skip
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels
 MOST_SAMPLES = 3000  # drawn of one line; spirals have many more

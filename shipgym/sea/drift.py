@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, waterplane_coefficient, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, mirrored, sine_series
 from shipgym.sea.waves import draught_attenuation, frequencies, slow_drift, spread, wave_spectrum
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 _PITCH_GYRADIUS = 0.25  # by length
 _WATERLINE_POINTS = 401

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 #: Points of the grid over the full circle on which curves are tabulated.
 POINTS = 360
@@ -45,17 +45,3 @@ def sine_series(curve: Floats, n: int) -> Floats:
     """Coefficients of sin(angle), sin(2 angle), ... of an odd curve, shape (n,)."""
     series: Floats = -np.fft.rfft(curve).imag[1 : n + 1] * 2.0 / len(curve)
     return series
-
-
-def evaluate_cosines(series: Floats, angle: ArrayLike) -> Floats:
-    """Sum of a cosine series, the mean first, at the angles."""
-    orders = np.arange(len(series))
-    values: Floats = np.cos(np.multiply.outer(np.asarray(angle, dtype=float), orders)) @ series
-    return values
-
-
-def evaluate_sines(series: Floats, angle: ArrayLike) -> Floats:
-    """Sum of a sine series, that of sin(angle) first, at the angles."""
-    orders = np.arange(1, len(series) + 1)
-    values: Floats = np.sin(np.multiply.outer(np.asarray(angle, dtype=float), orders)) @ series
-    return values

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.ships.inertia import inertia
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.term_table import Structure
-
-Floats = NDArray[np.float64]
 
 #: Rows of :func:`mobility`: acceleration by force, surge u, sway v, yaw r and roll p.
 MOBILITY_ROWS = ("uX", "vY", "vN", "rY", "rN", "pK", "vK", "pY", "pN", "rK")

@@ -5,15 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_series, mirrored
 from shipgym.sea.waves import encounter_frequency, frequencies, spread, wave_spectrum
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 #: Relative damping of roll of a ship under way, with bilge keels (0.05 to 0.15 in the literature).
 ROLL_DAMPING = 0.1

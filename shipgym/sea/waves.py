@@ -6,15 +6,14 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.harmonics import circle
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 
 class WaveFilter(NamedTuple):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.records import flat
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
@@ -18,7 +18,6 @@ from shipgym.sea.waves import wave_filter
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
-Floats = NDArray[np.float64]
 GRAVITY = 9.80665
 HARMONICS = len(Sines._fields)
 FLAT, NONE, STEADY = Cosines(*[0.0] * (HARMONICS + 1)), Sines(*[0.0] * HARMONICS), Filter(0.0, 0.0, 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.sea.estimates import house_area, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, sine_series
 from shipgym.sea.wind_tables import (
@@ -18,8 +18,6 @@ from shipgym.sea.wind_tables import (
     isherwood_coefficients,
 )
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 #: At 15 degrees Celsius and sea level, kg/m3 (ISO 2533 standard atmosphere).
 AIR_DENSITY = 1.225

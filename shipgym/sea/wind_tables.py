@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_number, check_table, did_you_mean, quoted
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 class Blendermann(NamedTuple):

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
@@ -19,7 +19,6 @@ from shipgym.ships.term_table import Structure
 if TYPE_CHECKING:
     from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 
 SAMPLES = 512
 #: Range of the states looked at, in service speed, service speed by length and rudder limit.

@@ -7,8 +7,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.loops import compile_loop, ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
@@ -19,7 +19,6 @@ from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, Sea, sea_parts
 from shipgym.sea.weather_column import as_weather, weather_column
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
-Floats = NDArray[np.float64]
 Seed = int | np.random.Generator
 CALM = Weather(name="calm")
 

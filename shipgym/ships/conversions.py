@@ -13,8 +13,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.linear import (
@@ -33,7 +34,6 @@ from shipgym.ships.steering import SteeringGear
 if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
 
-Floats = NDArray[np.float64]
 
 __all__ = [
     "Nomoto", "StraightRunning", "linear_steering_ship", "linearise", "nomoto", "nomoto1_ship",

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
+
 CHANNELS = ("u", "v", "r", "delta")
 
 
@@ -69,12 +70,9 @@ class Envelope:
     def to_dict(self) -> dict[str, Any]:
         """As it stands in a model file."""
         return {
-            "channels": list(CHANNELS),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "centre": self.centre.tolist(),
-            "shape": self.shape.tolist(),
-        }
+            "channels": list(CHANNELS), "low": self.low.tolist(), "high": self.high.tolist(),
+            "centre": self.centre.tolist(), "shape": self.shape.tolist(),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Envelope:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.shared_structure import SharedStructure
-
-Floats = NDArray[np.float64]
 
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:

@@ -11,28 +11,21 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
     from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 
 STEP = 1e-4  # of the finite differences, prime system; the error is its square
 SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed where surge is to be believed
 LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
 LARGEST_SWAY = 0.5  # over service speed, likewise
 AT_REST = 1e-8  # prime acceleration that is none
-BALANCED_BY = {
-    "u": "u",
-    "v": "v",
-    "delta": "r",
-    "phi": "p",
-    "q": "q",
-    "n": "n",
-}  # rate that each unknown brings to 0
+# rate that each unknown brings to 0
+BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
 
 @dataclass(frozen=True)
@@ -50,13 +43,9 @@ class StraightRunning:
     def state(self, model: ShipModel) -> Floats:
         """The state vector, in the order of `model.state_names`, shape (n_state,)."""
         values = {
-            "u": self.surge,
-            "v": self.sway,
-            "delta": self.rudder,
-            "phi": self.heel,
-            "n": self.shaft_speed,
+            "u": self.surge, "v": self.sway, "delta": self.rudder, "phi": self.heel, "n": self.shaft_speed,
             "q": self.memory,
-        }
+        }  # fmt: skip
         return np.array([values.get(name, 0.0) for name in model.state_names])
 
 
@@ -136,13 +125,9 @@ def _scales(model: ShipModel) -> Floats:
     """Unit of each state in the prime system (the shaft's: its service speed), shape (n_state,)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     units = {
-        "u": speed,
-        "v": speed,
-        "r": speed / length,
-        "p": speed / length,
-        "q": (speed / length) ** 2,
+        "u": speed, "v": speed, "r": speed / length, "p": speed / length, "q": (speed / length) ** 2,
         "n": model.service_shaft_speed or 1.0,
-    }
+    }  # fmt: skip
     return np.array([units.get(name, 1.0) for name in model.state_names])
 
 

@@ -7,8 +7,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
@@ -16,14 +17,13 @@ from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.equations import ShipEquations
-from shipgym.ships.orders import check_units
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import PRINTED, SHIPPED_EQUATIONS, get_dynamics, get_structure
 from shipgym.ships.term_table import Structure
 
-Floats = NDArray[np.float64]
 FORMAT = 1  # of model files
+FASTEST_SHAFT = 5.0  # times the shaft speed at service speed; beyond it stands in other units
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,15 +100,10 @@ class ManoeuvringModel:
         self.check_depth(water_depth)
         p, gear = self.particulars, self.steering
         ship = Ship(
-            length=p["length"],
-            speed=p["speed"],
-            rudder_limit=gear.limit,
-            rudder_rate=gear.rate,
+            length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
             gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-            shaft=self.service_shaft_speed,
-            water_depth=water_depth,
-            scale_speed=p["speed"],
-        )
+            shaft=self.service_shaft_speed, water_depth=water_depth, scale_speed=p["speed"],
+        )  # fmt: skip
         return np.concatenate([ship, self.dynamics.numbers(self.coefficients, p, self.service_shaft_speed)])
 
     @property
@@ -217,3 +212,47 @@ def two_commands(commands: Floats) -> Floats:
     two = np.zeros((len(commands), 2))
     two[:, : commands.shape[1]] = commands
     return two
+
+
+def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
+    """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
+
+    A rudder ordered beyond its limit is brought to the limit, as its gear would do; beyond a right angle it
+    was meant in other units. InputError names the first row out of range.
+    """
+    orders = np.asarray(commands, dtype=float)
+    names = model.command_names
+    if orders.ndim != 2 or orders.shape[1] != len(names) or len(orders) < 2:
+        raise InputError(
+            f"commands: shape {orders.shape} found, expected (n_steps, {len(names)}) for {', '.join(names)}, "
+            "with at least 2 steps"
+        )
+    check_units(model, orders)
+    if "n" in names and not model.turns_astern:
+        expected = f"a number >= 0: the equations of {model.name!r} hold for a shaft turning ahead only"
+        _within(orders[:, names.index("n")], 0.0, np.inf, "shaft speed", expected, "commands")
+    return orders
+
+
+def check_units(model: ManoeuvringModel, orders: Floats, where: str = "commands") -> None:
+    """InputError for orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
+    names = model.command_names
+    if not np.all(np.isfinite(orders)):
+        raise InputError(f"{where}: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite")
+    if "delta" in names:
+        rudder = orders[:, names.index("delta")]
+        _within(rudder, -np.pi / 2, np.pi / 2, "rudder", "rad (not degrees) between -pi/2 and pi/2", where)
+    if "n" in names:
+        most = FASTEST_SHAFT * model.service_shaft_speed
+        expected = (
+            f"1/s (not rpm) between {-most if model.turns_astern else 0.0:.4g} and {most:.4g}; "
+            f"{model.service_shaft_speed:.4g} at service speed"
+        )
+        _within(orders[:, names.index("n")], -most, most, "shaft speed", expected, where)
+
+
+def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:
+    wrong = np.flatnonzero((values < low) | (values > high))
+    if len(wrong):
+        row = int(wrong[0])
+        raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")

@@ -43,21 +43,11 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         for term, value in table.items()
     }
     particulars = Particulars(
-        name="Mariner class cargo ship",
-        length=LENGTH,
-        beam=23.17,
-        draught=8.23,
-        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3,
-        xg=XG * LENGTH,
-        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
-        speed=service_speed,
-        water_density=WATER_DENSITY,
-        X_udot=-42e-5,
-        Y_vdot=-748e-5,
-        Y_rdot=-9.354e-5,
-        N_vdot=4.646e-5,
-        N_rdot=-43.8e-5,
-    )
+        name="Mariner class cargo ship", length=LENGTH, beam=23.17, draught=8.23,
+        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3, xg=XG * LENGTH,
+        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2), speed=service_speed, water_density=WATER_DENSITY,
+        X_udot=-42e-5, Y_vdot=-748e-5, Y_rdot=-9.354e-5, N_vdot=4.646e-5, N_rdot=-43.8e-5,
+    )  # fmt: skip
     return ShipModel(
         name="mariner",
         structure="abkowitz",

@@ -132,14 +132,9 @@ def _grey_box(
     if not isinstance(shaft, bool):
         raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
     return GreyBox(
-        structure.name,
-        structure.source,
-        structure.equations,
-        structure.normalisation,
-        structure.quantity,
-        read_model(reference, f"{where}.reference", make),
-        shaft,
-    )
+        structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
+        read_model(reference, f"{where}.reference", make), shaft,
+    )  # fmt: skip
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:

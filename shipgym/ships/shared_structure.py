@@ -14,14 +14,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term
-
-Floats = NDArray[np.float64]
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")

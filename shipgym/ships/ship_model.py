@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
@@ -18,8 +19,6 @@ from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import load, read_model
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

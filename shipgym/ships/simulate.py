@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage, Seed
-from shipgym.ships.manoeuvring_model import ManoeuvringModel, two_commands
-from shipgym.ships.orders import checked_orders
+from shipgym.ships.manoeuvring_model import ManoeuvringModel, checked_orders, two_commands
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
-Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
 
 

@@ -9,14 +9,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 SIDES = {"starboard": 1, "port": -1}
 
 

@@ -27,11 +27,7 @@ ABKOWITZ = Structure(
     name="abkowitz",
     source="Chislett & Strom-Tejsen 1965, Planar motion mechanism tests and full-scale steering and "
     "manoeuvring predictions for a Mariner class vessel; Cao 2015, equations 13 to 17",
-    equations={
-        "u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"),
-        "v": SWAY_AND_YAW,
-        "r": SWAY_AND_YAW,
-    },
+    equations={"u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"), "v": SWAY_AND_YAW, "r": SWAY_AND_YAW},
 )
 
 

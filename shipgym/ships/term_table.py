@@ -12,8 +12,8 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
@@ -26,8 +26,6 @@ from shipgym.ships.term_functions import (
     coefficients_record,
 )
 from shipgym.ships.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
-
-Floats = NDArray[np.float64]
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 #: As Zhu 2018 names the coefficients of surge, sway and yaw; roll, and the memory of yaw, go on from there.

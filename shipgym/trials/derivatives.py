@@ -5,16 +5,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from shipgym.arrays import Floats
 
 _DEGREE = 5
 _FEWEST_SPANS = 8
 _STEEPEST_GROWTH = 0.8
 
 
-def time_derivative(t: Array, values: Array) -> Array:
+def time_derivative(t: Floats, values: Floats) -> Floats:
     """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
 
     Quintic splines are fitted by least squares with a knot at every second, third, fifth, ... sample. While

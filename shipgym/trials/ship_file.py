@@ -121,18 +121,10 @@ class ShipFile:
         c = entry.conventions
         try:
             trial = Trial.from_csv(
-                entry.path,
-                entry.columns,
-                c.rudder_positive,
-                c.velocity_frame,
-                origin=c.origin,
-                xg=c.xg,
-                repair=c.repair,
-                name=entry.file,
-                kind=entry.kind,
-                use=entry.use,
+                entry.path, entry.columns, c.rudder_positive, c.velocity_frame, origin=c.origin, xg=c.xg,
+                repair=c.repair, name=entry.file, kind=entry.kind, use=entry.use,
                 length=self.particulars.length,
-            )
+            )  # fmt: skip
         except InputError as error:
             raise InputError(f"{entry.where}: {error}") from None
         check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.trials.trial_import import Conventions, import_csv
 from shipgym.trials.units import CHANNELS, check_channel
-
-Array = npt.NDArray[np.float64]
 
 #: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
 KINDS = ["zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"]
@@ -67,8 +66,8 @@ class Trial:
         For unknown channels, lengths that differ, values that are not finite, or time that goes back.
     """
 
-    t: Array
-    channels: Mapping[str, Array]
+    t: Floats
+    channels: Mapping[str, Floats]
     name: str
     kind: str | None
     use: str
@@ -140,7 +139,7 @@ class Trial:
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Trial, **self._settings()), (self.t, dict(self.channels))
 
-    def __getitem__(self, channel: str) -> Array:
+    def __getitem__(self, channel: str) -> Floats:
         if channel == "t":
             return self.t
         try:
@@ -255,7 +254,7 @@ class Trial:
 
 def _frozen_channels(
     channels: Mapping[str, npt.ArrayLike], shape: tuple[int, ...], where: str
-) -> dict[str, Array]:
+) -> dict[str, Floats]:
     """The channels as read-only arrays, after checking names and lengths."""
     if not channels:
         raise InputError(f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}")
@@ -270,7 +269,7 @@ def _frozen_channels(
     return arrays
 
 
-def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
+def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:
     """Return `values` as a read-only copy of shape (n_samples,), all finite."""
     hint = 'leave such samples out, or import the file with repair = "interpolate"'
     array = check_finite(values, where, hint)
@@ -279,7 +278,7 @@ def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
     return array
 
 
-def _check_time(t: Array, where: str) -> None:
+def _check_time(t: Floats, where: str) -> None:
     if t.size < 3:
         raise InputError(f"{where}: {t.size} samples found, expected at least 3")
     back = np.diff(t) <= 0.0
