@@ -69,23 +69,10 @@ def check_number(
     at_most: float | None = None,
     hint: str = "",
 ) -> float:
-    """Return `value` as float; it must be a finite number within the bounds.
+    """Return `value` as float; it must be a finite number within the open and closed bounds.
 
-    Parameters
-    ----------
-    value : Any
-        What the user wrote. Truth values and numbers in quotes are refused.
-    where : str
-        The place for the message, such as ``"ship.toml: [ship] length"``.
-    above, at_least, below, at_most : float, optional
-        The open and closed bounds.
-    hint : str, optional
-        What to do about it, appended to the message.
-
-    Raises
-    ------
-    InputError
-        Naming the place, the value and what is expected.
+    Truth values and numbers in quotes are refused. The InputError begins with `where`, the place, such as
+    ``"ship.toml: [ship] length"``, names the value and what is expected, and ends with `hint`, what to do.
     """
     bounds = ((">", above), (">=", at_least), ("<", below), ("<=", at_most))
     stated = " and ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)

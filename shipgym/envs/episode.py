@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import (
     check_finite,
     check_flag,
@@ -24,8 +25,6 @@ from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
-
-Floats = NDArray[np.float64]
 
 #: What has to be recorded of any ship.
 REQUIRED_STATES = ("x", "y", "psi", "delta")
@@ -216,10 +215,7 @@ class Episode:
     def load(cls, path: str | Path) -> Episode:
         """Read an episode that was saved; its numbers are the very same.
 
-        Raises
-        ------
-        InputError
-            Naming the file and the field at fault.
+        Raises InputError, naming the file and the field at fault.
         """
         content = read_json(Path(path), "episode file", "record the episode again or take another copy")
         try:

@@ -59,10 +59,7 @@ def to_file(episode: Mapping[str, Any]) -> dict[str, Any]:
 def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     """An episode's fields by name, from the content of an episode file.
 
-    Raises
-    ------
-    InputError
-        For another kind of file or format, a field that is missing or unknown, or one that holds no numbers.
+    Raises InputError for another kind of file or format, a field that is missing, unknown or not of numbers.
     """
     if content.get("kind") != KIND:
         raise InputError(

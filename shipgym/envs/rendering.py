@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 Point = tuple[float, float]
 Colour = tuple[int, int, int]
@@ -60,17 +60,9 @@ class Scene:
 
 
 class Renderer:
-    """Draws scenes, into arrays or a window.
+    """Draws scenes into arrays ("rgb_array") or in a window too ("human").
 
-    Parameters
-    ----------
-    mode : {"rgb_array", "human"}
-        Whether `draw` shows the picture in a window too.
-
-    Raises
-    ------
-    InputError
-        For another mode, or where pygame-ce is not installed.
+    Raises InputError for another mode, or where pygame-ce is not installed.
     """
 
     def __init__(self, mode: str) -> None:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 ARRIVED = 0.9  # a rudder beyond this part of its usual angle has arrived there
 

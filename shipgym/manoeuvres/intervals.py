@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 LEVELS = (0.025, 0.975)  # of the 95 % interval
@@ -148,23 +148,10 @@ def intervals_of(
     evaluations: Mapping[str, Evaluation],
     progress: Callable[[int], None] | None = None,
 ) -> dict[str, dict[str, IndexInterval]]:
-    """Indices of several manoeuvres over the same draws.
+    """Indices of several manoeuvres over the same draws, by manoeuvre and index.
 
-    Parameters
-    ----------
-    own : mapping of str to indices
-        Of the model itself, by manoeuvre.
-    draws : sequence of ShipModel
-        Sailed one after the other; with none, the values stand alone.
-    evaluations : mapping of str to callable
-        From a ship to the indices, by manoeuvre.
-    progress : callable, optional
-        Called with the number of draws done.
-
-    Returns
-    -------
-    dict of str to dict of str to IndexInterval
-        By manoeuvre and index.
+    `own` are those of the model itself, `evaluations` give them from a ship; both by manoeuvre. Without draws
+    the values stand alone. `progress` is called with the number of draws done.
     """
     ran_away = {name: np.zeros(len(draws), dtype=np.bool_) for name in own}
     values = {name: {index: np.full(len(draws), np.nan) for index in own[name]} for name in own}

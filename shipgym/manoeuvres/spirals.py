@@ -11,8 +11,8 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import require, rudder
@@ -24,7 +24,6 @@ from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]
 
 #: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps where the loop is.
@@ -183,9 +182,7 @@ def _one_way(values: Sequence[float], argument: str, unit: str, limit: float, wh
 
 
 def spiral_from_trial(
-    trial: Trial,
-    rudder_deg: Sequence[float] | None = None,
-    tolerance_deg: float = 0.5,
+    trial: Trial, rudder_deg: Sequence[float] | None = None, tolerance_deg: float = 0.5
 ) -> Spiral:
     """The steady turns of a measured direct spiral.
 

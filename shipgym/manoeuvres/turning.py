@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
@@ -17,8 +18,6 @@ from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
 CAPTION = "Path from above, from the position and along the heading at which the rudder was ordered."

@@ -8,8 +8,8 @@ from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
@@ -19,8 +19,6 @@ from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 STANDARD_DEG = (10.0, 20.0)
 CAPTION = "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed."

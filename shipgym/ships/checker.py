@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
@@ -19,7 +19,6 @@ from shipgym.ships.term_table import Structure
 if TYPE_CHECKING:
     from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 
 SAMPLES = 512
 #: Range of the states looked at, in service speed, service speed by length and rudder limit.
@@ -84,10 +83,6 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     model : ShipModel, str or Path
         A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
         coefficient is missing for instance, is a problem found.
-
-    Returns
-    -------
-    ModelCheck
     """
     if not isinstance(model, ShipModel):
         try:

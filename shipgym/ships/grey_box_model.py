@@ -33,10 +33,6 @@ def grey_box(
     name : str
         Of the structure.
 
-    Returns
-    -------
-    GreyBox
-
     Raises
     ------
     InputError
@@ -73,10 +69,6 @@ def converted_model(
         Of the target, 1/s; 0: not known, and the reference ship's is taken as at service speed.
     name : str, optional
         By default the target's.
-
-    Returns
-    -------
-    ShipModel
     """
     box = reference
     if not isinstance(box, GreyBox):

@@ -61,21 +61,9 @@ def load(path: Path, make: Callable[..., Model]) -> Model:
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
-    """The model that `ManoeuvringModel.to_dict` wrote.
+    """The model that `ManoeuvringModel.to_dict` wrote, made by `make` (`ShipModel`).
 
-    Parameters
-    ----------
-    fields : mapping
-        Content of a model file.
-    where : str
-        Start of each message.
-    make : type
-        `ShipModel`.
-
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
+    Raises InputError that starts with `where` and names the field at fault.
     """
     if "format" in fields and fields["format"] != FORMAT:
         raise InputError(
@@ -144,14 +132,9 @@ def _grey_box(
     if not isinstance(shaft, bool):
         raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
     return GreyBox(
-        structure.name,
-        structure.source,
-        structure.equations,
-        structure.normalisation,
-        structure.quantity,
-        read_model(reference, f"{where}.reference", make),
-        shaft,
-    )
+        structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
+        read_model(reference, f"{where}.reference", make), shaft,
+    )  # fmt: skip
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
@@ -215,13 +198,7 @@ def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float
 
 
 def read_envelope(value: Any, where: str) -> Envelope | None:
-    """The envelope that `Envelope.to_dict` wrote; None for null.
-
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
-    """
+    """The envelope that `Envelope.to_dict` wrote; None for null. InputError names the field at fault."""
     if value is None:
         return None
     table = check_table(value, where)

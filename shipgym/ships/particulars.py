@@ -197,12 +197,7 @@ class Particulars(Mapping[str, Any]):
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass from the block
         coefficient, X_udot five per cent of the mass, the other added masses by the regressions of Clarke,
         Gedling and Hine 1983 (The application of manoeuvring criteria in hull design using linear theory,
-        Transactions of RINA 125).
-
-        Raises
-        ------
-        InputError
-            Naming what is missing, where not even that is possible.
+        Transactions of RINA 125). Raises InputError, naming what is missing, where not even that is possible.
         """
         ship = self
         for name, estimate in _ESTIMATES.items():

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
@@ -19,7 +19,6 @@ from shipgym.ships.term_table import Structure
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-Floats = NDArray[np.float64]
 
 #: Powers of the length with which the particulars grow; those without unit stay.
 GROWTH = {
@@ -48,10 +47,6 @@ def scale_model(
         Its service speed, m/s; by default that of the same Froude number.
     water_density : float, optional
         Of its water, kg/m3; by default as it was.
-
-    Returns
-    -------
-    ShipModel
 
     Raises
     ------

@@ -58,19 +58,9 @@ class SteeringGear:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> SteeringGear:
-        """Make a steering gear from the keys of the ship file's ``[steering]``.
+        """A steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
 
-        Parameters
-        ----------
-        mapping : mapping of str to float
-            Any of ``rudder_limit_deg``, ``rudder_rate_deg_s``, ``time_constant``.
-        where : str, optional
-            Start of each message, such as ``"ship.toml: [steering]"``.
-
-        Raises
-        ------
-        InputError
-            For an unknown key or a value out of bounds.
+        Raises InputError, beginning with `where`, for an unknown key or a value out of bounds.
         """
         table = check_table(mapping, where)
         check_keys(table, [field.name for field in fields(cls)], where)

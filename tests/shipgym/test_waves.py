@@ -13,7 +13,8 @@ from shipgym.sea import (
     wave_motion,
 )
 from shipgym.sea.estimates import GRAVITY, weather_particulars
-from shipgym.sea.harmonics import circle, evaluate_cosines
+from shipgym.sea.harmonics import circle
+from tests.shipgym.harmonics import evaluate_cosines
 from shipgym.sea.motions import heading_response, roll_response
 from shipgym.sea.waves import spread
 
