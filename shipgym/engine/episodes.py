@@ -76,6 +76,7 @@ from shipgym.engine.records import LANES
 from shipgym.tasks.contract import Interval, Random
 
 REFUSED = -1  # what `step` answers to commands that are not finite
+OF_STATE = 1 << 40  # added to the offset of a row that stands in the state, not in the result
 N_STEP, N_STEP_FLAGS = 3, 2  # of outcomes and flags, what `step` answers: reward, terminated, truncated
 SHIP_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
 # NumPy's numbers, since a function is compiled anew for each literal that it is called with
@@ -163,13 +164,20 @@ def sail_lanes(state: Any, words: Any, h: float, ships: Any, lanes: int) -> None
             store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
 
 
-def conclude_lanes(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
-    """Reward, readings and observations of an interval that is over."""
+def conclude_lanes(
+    state: Any, result: Any, keys: Any, settings: Any, ships: Any, lanes: int, whole: int
+) -> tuple[int, int]:
+    """Reward, readings and observations of an interval that is over.
+
+    Returns in how many of the `lanes` something is due, and how many episodes have just ended; lanes beyond
+    them, up to `whole`, fill vectors.
+    """
     rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
     common, view = common_ship(ships), common_view(ships)
     sea_common = common_sea(ships)
     worst = worst_cost(asked)
-    for lane in range(lanes):
+    n_due, n_ended = 0, 0
+    for lane in range(whole):
         ship, _ = ship_at(common, ships, lane)
         data, scale = view_at(view, ships, lane)
         motion, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
@@ -201,84 +209,76 @@ def conclude_lanes(state: Any, keys: Any, settings: Any, ships: Any, lanes: int)
 
         store_ended(state, lane, ended)
         store_outcome(
-            state, lane,
+            result, lane,
             Outcome(reward, terminated, late * (1.0 - terminated), distance, interval.extrapolating, end),
         )  # fmt: skip
-        store_reward(state, lane, earned)
+        store_reward(result, lane, earned)
         store_state(state, lane, after)
         store_memory(state, lane, memory)
         seen = readings(motion, sea, memory)
-        store_observation(state, lane, observe(seen, after, interval, ship, asked), scale)
+        store_observation(result, lane, observe(seen, after, interval, ship, asked), scale)
+        real = lane < lanes
+        n_due += 1 if due(motion, after, interval, ship, asked) & (ended == 0.0) & real else 0
+        n_ended += 1 if (max(terminated, late) > 0.0) & real else 0
+    return n_due, n_ended
 
 
-def interval_of(state: Any, rules: Rules, lane: int) -> Interval:
+def interval_of(state: Any, result: Any, rules: Rules, lane: int) -> Interval:
     """The interval of a lane, as it was concluded."""
-    course, outcome = load_course(state, lane), load_outcome(state, lane)
+    course, outcome = load_course(state, lane), load_outcome(result, lane)
     return Interval(
         rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command,
         outcome.envelope_distance, outcome.extrapolating,
     )  # fmt: skip
 
 
-def observe_lane(state: Any, settings: Any, ships: Any, lane: int) -> None:
+def observe_lane(state: Any, result: Any, settings: Any, ships: Any, lane: int) -> None:
     """What an autopilot sees now."""
     rules, asked = read_rules(settings, 0), read_settings(settings, 0)
     ship, _ = ship_at(common_ship(ships), ships, lane)
     _, scale = view_at(common_view(ships), ships, lane)
     seen = readings(load_motion(state, lane), load_sea(state, lane), load_memory(state, lane))
-    interval = interval_of(state, rules, lane)
-    store_observation(state, lane, observe(seen, load_state(state, lane), interval, ship, asked), scale)
+    interval = interval_of(state, result, rules, lane)
+    store_observation(result, lane, observe(seen, load_state(state, lane), interval, ship, asked), scale)
 
 
-def let_events_come(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
+def let_events_come(state: Any, result: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
     """What comes seldom, for the lanes for which it is time."""
     rules, asked = read_rules(settings, 0), read_settings(settings, 0)
     common = common_ship(ships)
     for lane in range(lanes):
         course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
         ship, _ = ship_at(common, ships, lane)
-        interval = interval_of(state, rules, lane)
+        interval = interval_of(state, result, rules, lane)
         if course.ended == 0.0 and due(motion, before, interval, ship, asked):
             random, plan = Random(keys[0, lane], keys[1, lane]), plan_of(state, lane)
             store_state(state, lane, on_event(motion, before, interval, ship, asked, random, plan))
-            observe_lane(state, settings, ships, lane)
-
-
-def count_events(state: Any, settings: Any, ships: Any, lanes: int) -> tuple[int, int]:
-    """In how many lanes something is due, and how many episodes have just ended."""
-    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
-    common = common_ship(ships)
-    n_due, n_ended = 0, 0
-    for lane in range(lanes):
-        ship, _ = ship_at(common, ships, lane)
-        course, outcome = load_course(state, lane), load_outcome(state, lane)
-        interval = interval_of(state, rules, lane)
-        is_due = due(load_motion(state, lane), load_state(state, lane), interval, ship, asked)
-        n_due += 1 if is_due & (course.ended == 0.0) else 0
-        n_ended += 1 if outcome.terminated + outcome.truncated > 0.0 else 0
-    return n_due, n_ended
+            observe_lane(state, result, settings, ships, lane)
 
 
 def show(
-    state: Any, rows: Any, observations: Any, outcomes: Any, flags: Any, whole: bool, first: int, begin: int,
-    end: int,
+    state: Any, result: Any, rows: Any, observations: Any, outcomes: Any, flags: Any, whole: bool, first: int,
+    begin: int, end: int,
 ) -> None:  # fmt: skip
     """Hand observations, outcomes and flags of some lanes over, or all but what `step` answers."""
+    at = 3
     for k in range(rows[0]):
-        row = rows[3 + k]
+        row = rows[at + k]
         for lane in range(begin, end):
-            observations[np.uintp(first + lane), k] = state[np.uintp(row + lane)]
+            observations[np.uintp(first + lane), k] = result[np.uintp(row + lane)]
+    at += rows[0]
     for k in range(0 if whole else N_STEP, rows[1]):
-        row = rows[3 + rows[0] + k]
+        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
         for lane in range(begin, end):
-            outcomes[k, np.uintp(first + lane)] = state[np.uintp(row + lane)]
+            outcomes[k, np.uintp(first + lane)] = source[np.uintp(row + lane)]
+    at += rows[1]
     for k in range(0 if whole else N_STEP_FLAGS, rows[2]):
-        row = rows[3 + rows[0] + rows[1] + k]
+        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
         for lane in range(begin, end):
-            flags[k, np.uintp(first + lane)] = state[np.uintp(row + lane)] > 0.0
+            flags[k, np.uintp(first + lane)] = source[np.uintp(row + lane)] > 0.0
 
 
-def begin_lane(state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any) -> None:
+def begin_lane(state: Any, result: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any) -> None:
     """Begin an episode in a lane, with a ship of the pool, if there is one."""
     if pool.shape[0] > 0:
         number = int(uniform(keys[0, lane], keys[1, lane], SHIP_DRAW, 0.0, float(pool.shape[0])))
@@ -286,6 +286,8 @@ def begin_lane(state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships
             ships[row * LANES + lane] = pool[number, row]
     for row in range(0, len(state) // LANES):
         state[row * LANES + lane] = 0.0
+    for row in range(0, len(result) // LANES):
+        result[row * LANES + lane] = 0.0
     rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
     ship, _ = ship_at(common_ship(ships), ships, lane)
     p = sea_at(common_sea(ships), ships, lane)
@@ -298,21 +300,21 @@ def begin_lane(state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships
         word = stream(keys[0, lane], keys[1, lane])
         keys[2, lane] = word + BEGIN_WORDS
         store_sea(state, lane, begin_sea(motion, word, p))
-    sea, interval = load_sea(state, lane), interval_of(state, rules, lane)
+    sea, interval = load_sea(state, lane), interval_of(state, result, rules, lane)
     frequency = encounter_frequency(motion, sea, p)
     memory = measure(motion, sea, load_memory(state, lane), frequency, interval, sensor, random)
     store_memory(state, lane, memory)
-    observe_lane(state, settings, ships, lane)
+    observe_lane(state, result, settings, ships, lane)
 
 
 def begin_next(
-    state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, observations: Any,
+    state: Any, result: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, observations: Any,
     outcomes: Any, flags: Any, first: int,
 ) -> None:  # fmt: skip
     """Begin the next episode of a lane and show it; reward and flags stay those of the last step."""
     keys[1, lane] += np.uint64(1)
-    begin_lane(state, lane, keys, settings, pool, ships)
-    show(state, rows, observations, outcomes, flags, ANSWERED, first, lane, lane + 1)
+    begin_lane(state, result, lane, keys, settings, pool, ships)
+    show(state, result, rows, observations, outcomes, flags, ANSWERED, first, lane, lane + 1)
 
 
 def are_finite(actions: Any) -> bool:
@@ -325,7 +327,7 @@ def are_finite(actions: Any) -> bool:
 
 
 def reset(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, which: Any, observations: Any,
+    states: Any, result: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, which: Any, observations: Any,
     outcomes: Any, flags: Any, next_one: bool,
 ) -> None:  # fmt: skip
     """Begin an episode in the lanes of `which`.
@@ -334,6 +336,8 @@ def reset(
     ----------
     states : float64 array of shape (n_tiles, n_rows * 64)
         Of the ships, tile by tile.
+    result : float64 array of shape (n_result_rows * 64,)
+        What came of the interval in one tile; room for work.
     keys : uint64 array of shape (n_tiles, 3, 64)
         Seed and number of each episode, and the state of its sea's random numbers.
     settings : float64 array
@@ -364,16 +368,26 @@ def reset(
             if which[first + lane]:
                 if next_one:
                     begin_next(
-                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
+                        state,
+                        result,
+                        lane,
+                        key,
+                        settings,
+                        pool,
+                        ship,
+                        rows,
+                        observations,
+                        outcomes,
+                        flags,
+                        first,
                     )
                 else:
-                    begin_lane(state, lane, key, settings, pool, ship)
-        if not next_one:
-            show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+                    begin_lane(state, result, lane, key, settings, pool, ship)
+                    show(state, result, rows, observations, outcomes, flags, WHOLE, first, lane, lane + 1)
 
 
 def step(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, actions: Any, observations: Any,
+    states: Any, result: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, actions: Any, observations: Any,
     outcomes: Any, flags: Any, first_tile: int, end_tile: int, next_ones: bool,
 ) -> int:  # fmt: skip
     """One control interval of the tiles from `first_tile` up to `end_tile`.
@@ -394,18 +408,28 @@ def step(
         take_commands(state, actions, rules, first, lanes)
         for _ in range(int(rules.substeps)):
             sail_lanes(state, key[2], h, ship, whole)
-        conclude_lanes(state, key, settings, ship, whole)
-        n_due, n_ended = count_events(state, settings, ship, lanes)
+        n_due, n_ended = conclude_lanes(state, result, key, settings, ship, lanes, whole)
         ended += n_ended
         if n_due > 0:
-            let_events_come(state, key, settings, ship, lanes)
-        show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+            let_events_come(state, result, key, settings, ship, lanes)
+        show(state, result, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
         if next_ones:
             for lane in range(lanes):
-                outcome = load_outcome(state, lane)
+                outcome = load_outcome(result, lane)
                 if load_course(state, lane).ended != 0.0 and outcome.terminated + outcome.truncated == 0.0:
                     begin_next(
-                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
+                        state,
+                        result,
+                        lane,
+                        key,
+                        settings,
+                        pool,
+                        ship,
+                        rows,
+                        observations,
+                        outcomes,
+                        flags,
+                        first,
                     )
     return ended
 
@@ -423,7 +447,7 @@ def run(world: Any, asked: int) -> int:
     ----------
     world : int64 array
         States, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags, then
-        the first tile of a step and the one behind its last.
+        the first tile of a step, the one behind its last, and room for the result of a tile.
     asked : int
         `STEP`; `STEP_AND_BEGIN`: episodes that were over begin anew; `BEGIN` or `BEGIN_NEXT` in some lanes.
     """
@@ -432,9 +456,11 @@ def run(world: Any, asked: int) -> int:
     rows, which = rows_at(world, 15), flags_at(world, 17)
     actions, observations = single_table_at(world, 19), single_table_at(world, 22)
     outcomes, flags = table_at(world, 25), flag_table_at(world, 28)
+    result = numbers_at(world, 33)
     if asked >= BEGIN:
         reset(
             states,
+            result,
             keys,
             settings,
             pool,
@@ -448,6 +474,6 @@ def run(world: Any, asked: int) -> int:
         )
         return 0
     return step(
-        states, keys, settings, pool, ships, rows, actions, observations, outcomes, flags, world[31], world[32],
+        states, result, keys, settings, pool, ships, rows, actions, observations, outcomes, flags, world[31], world[32],
         asked == STEP_AND_BEGIN,
     )  # fmt: skip
