@@ -10,7 +10,7 @@ import numpy as np
 
 from shipgym.engine import episodes
 from shipgym.engine.addresses import array_at, plan_at
-from shipgym.engine.compiling import compiled
+from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Motion
 from shipgym.engine.parts import Part
@@ -48,6 +48,10 @@ class Sensors:
     filter: bool = False
 
 
+#: Functions of `episodes` that loops call; others become part of them.
+SELDOM = (
+    "begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands", "sail_lanes",
+)  # fmt: skip
 PERFECT = Sensors(perfect)
 
 
@@ -174,11 +178,7 @@ class Voyages:
 
     def _functions(self) -> dict[str, Any]:
         task, sensors = self.task, self.sensors.module
-        seldom = {
-            name: Part(getattr(episodes, name), inline=False)
-            for name in ("begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands",
-                         "sail_lanes")
-        }  # fmt: skip
+        seldom = {name: Part(getattr(episodes, name), inline=False) for name in SELDOM}
         return seldom | {
             "conclude_lanes": Part(episodes.conclude_lanes, inline=False),
             "step": Part(episodes.step),
@@ -191,6 +191,7 @@ class Voyages:
             "flag_table_at": array_at(np.bool_, 2),
             "single_table_at": array_at(np.float32, 2),
             **open_sea.sea_functions(self.windy),
+            "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,
             "HAS_FILTER": self.sensors.filter,
             "measure": Part(sensors.measure),

@@ -57,8 +57,8 @@ class Outputs:
 class OutputPool:
     """Output buffers of one engine; the memory of those that nobody holds any more is used again.
 
-    To ask the system for memory in each step would take longer than to sail hundreds of ships. What a user keeps,
-    an array or a view of one, stays as it is.
+    To ask the system for memory in each step would take longer than to sail hundreds of ships. What a user
+    keeps, an array or a view of one, stays as it is.
 
     Parameters
     ----------
