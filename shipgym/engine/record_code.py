@@ -1,7 +1,7 @@
 """Records in loops: `load`, `store` and kin, as plain Python and as LLVM instructions.
 
-Written out as source, a record's load would take Numba as long to translate as a ship's equations; so each function
-comes as a `Part` with instructions of its own.
+Written out as source, a record's load would take Numba as long to translate as a ship's equations; so each
+function comes as a `Part` with instructions of its own.
 """
 
 from __future__ import annotations
