@@ -236,6 +236,7 @@ FILES = {
 }
 SHIP_FUNCTIONS = ("accelerations", "shaft_acceleration")  # places of `shipgym.engine.motion`
 SELDOM = ("let_events_come", "begin_next")
+HOUSEKEEPING = ("are_finite", "tile_of")
 OFTEN = {"sail_lanes": ", in each substep"}
 EPISODES = ROOT / "shipgym" / "engine" / "episodes.py"
 
@@ -249,7 +250,7 @@ def stages() -> dict[str, tuple[str, list[tuple[str, str]]]]:
     }
     found = {}
     for name in _called(functions["step"]):
-        if name in functions and name != "are_finite":
+        if name in functions and name not in HOUSEKEEPING:
             about = (ast.get_docstring(functions[name]) or "").partition("\n")[0]
             found[name] = about, list(_given(name, functions))
     return found
@@ -291,7 +292,7 @@ def draw_step() -> str:
     for i, (name, (about, given)) in enumerate(rows.items()):
         lines += _stage(name, about, given, top + 40 + i * (TALL + 16), last=i == len(rows) - 1)
     lines.append(line_to(f"M140 {bottom} L140 {bottom + 30}"))
-    answer = "observations, rewards, terminated, truncated, infos: new arrays in each step"
+    answer = "observations, rewards, terminated, truncated, infos"
     lines.append(text(154, bottom + 24, answer, size=12))
     return picture(960, bottom + 44, "A step of the engine", lines)
 
