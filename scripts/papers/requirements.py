@@ -84,7 +84,7 @@ REQUIREMENTS = (
     Requirement(
         "R3",
         "The model is identifiable",
-        "The regressors of one trial have full rank and no coefficient's interval holds 0, where the thesis' "
+        "The regressors of one trial have full rank and no coefficient's interval contains 0, where the thesis' "
         "four terms of surge and seven of steering drift; collinear terms are named, and the next manoeuvre "
         "is advised.",
         (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_recovered",
@@ -221,7 +221,7 @@ def simplicity_rows() -> Iterator[Row]:
 
 
 def uncertain(result: IdentificationResult) -> int:
-    """Coefficients whose 95 % interval holds 0."""
+    """Coefficients whose 95 % interval contains 0."""
     return sum(
         Z95 * error >= abs(result.coefficients[name]) for name, error in result.standard_errors.items()
     )
@@ -239,7 +239,7 @@ def identifiability_rows() -> Iterator[Row]:
     for what, many, theirs, ours in cases:
         count = uncertain(ours)
         yield Row(
-            "R3", f"coefficients of {what} whose 95 % interval holds 0", None, uncertain(theirs), count, "0",
+            "R3", f"coefficients of {what} whose 95 % interval contains 0", None, uncertain(theirs), count, "0",
             count == 0, f"as the paper: {many} terms an equation",
         )  # fmt: skip
 

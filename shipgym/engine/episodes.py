@@ -293,7 +293,7 @@ def let_events_come(tile: Tile) -> None:
 
 
 def show(tile: Tile, shown: Shown, whole: bool, begin: int, end: int) -> None:
-    """Copy observations, outcomes and flags of some lanes into the arrays that users are given."""
+    """Copy what is seen of some lanes into the users' arrays; reward and ends only if `whole`."""
     state, result, rows, first = tile.state, tile.result, shown.rows, tile.first
     at = 3
     for k in range(rows[0]):
