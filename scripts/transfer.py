@@ -85,7 +85,7 @@ class TransferCase:
         """The task in which a learner learns."""
         if learner == REFERENCE:
             return self.task
-        uncertain = {"model_uncertainty": "posterior"} if learner == COVARIANCE else {}
+        uncertain = {"model_uncertainty": "covariance"} if learner == COVARIANCE else {}
         options = {**self.task.options, **uncertain}
         name = f"{self.task.name}-{learner}"
         return BenchmarkTask(name, self.task.environment, self.identified, self.task.why, options)

@@ -286,10 +286,10 @@ def start_rows() -> Iterator[Row]:
         found = np.array([
             TunedLSSVM(search, fit_intercept=False, seed=seed).fit(X, y).coef_ for seed in range(SEEDS)
         ])  # fmt: skip
-        spread = 100.0 * float(np.max(np.ptp(found, axis=0) / np.abs(found.mean(axis=0))))
+        width = 100.0 * float(np.max(np.ptp(found, axis=0) / np.abs(found.mean(axis=0))))
         yield Row(
-            "R6", f"largest spread of a coefficient over {SEEDS} starts of the search {search}, %", None,
-            None, spread, "below 0.01", spread < 0.01,
+            "R6", f"largest range of a coefficient over {SEEDS} starts of the search {search}, %", None,
+            None, width, "below 0.01", width < 0.01,
         )  # fmt: skip
 
 
