@@ -16,7 +16,7 @@ from shipgym.trials.identify_table import check_options
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
-RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
+RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it implies the structure
 MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
 
 

@@ -1,4 +1,4 @@
-"""Folders of results: written whole or not at all, and never over somebody else's files."""
+"""Folders of results: written whole or not at all, and never over files that are not results."""
 
 from __future__ import annotations
 

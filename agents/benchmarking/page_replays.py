@@ -64,7 +64,7 @@ def hardest_of(result: BenchmarkResult, task: str) -> int:
 def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[EpisodeId]]]:
     """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
 
-    At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
+    At first all contestants in the hardest episode, of the task as a whole; then the worst episodes of
     each, beside the task's best contestant in the same.
     """
     who, seed = contestants_of(result, task), hardest_of(result, task)

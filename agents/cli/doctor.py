@@ -1,4 +1,4 @@
-"""What `shipgym doctor` looks at: versions, the cache of compiled ships, optional packages, names."""
+"""What `shipgym doctor` checks: versions, the cache of compiled ships, optional packages, names."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ OURS = ("shipgym", "identification", "agents")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at."""
+    """The result of one check."""
 
     what: str
     #: "fine", "absent", "wrong": "absent": an option that is not installed; "wrong": something does not

@@ -97,7 +97,7 @@ def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A value of TOML; what is none is a text without quotes."""
+    """A value of TOML; anything else is a text without quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

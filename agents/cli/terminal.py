@@ -137,7 +137,7 @@ def comparison_table(comparison: Comparison) -> Table:
     headings = (
         "method",
         "model",
-        ">error by\nspread",
+        ">error by\nstd. dev.",
         ">heading\ndeg",
         ">yaw rate\ndeg/s",
         ">ran away\ntrials",

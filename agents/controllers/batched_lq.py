@@ -53,10 +53,10 @@ def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
     solutions, shape (n, m, m), NaN where the doubling did not converge.
     """
     eye = np.eye(A.shape[-1])
-    settled = np.zeros(len(A), dtype=np.bool_)
+    converged = np.zeros(len(A), dtype=np.bool_)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(DOUBLINGS):
-            going = ~settled & np.isfinite(H).all(axis=(1, 2))
+            going = ~converged & np.isfinite(H).all(axis=(1, 2))
             if not going.any():
                 break
             a, g, h = A[going], G[going], H[going]
@@ -66,6 +66,6 @@ def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
             more = at @ h @ wa
             A[going], G[going], H[going] = a @ wa, g + a @ wg @ at, h + 0.5 * (more + more.transpose(0, 2, 1))
             size = np.abs(H[going]).max(axis=(1, 2))
-            settled[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
-    H[~settled] = np.nan
+            converged[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
+    H[~converged] = np.nan
     return H

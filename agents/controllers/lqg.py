@@ -35,7 +35,7 @@ from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL
 
 OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
-COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two looks at it, rad
+COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two measurements, rad
 NEW_COURSE = np.radians(1.0)  # least jump of the heading error that is a new course, rad
 GATE = 6.0  # such a jump in standard deviations of what noise explains
 WAVE_DAMPING = 0.1  # of the model of first-order motion (Fossen 2011, 8.2.6)
@@ -53,7 +53,7 @@ class LQG(Stateful):
     Attributes
     ----------
     transition : array of shape (n_states, n_states)
-        From one look to the next.
+        From one measurement to the next.
     input : array of shape (n_states,)
         Effect of the mean rudder in between.
     kalman : array of shape (n_states, 2)
@@ -140,7 +140,7 @@ class LQG(Stateful):
 
     @property
     def memory_size(self) -> int:
-        """The estimate, and the rudder at the last look."""
+        """The estimate, and the rudder at the last measurement."""
         return len(self.input) + 1
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
@@ -167,12 +167,12 @@ class LQG(Stateful):
     def loop(self) -> Compensator:
         """Filter and feedback together; the course does not jump."""
         n = len(self.input)
-        look = np.zeros((2, len(SIGNALS)))
-        look[[0, 1], list(OUTPUTS)] = 1.0
+        measure = np.zeros((2, len(SIGNALS)))
+        measure[[0, 1], list(OUTPUTS)] = 1.0
         trusted = np.eye(n) - self.kalman @ self.output
         rudder = np.eye(len(SIGNALS))[RUDDER]
         remember = np.column_stack([trusted @ self.transition, 0.5 * trusted @ self.input])
-        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ look
+        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ measure
         row = np.zeros(n)
         row[: ERROR + 1] = [self.gains[signal] for signal in SIGNALS[: ERROR + 1]]
         at_once = self.gains["rudder"] * rudder

@@ -67,7 +67,7 @@ def died_too_often(text: str, retries: int) -> WorkerDiedError:
 
 
 def with_modules(function: JobFunction, modules: Sequence[str], job: dict[str, Any]) -> Any:
-    """Do a job after importing modules: in another process nobody else has."""
+    """Do a job after importing modules, which another process has not imported."""
     for module in modules:
         import_module(module)
     return function(job)

@@ -1,6 +1,6 @@
 """A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
 
-It looks at observations alone and takes over
+It uses observations alone and takes over
 
 * where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
   for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such

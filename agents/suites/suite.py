@@ -90,8 +90,8 @@ class BenchmarkTask:
 
     def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
         """Many ships at once under this task, by default with its own ship."""
-        ship, task, variety = self.parts
-        return Engine(ship if model is None else model, num_envs, task, variety, threads=threads)
+        ship, task, randomisation = self.parts
+        return Engine(ship if model is None else model, num_envs, task, randomisation, threads=threads)
 
 
 @dataclass(frozen=True)

@@ -209,7 +209,7 @@ def training_options(plan: Plan) -> dict[str, Any]:
         return options
     ship, task = plan.task.ship, plan.task.task
     if ship.covariance is not None:
-        options.setdefault("model_uncertainty", "posterior")
+        options.setdefault("model_uncertainty", "covariance")
     options.setdefault("speed_range", SPEED_RANGE)
     names = {sea.name for sea in task.seas}
     current = task.weather.current

@@ -127,7 +127,7 @@ def tune(
 
 
 def evaluated_evenly(plan: Plan) -> Plan:
-    """The plan with ten evaluations on the way, which stopping early lives on."""
+    """The plan with ten evaluations on the way, which early stopping needs."""
     every = max(1, plan.settings.total_steps // EVALUATIONS)
     return replace(plan, settings=changed(plan.settings, {"evaluate_every": every}))
 
@@ -163,7 +163,7 @@ class _StoppedEarlyError(Exception):
 
 
 def limits(trials: Sequence[Trial], total_steps: int) -> list[tuple[int, float]]:
-    """Steps, and the median over finished trials of the best cost that they had come to by then."""
+    """Steps, and the median over finished trials of their best cost by then."""
     finished = [trial.curve for trial in trials if trial.ended == "finished"]
     if len(finished) < TRIALS_BEFORE_STOPPING:
         return []

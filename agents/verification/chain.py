@@ -69,7 +69,7 @@ def build_autopilot(
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
-    graph_objects()  # a missing extra shall be told now, not after the work
+    graph_objects()  # a missing extra is reported now, not after the work
     result = examine(
         ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
         where=where,

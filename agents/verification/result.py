@@ -61,7 +61,7 @@ class Verification:
 
 @dataclass(frozen=True, eq=False)
 class AutopilotResult:
-    """All that the report tells."""
+    """Everything in the report."""
 
     ship: ShipFile  # what was read
     trials: tuple[Trial, ...]  # in the order of the file
@@ -95,7 +95,7 @@ class AutopilotResult:
 
 
 def verification_metrics(found: Verification) -> dict[str, Any]:
-    """What metrics.json tells of a verification."""
+    """What metrics.json says of a verification."""
     return {
         "draws": {
             "count": found.draws,
@@ -104,7 +104,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "course_unstable": int(found.course_unstable.sum()),
         },
         "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
-        "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
+        "imo": {name: criterion.to_dict() for name, criterion in found.manoeuvres.criteria.items()},
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,

@@ -236,7 +236,7 @@ def advise(
 def _gains(
     total: Floats, offers: Mapping[str, Floats], size: Floats, criterion: str, at: int
 ) -> dict[str, float]:
-    """By what factor each candidate would shrink what the criterion looks at."""
+    """By what factor each candidate would shrink what the criterion measures."""
     now = _uncertainty(total, size, criterion, at)
     return {name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()}
 

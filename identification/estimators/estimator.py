@@ -1,4 +1,4 @@
-"""What every estimator offers that `identify` may fit to an equation, and what a method may look at."""
+"""What every estimator offers that `identify` may fit to an equation, and what a method may use."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def weights(estimator: Estimator, features: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FitTask:
-    """All that a method may look at."""
+    """Everything that a method may use."""
 
     samples: Samples  # the regression of each equation
     blank: ShipModel  # the model but for its coefficients

@@ -72,7 +72,7 @@ def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSV
     for k, q in enumerate(equations):
         own = replace(search, x=search.x[k : k + 1], course=search.course[:, k : k + 1])
         estimator = TunedLSSVM(**settings.get_params(deep=False))
-        estimators[q] = estimator.settle(
+        estimators[q] = estimator.fit_with(
             samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own
         )
     return estimators

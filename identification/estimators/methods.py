@@ -83,7 +83,7 @@ def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
 
 
 def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may look at trials: as blocks, or by simulating them."""
+    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
     template, samples = make(), task.samples
     assert isinstance(template, TunedLSSVM)
     if template.objective == "free-running":
@@ -120,7 +120,7 @@ METHODS = {
     )
 }
 
-#: Estimators that look at more than the samples of one equation.
+#: Estimators that use more than the samples of one equation.
 FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
 
 

@@ -58,10 +58,10 @@ def smooth_linear(
             p = left @ p @ left.T + variance * np.outer(gain, gain)
             likelihood -= 0.5 * (np.log(innovation_variance) + error * error / innovation_variance)
         ahead[1, k], filtered[1, k] = x, p
-    states, spreads = ahead[1], filtered[1]
+    states, covariances = ahead[1], filtered[1]
     if not only_likelihood:
         for k in range(n - 2, -1, -1):
-            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ spreads[k]).T
+            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ covariances[k]).T
             states[k] += gain @ (states[k + 1] - ahead[0, k + 1])
-            spreads[k] += gain @ (spreads[k + 1] - filtered[0, k + 1]) @ gain.T
-    return Smoothed(states, np.diagonal(spreads, axis1=1, axis2=2).copy(), likelihood)
+            covariances[k] += gain @ (covariances[k + 1] - filtered[0, k + 1]) @ gain.T
+    return Smoothed(states, np.diagonal(covariances, axis1=1, axis2=2).copy(), likelihood)
