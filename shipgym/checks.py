@@ -1,7 +1,5 @@
 """Checks of what a user wrote, each answering with one message that names the place and the remedy."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping

@@ -1,7 +1,5 @@
 """When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

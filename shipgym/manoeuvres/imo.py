@@ -1,7 +1,5 @@
 """The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

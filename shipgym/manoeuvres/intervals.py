@@ -1,7 +1,5 @@
 """How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -3,8 +3,6 @@
 As described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Straight-line acceleration and stopping, and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

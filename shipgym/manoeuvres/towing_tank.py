@@ -5,8 +5,6 @@ InputError. The tests are those of the planar motion mechanism (Gertler 1967, Th
 planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

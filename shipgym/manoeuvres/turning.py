@@ -1,7 +1,5 @@
 """The turning circle and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

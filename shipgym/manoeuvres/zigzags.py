@@ -1,7 +1,5 @@
 """The zigzag manoeuvre (Kempf 1932) and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

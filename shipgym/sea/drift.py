@@ -1,7 +1,5 @@
 """Mean second-order wave forces on a ship, over the direction of the waves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """First-order heading and roll in waves: closed-form transfer functions, integrated over the spectrum."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -11,8 +11,6 @@ integrals involving the matrix exponential): their variances do not depend on th
 Forces are Fourier series over an angle, already divided by the ship's inertia.
 """
 
-from __future__ import annotations
-
 from math import fabs, pi, sqrt
 from typing import Any, NamedTuple
 

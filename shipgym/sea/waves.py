@@ -1,7 +1,5 @@
 """Wave spectra, and the linear filters that stand for first-order motion and slow drift."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Mass and added mass that belong to a ship's accelerations, so that these can be turned into forces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats

@@ -4,8 +4,6 @@ Sources: Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SN
 Principles of Naval Architecture III, chapter IX, section 4 (the criterion C).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 

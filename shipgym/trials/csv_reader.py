@@ -1,7 +1,5 @@
 """Reading numbers from CSV files: fast where the file is sound, exact about the place where it is not."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re

@@ -1,7 +1,5 @@
 """Values that no ship can have, and channels that contradict each other: most often a wrong unit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
