@@ -29,44 +29,24 @@ ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to se
 
 @dataclass(frozen=True)
 class StoppingIndices:
-    """Indices of a stopping trial.
+    """Indices of a stopping trial."""
 
-    Attributes
-    ----------
-    track_reach_lengths : float
-        Distance sailed along the track until the speed is reached, ship lengths: the stopping distance.
-    head_reach_lengths, side_reach_lengths : float
-        The same along and across the heading at the order, ship lengths; to starboard positive.
-    heading_change_deg : float
-        Degrees, positive to starboard.
-    time_s : float
-        s.
-    """
-
+    # distance sailed along the track until the speed is reached, ship lengths: the stopping distance
     track_reach_lengths: float
+    # the same along and across the heading at the order, ship lengths; to starboard positive
     head_reach_lengths: float
     side_reach_lengths: float
-    heading_change_deg: float
-    time_s: float
+    heading_change_deg: float  # degrees, positive to starboard
+    time_s: float  # s
 
 
 @dataclass(frozen=True)
 class AccelerationIndices:
-    """Indices of an acceleration.
+    """Indices of an acceleration."""
 
-    Attributes
-    ----------
-    time_s : float
-        Until the given part of the change of speed is done, s.
-    distance_lengths : float
-        Sailed by then, ship lengths.
-    final_speed : float
-        Surge speed at the end, m/s.
-    """
-
-    time_s: float
-    distance_lengths: float
-    final_speed: float
+    time_s: float  # until the given part of the change of speed is done, s
+    distance_lengths: float  # sailed by then, ship lengths
+    final_speed: float  # surge speed at the end, m/s
 
 
 def stopping(
@@ -94,10 +74,8 @@ def stopping(
     speed_ratio : float
         Surge speed at which the trial ends, by that at service; 0 for dead in the water, which only a
         shaft astern brings about.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Raises
     ------
@@ -222,10 +200,8 @@ def acceleration(
         Speed and shaft speed at the start, by those at service.
     duration : float, optional
         s; by default 40 times the time to travel one ship length.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Raises
     ------

@@ -30,8 +30,8 @@ class Tank:
     """How a captive test is run and measured; InputError for a number out of range."""
 
     speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
-    rudder_deg: float = 0.0  # Held, degrees
-    shaft_speed: float | None = None  # Held, 1/s; None: that at service speed. For ships with a shaft
+    rudder_deg: float = 0.0  # held, degrees
+    shaft_speed: float | None = None  # held, 1/s; None: that at service speed. For ships with a shaft
     cycles: int = 3  # periods of an oscillation that are recorded
     samples: int = 200  # in each period, and at each angle of a static test
     # standard deviation of white noise on each force, in parts of its root mean square over the test

@@ -26,26 +26,17 @@ class TurningIndices:
     """Indices of a turning circle; None where the ship did not turn so far.
 
     Lengths are measured from the position and along the heading at which the rudder was ordered.
-
-    Attributes
-    ----------
-    advance_lengths, transfer_lengths : float or None
-        Distance ahead and to the side when the heading has changed by 90 degrees, ship lengths.
-    tactical_diameter_lengths : float or None
-        Distance to the side when the heading has changed by 180 degrees, ship lengths.
-    steady_diameter_lengths : float or None
-        Diameter of the steady turn, 2 U / r over the last quarter turn before the end, ship lengths.
-    steady_speed_ratio : float or None
-        Speed in the steady turn over that at the order.
-    steady_drift_deg : float or None
-        Drift angle at midship in the steady turn, degrees, positive when the bow points into the turn.
     """
 
+    # distance ahead and to the side when the heading has changed by 90 degrees, ship lengths
     advance_lengths: float | None
     transfer_lengths: float | None
+    # distance to the side when the heading has changed by 180 degrees, ship lengths
     tactical_diameter_lengths: float | None
+    # diameter of the steady turn, 2 U / r over the last quarter turn before the end, ship lengths
     steady_diameter_lengths: float | None
-    steady_speed_ratio: float | None
+    steady_speed_ratio: float | None  # speed in the steady turn over that at the order
+    # drift angle at midship in the steady turn, degrees, positive when the bow points into the turn
     steady_drift_deg: float | None
 
 
@@ -63,7 +54,6 @@ def turning_circle(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     rudder_deg : float
         Rudder ordered at the start, degrees; negative turns to port.
     duration, dt : float

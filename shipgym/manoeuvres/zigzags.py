@@ -24,22 +24,14 @@ CAPTION = "Heading change and rudder in degrees; dotted: the heading at which th
 
 @dataclass(frozen=True)
 class ZigzagIndices:
-    """Indices of a zigzag; None where the manoeuvre ended before.
+    """Indices of a zigzag; None where the manoeuvre ended before."""
 
-    Attributes
-    ----------
-    overshoot_1_deg, overshoot_2_deg : float or None
-        Heading beyond that at which the rudder was reversed for the first and the second time, degrees.
-    initial_turning_lengths : float or None
-        Distance sailed from the first order to the first reversal, ship lengths.
-    period_s : float or None
-        Time from the first to the third reversal, s.
-    """
-
+    # heading beyond that at which the rudder was reversed for the first and the second time, degrees
     overshoot_1_deg: float | None
     overshoot_2_deg: float | None
+    # distance sailed from the first order to the first reversal, ship lengths
     initial_turning_lengths: float | None
-    period_s: float | None
+    period_s: float | None  # time from the first to the third reversal, s
 
 
 def zigzag(
@@ -62,7 +54,6 @@ def zigzag(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     rudder_deg, heading_deg : float
         Rudder angle ordered and heading change at which it is reversed, degrees.
     port_first : bool

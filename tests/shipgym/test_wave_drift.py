@@ -11,11 +11,11 @@ from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
 from shipgym.sea.drift import added_resistance, reflection_coefficients
 from shipgym.sea.estimates import GRAVITY, weather_particulars
-from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 from shipgym.sea.mobility import mobility_matrix, roll_inertia
 from shipgym.sea.waves import draught_attenuation
 from shipgym.ships import get_structure
 from shipgym.ships.inertia import inertia
+from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
 KVLCC2 = weather_particulars(load_model("kvlcc2").particulars)
