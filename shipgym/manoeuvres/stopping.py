@@ -8,7 +8,7 @@ import numpy as np
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
-from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -254,15 +254,14 @@ def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None =
 
 def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
     """Time at which values first reach a threshold, between samples by straight lines, s."""
-    reached = np.flatnonzero(values >= threshold)
-    if len(reached) == 0:
+    time = reached(values, threshold, trial.t)
+    if time is None:
         raise ManoeuvreError(
             f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end, expected it to reach "
             f"{abs(threshold):.3g} m/s; give a larger speed_ratio",
             trial,
         )
-    k = max(int(reached[0]), 1)
-    return float(np.interp(threshold, values[k - 1 : k + 1], trial.t[k - 1 : k + 1]))
+    return time
 
 
 def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:

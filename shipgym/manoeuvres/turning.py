@@ -6,10 +6,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
+from shipgym.manoeuvres.execution import execute_time, number_of_steps, reached, require, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
@@ -108,22 +107,13 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
         _steady(trial, after, steady, side, lpp) if turned[-1] > 1.5 * np.pi else (None,) * 3
     )
     return TurningIndices(
-        advance_lengths=_when_turned(turned, np.pi / 2, ahead),
-        transfer_lengths=_when_turned(turned, np.pi / 2, aside),
-        tactical_diameter_lengths=_when_turned(turned, np.pi, aside),
+        advance_lengths=reached(turned, np.pi / 2, ahead),
+        transfer_lengths=reached(turned, np.pi / 2, aside),
+        tactical_diameter_lengths=reached(turned, np.pi, aside),
         steady_diameter_lengths=diameter,
         steady_speed_ratio=ratio,
         steady_drift_deg=drift,
     )
-
-
-def _when_turned(turned: Floats, angle: float, distance: Floats) -> float | None:
-    """Distance at which the heading has changed by an angle, between samples by straight lines."""
-    past = np.flatnonzero(turned >= angle)
-    if len(past) == 0:
-        return None
-    k = max(int(past[0]), 1)
-    return float(np.interp(angle, turned[k - 1 : k + 1], distance[k - 1 : k + 1]))
 
 
 def _steady(

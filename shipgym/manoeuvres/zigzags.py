@@ -10,7 +10,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage, Seed
@@ -170,11 +170,9 @@ def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, le
     """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
     after = trial.t >= start
     times, change = trial.t[after], np.abs(_heading_change(trial, start, trial.t[after]))
-    past = np.flatnonzero(change >= np.radians(threshold_deg or np.inf))
-    if len(past) == 0:
+    when = reached(change, float(np.radians(threshold_deg or np.inf)), times)
+    if when is None:
         return None
-    step = slice(max(int(past[0]), 1) - 1, max(int(past[0]), 1) + 1)
-    when = np.interp(np.radians(threshold_deg or np.inf), change[step], times[step])
     sailed = np.interp([start, when], trial.t, distance_sailed(trial))
     return float(sailed[1] - sailed[0]) / length
 
