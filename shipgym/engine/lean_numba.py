@@ -1,8 +1,9 @@
-"""Compiling a loop once: Numba optimises and emits each function on its own, though the loop holds them all.
+"""Compiling a loop once: Numba optimises each function on its own, though the loop holds them all.
 
-Numba makes machine code of every function that a loop calls, nested ones again in each that calls them, and then
-of the loop, into which their code is inlined. Within `lean` the functions with the loop's tag are translated only
-as far as LLVM's intermediate code: two thirds of the time to compile are saved, the loop's code is the same.
+It makes machine code of every function that a loop calls, nested ones again in each that calls them, and then
+of the loop, into which their code is inlined. Within `lean` the functions with the loop's tag are translated
+only as far as LLVM's intermediate code: that saves two thirds of the time to compile; the loop's code is the
+same.
 """
 
 from __future__ import annotations

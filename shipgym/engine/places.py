@@ -19,7 +19,8 @@ PLACES = {
         "load_scale",
     ),
     "arrays": (
-        "words_at", "numbers_at", "table_at", "rows_at", "flags_at", "flag_table_at", "single_table_at", "plan_of",
+        "words_at", "numbers_at", "table_at", "rows_at", "flags_at", "flag_table_at", "single_table_at",
+        "plan_of",
     ),
     "numbers of the ships": ("common_ship", "ship_at", "common_sea", "sea_at", "common_view", "view_at"),
     "the sea": ("push", "evolve", "begin_sea", "encounter_frequency"),
