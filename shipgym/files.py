@@ -1,7 +1,5 @@
 """Files that are read with one clear error, and written whole or not at all."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping

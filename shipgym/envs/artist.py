@@ -1,7 +1,5 @@
 """What an environment's picture shows: the scene of one lane of an engine, and the wake behind its ship."""
 
-from __future__ import annotations
-
 from math import atan2, degrees, hypot, pi
 
 import numpy as np

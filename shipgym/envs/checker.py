@@ -1,7 +1,5 @@
 """A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -20,8 +20,6 @@ Format 1:
     outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 

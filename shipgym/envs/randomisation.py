@@ -1,7 +1,5 @@
 """Domain randomisation: the ships of which an environment gives each episode one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Identified models that run away are kept in their files, marked, and not sailed unless asked for."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable
 

@@ -3,8 +3,6 @@
 Signals: Ljung 1999, System Identification, 13.3 (pseudo-random binary and multi-sine signals).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats

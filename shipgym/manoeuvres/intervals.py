@@ -1,7 +1,5 @@
 """How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -25,21 +23,11 @@ Evaluation = Callable[[ShipModel], Any]
 
 @dataclass(frozen=True, eq=False)
 class IndexInterval:
-    """One index of a model and of models drawn from its covariance.
+    """One index of a model and of models drawn from its covariance."""
 
-    Attributes
-    ----------
-    value : float or None
-        Of the model itself; None where its manoeuvre never got so far.
-    values : array of shape (n_draws,)
-        Of the draws; NaN where one ran away or its manoeuvre never got so far.
-    ran_away : bool array of shape (n_draws,)
-        Draws that ran away in the manoeuvre.
-    """
-
-    value: float | None
-    values: Floats
-    ran_away: Bools
+    value: float | None  # of the model itself; None where its manoeuvre never got so far
+    values: Floats  # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got so far
+    ran_away: Bools  # shape (n_draws,); draws that ran away in the manoeuvre
 
     @property
     def interval(self) -> tuple[float, float] | None:

@@ -1,7 +1,5 @@
 """Legs of a manoeuvre that last until the motion is steady."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

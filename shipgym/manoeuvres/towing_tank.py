@@ -5,14 +5,12 @@ InputError. The tests are those of the planar motion mechanism (Gertler 1967, Th
 planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia, rigid_inertia
@@ -32,8 +30,8 @@ class Tank:
     """How a captive test is run and measured; InputError for a number out of range."""
 
     speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
-    rudder_deg: float = 0.0  # Held, degrees
-    shaft_speed: float | None = None  # Held, 1/s; None: that at service speed. For ships with a shaft
+    rudder_deg: float = 0.0  # held, degrees
+    shaft_speed: float | None = None  # held, 1/s; None: that at service speed. For ships with a shaft
     cycles: int = 3  # periods of an oscillation that are recorded
     samples: int = 200  # in each period, and at each angle of a static test
     # standard deviation of white noise on each force, in parts of its root mean square over the test
@@ -189,7 +187,7 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
             f"tank shaft_speed: {tank.shaft_speed:g} found, but {model.name!r} has no shaft; leave it"
         )
     shaft = model.service_shaft_speed if tank.shaft_speed is None else tank.shaft_speed
-    psi = _integral(motion.t, motion.velocity[:, 2])
+    psi = integral(motion.t, motion.velocity[:, 2])
     columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
     columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
     none = np.zeros(len(psi))
@@ -205,8 +203,8 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     if not tank.model_inertia:
         forces += _ship_s_own(model, motion)
     channels = {
-        "x": _integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
-        "y": _integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
+        "x": integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
+        "y": integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
         **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
         **({"n": columns["n"]} if "n" in model.command_names else {}),
         **dict(zip(FORCES, _noisy(forces, tank).T, strict=True)),
@@ -231,8 +229,3 @@ def _noisy(forces: Floats, tank: Tank) -> Floats:
     size = tank.noise * np.sqrt((forces**2).mean(axis=0))
     noisy: Floats = forces + size * np.random.default_rng(tank.seed).standard_normal(forces.shape)
     return noisy
-
-
-def _integral(t: Floats, rate: Floats) -> Floats:
-    """Integral over time from zero by the trapezoid rule, shape (n_samples,)."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])

@@ -70,16 +70,9 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
-        "gridcolor": GRID,
-        "zeroline": zero,
-        "zerolinecolor": GRID,
-        "linecolor": "#c5ccd6",
-        "showline": True,
-        "ticks": "outside",
-        "ticklen": 4,
-        "tickcolor": "#c5ccd6",
-        "tickfont": {"size": 11, "color": MUTED},
-    }
+        "gridcolor": GRID, "zeroline": zero, "zerolinecolor": GRID, "linecolor": "#c5ccd6", "showline": True,
+        "ticks": "outside", "ticklen": 4, "tickcolor": "#c5ccd6", "tickfont": {"size": 11, "color": MUTED},
+    }  # fmt: skip
     return shared | changes
 
 

@@ -1,7 +1,5 @@
 """Mean second-order wave forces on a ship, over the direction of the waves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -12,7 +10,7 @@ from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, waterplane_coefficient, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, mirrored, sine_series
-from shipgym.sea.waves import draught_attenuation, frequencies, slow_drift, spread, wave_spectrum
+from shipgym.sea.waves import draught_attenuation, frequencies, over_directions, slow_drift, wave_spectrum
 from shipgym.ships.particulars import Particulars
 
 _PITCH_GYRADIUS = 0.25  # by length
@@ -73,9 +71,9 @@ def wave_drift(waves: Waves, particulars: Particulars, speed: float | None = Non
     used = {"block_coefficient", "water_density"}
     return WaveDrift(
         chi,
-        spread(mirrored(X), waves),
-        spread(mirrored(Y, -1.0), waves),
-        spread(mirrored(N, -1.0), waves),
+        over_directions(mirrored(X), waves),
+        over_directions(mirrored(Y, -1.0), waves),
+        over_directions(mirrored(N, -1.0), waves),
         *slow,
         tuple(sorted(ship.estimated & used)),
     )

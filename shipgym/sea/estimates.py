@@ -1,7 +1,5 @@
 """What wind and waves need of a ship's particulars, estimated where it is not given."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace

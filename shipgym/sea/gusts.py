@@ -1,7 +1,5 @@
 """Gust spectra of the wind over the sea, and the first-order filter that stands for them."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Curves over an angle as short Fourier series, which kernels evaluate without the angle itself."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

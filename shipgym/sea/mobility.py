@@ -1,7 +1,5 @@
 """Inverse inertia: how the forces of wind and waves become accelerations of a model."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats
@@ -11,21 +9,7 @@ from shipgym.ships.inertia import inertia
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.term_table import Structure
 
-#: Rows of :func:`mobility`: acceleration by force, surge u, sway v, yaw r and roll p.
-MOBILITY_ROWS = ("uX", "vY", "vN", "rY", "rN", "pK", "vK", "pY", "pN", "rK")
-
 _AXES = "uvrp"
-_FORCES = "XYNK"
-
-
-def mobility(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Accelerations by unit force and moment, SI units, those that are not always 0: `MOBILITY_ROWS`.
-
-    First surge, the sway-yaw block and roll, then what couples roll to sway and yaw, which only the container
-    ship has. Raises InputError that names what mass and added mass lack.
-    """
-    matrix = mobility_matrix(model, water_depth)
-    return np.array([matrix[_AXES.index(row[0]), _FORCES.index(row[1])] for row in MOBILITY_ROWS])
 
 
 def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
@@ -36,7 +20,7 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     on the depth, m). A structure without an equation of surge keeps its speed, one without sway or yaw does
     not drift or turn: their rows and columns are 0. So is roll where the model has none; a structure with an
     equation of roll, or a ship of the user's that rolls, has that inertia which the roll period and the
-    metacentric height tell.
+    metacentric height tell. Raises InputError that names what mass and added mass lack.
     """
     mass = np.zeros((4, 4))
     mass[:3] = _inertia(model, water_depth)

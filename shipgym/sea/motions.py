@@ -1,7 +1,5 @@
 """First-order heading and roll in waves: closed-form transfer functions, integrated over the spectrum."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +9,7 @@ from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_series, mirrored
-from shipgym.sea.waves import encounter_frequency, frequencies, spread, wave_spectrum
+from shipgym.sea.waves import encounter_frequency, frequencies, over_directions, wave_spectrum
 from shipgym.ships.particulars import Particulars
 
 #: Relative damping of roll of a ship under way, with bilge keels (0.05 to 0.15 in the literature).
@@ -98,7 +96,7 @@ def wave_motion(waves: Waves, particulars: Particulars, speed: float | None = No
     heading = heading_response(omega, quarter[:, None], ship)
     roll = roll_response(omega, quarter[:, None], ship, U)
     heading_variance, roll_variance = (
-        spread(mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves)
+        over_directions(mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves)
         for response in (heading, roll)
     )
     used = {"metacentric_height", "roll_period", "block_coefficient"}

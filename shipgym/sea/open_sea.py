@@ -11,8 +11,6 @@ integrals involving the matrix exponential): their variances do not depend on th
 Forces are Fourier series over an angle, already divided by the ship's inertia.
 """
 
-from __future__ import annotations
-
 from math import fabs, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -343,20 +341,12 @@ def sea_records(windy: bool) -> tuple[Any, Any]:
 
 def sea_functions(windy: bool) -> dict[str, Any]:
     """What takes the place of the functions that loops name for the sea."""
-    if not windy:
-        return {
-            "HAS_SEA": False,
-            "push": Part(no_push),
-            "evolve": Part(still),
-            "begin_sea": Part(begin_calm),
-            "encounter_frequency": Part(no_encounter),
-        }
     return {
-        "HAS_SEA": True,
-        "push": Part(push),
-        "evolve": Part(evolve),
-        "begin_sea": Part(begin_sea, inline=False),
-        "encounter_frequency": Part(encounter_frequency),
+        "HAS_SEA": windy,
+        "push": Part(push if windy else no_push),
+        "evolve": Part(evolve if windy else still),
+        "begin_sea": Part(begin_sea, inline=False) if windy else Part(begin_calm),
+        "encounter_frequency": Part(encounter_frequency if windy else no_encounter),
     }
 
 

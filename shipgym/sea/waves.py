@@ -1,7 +1,5 @@
 """Wave spectra, and the linear filters that stand for first-order motion and slow drift."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -82,7 +80,7 @@ def frequencies(waves: Waves, points: int = 400) -> Floats:
     return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, points)
 
 
-def spread(curve: Floats, waves: Waves) -> Floats:
+def over_directions(curve: Floats, waves: Waves) -> Floats:
     """A curve over :func:`shipgym.sea.harmonics.circle` averaged over the directions of a sea's waves.
 
     The curve is what waves from one direction do (a variance or a mean force, which add up), the average over

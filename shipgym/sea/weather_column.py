@@ -1,7 +1,5 @@
 """The sea as loops read it: what current, wind and waves do to a ship, as numbers of `SeaParameters`."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats

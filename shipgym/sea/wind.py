@@ -1,7 +1,5 @@
 """Wind forces on a ship over the direction of the relative wind."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

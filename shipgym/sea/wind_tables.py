@@ -20,8 +20,8 @@ class Blendermann(NamedTuple):
     # longitudinal resistance in head and in following wind, by frontal area
     CD_l_bow: float
     CD_l_stern: float
-    delta: float  # Cross-force parameter
-    kappa: float  # Rolling-moment factor
+    delta: float  # cross-force parameter
+    kappa: float  # rolling-moment factor
 
 
 #: Blendermann 1994, Parameter identification of wind loads on ships, Journal of Wind Engineering and

@@ -1,7 +1,5 @@
 """The shipped models by name: reference ships, and identified models in `library/`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path

@@ -38,24 +38,14 @@ SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """What a check of a model found.
+    """What a check of a model found."""
 
-    Attributes
-    ----------
-    name : str
-        Of the model.
-    problems : tuple of str
-        What makes it unfit to be simulated or steered, each with a remedy; empty for a sound model.
-    remarks : tuple of str
-        What is unusual, and may be right.
-    asymmetry : float
-        Root mean square of the accelerations' port/starboard difference over twice their own, over states
-        that a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated.
-    """
-
-    name: str
+    name: str  # of the model
+    # what makes it unfit to be simulated or steered, each with a remedy; empty for a sound model
     problems: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what is unusual, and may be right
+    # root mean square of the accelerations' port/starboard difference over twice their own, over states that
+    # a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated
     asymmetry: float
 
     @property
@@ -238,7 +228,7 @@ def _wrong_rudder(model: ShipModel) -> Iterator[str]:
     try:
         turned = [_run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1] for side in (1.0, -1.0)]
     except UnstableModelError:
-        return  # told by the courses
+        return  # the courses say so
     if not turned[0] > turned[1]:
         port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
         yield (
@@ -262,7 +252,7 @@ def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
             "propeller of a single-screw ship explains; identify from trials that begin to both sides"
         )
     if not _steers(model):
-        yield "no rudder turns this model: it is none for an autopilot"
+        yield "no rudder turns this model: an autopilot has nothing to do on it"
     try:
         final = float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1]) / model.particulars["speed"]
     except UnstableModelError:

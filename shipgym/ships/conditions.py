@@ -1,7 +1,5 @@
 """What a simulation happens in: depth of the water, weather, and the seed that the weather follows from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any

@@ -5,8 +5,6 @@ ship, J. Soc. Naval Architects of Japan 150; in the form of the function `contai
 (Fossen 1994). Prime system with L^2 and the instantaneous speed; u' is the total surge speed over U.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, pi, sqrt
 from typing import NamedTuple
 

@@ -20,22 +20,13 @@ CHANNELS = ("u", "v", "r", "delta")
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """Range and ellipsoid of (u, v, r, delta), SI units.
+    """Range and ellipsoid of (u, v, r, delta), SI units."""
 
-    Attributes
-    ----------
-    low, high : array of shape (4,)
-        Range of each channel.
-    centre : array of shape (4,)
-        Centre of the ellipsoid.
-    shape : array of shape (4, 4)
-        Upper triangular W; a state z is inside where |W (z - centre)| <= 1.
-    """
-
+    # shape (4,); range of each channel
     low: Floats
     high: Floats
-    centre: Floats
-    shape: Floats
+    centre: Floats  # shape (4,); centre of the ellipsoid
+    shape: Floats  # shape (4, 4); upper triangular W; a state z is inside where |W (z - centre)| <= 1
 
     @classmethod
     def from_samples(cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Envelope:
@@ -103,5 +94,5 @@ def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats,
         weights *= 1.0 - step
         weights[farthest] += step
     centre = weights @ points
-    spread = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
-    return centre, np.linalg.inv(spread) / d
+    scatter = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
+    return centre, np.linalg.inv(scatter) / d

@@ -5,8 +5,6 @@ A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with t
 ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgym.engine` compiles them.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import math

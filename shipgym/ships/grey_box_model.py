@@ -1,7 +1,5 @@
 """Grey boxes by the name of their reference ship, and reference ships as models of other ships."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ minor rudder. Their equation 11 adds accelerations of two different ships; here 
 are converted back to the target first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property

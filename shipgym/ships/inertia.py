@@ -1,7 +1,5 @@
 """Mass and added mass that belong to a ship's accelerations, so that these can be turned into forces."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats
@@ -65,11 +63,7 @@ def _container(model: ManoeuvringModel) -> Floats:
     c, L = model.coefficients, model.particulars["length"]
     prime = np.zeros((3, 4))
     prime[0, 0] = c["m"] + c["mx"]
-    prime[1, 1], prime[1, 2], prime[1, 3] = (
-        c["m"] + c["my"],
-        c["my"] * c["alpha_y"] * L,
-        -c["my"] * c["ly"] * L,
-    )
+    prime[1, 1], prime[1, 3] = c["m"] + c["my"], -c["my"] * c["ly"] * L
     prime[1, 2] = prime[2, 1] = c["my"] * c["alpha_y"] * L
     prime[2, 2] = (c["Iz"] + c["Jz"]) * L * L
     return _prime_mass(model) * prime

@@ -6,8 +6,6 @@ of scale. `PACKAGE_FORM` chooses the variant of the package shipmmg 0.0.11, whic
 another point and has another law for the wake.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, pi, sqrt
 from typing import NamedTuple
 

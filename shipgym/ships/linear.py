@@ -23,7 +23,7 @@ STEP = 1e-4  # of the finite differences, prime system; the error is its square
 SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed where surge is to be believed
 LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
 LARGEST_SWAY = 0.5  # over service speed, likewise
-AT_REST = 1e-8  # prime acceleration that is none
+AT_REST = 1e-8  # prime acceleration that counts as zero
 # rate that each unknown brings to 0
 BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
@@ -36,7 +36,7 @@ class StraightRunning:
     surge: float
     sway: float
     rudder: float  # the neutral rudder, rad, positive to starboard
-    heel: float = 0.0  # Rad, starboard down; 0 where the model knows no roll
+    heel: float = 0.0  # rad, starboard down; 0 where the model knows no roll
     shaft_speed: float = 0.0  # 1/s; 0 where the model's shaft has no dynamics
     memory: float = 0.0  # yaw acceleration that a table with a memory `q` keeps, rad/s^2
 
@@ -58,7 +58,7 @@ class Nomoto:
     K and T are positive for a ship stable on its course and negative for one that is not.
     """
 
-    K: float  # Gain, 1/s
+    K: float  # gain, 1/s
     # time constants, the larger magnitude first, s; nan where the poles are a complex pair
     T1: float
     T2: float

@@ -1,7 +1,5 @@
 """The equations of motion of one ship with her numbers: what every simulation is made from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any

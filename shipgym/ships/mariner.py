@@ -8,8 +8,6 @@ of the rudder changes its sign, so that a positive rudder turns the ship to star
 terms are inside the coefficients: Y_r is Y_r' - m', X_vr is m', and so on.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 from shipgym.ships.particulars import Particulars

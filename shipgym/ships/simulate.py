@@ -1,7 +1,5 @@
 """Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -4,8 +4,6 @@ Sources: Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SN
 Principles of Naval Architecture III, chapter IX, section 4 (the criterion C).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,19 +19,13 @@ SIDES = {"starboard": 1, "port": -1}
 
 @dataclass(frozen=True)
 class StraightLineStability:
-    """Straight-line stability with the rudder held.
+    """Straight-line stability with the rudder held."""
 
-    Attributes
-    ----------
-    eigenvalues : dict of str to tuple of complex
-        Of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part
-        first. They are the same for a ship alike to both sides.
-    criterion : dict of str to float, or None
-        C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
-        where the particulars do not tell the mass.
-    """
-
+    # of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part first.
+    # They are the same for a ship alike to both sides
     eigenvalues: dict[str, tuple[complex, ...]]
+    # C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
+    # where the particulars do not tell the mass
     criterion: dict[str, float] | None
 
     @property

@@ -5,18 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from typing import Any, TypedDict
+from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table
 
-
-class _Bounds(TypedDict, total=False):
-    above: float
-    at_least: float
-    at_most: float
-
-
-_BOUNDS: dict[str, _Bounds] = {
+_BOUNDS: dict[str, dict[str, Any]] = {
     "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
     "rudder_rate_deg_s": {"above": 0.0},
     "time_constant": {"at_least": 0.0},

@@ -1,7 +1,5 @@
 """The printed structures by name, and those that users register."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ form of the function `tanker` of the MSS toolbox (Fossen 1994). Bis system: per 
 The source's rudder is positive to port; here it is turned.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The function is written from the powers of the terms alone: fixed symbols, numbe
 numbers, so that no name or text of a model file becomes part of a program.
 """
 
-from __future__ import annotations
-
 import hashlib
 import linecache
 from collections import Counter

@@ -1,7 +1,5 @@
 """Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 
@@ -26,17 +24,10 @@ LARGEST_POWER = 9
 
 @dataclass(frozen=True)
 class Term:
-    """A product of integer powers of symbols, in the units of the structure.
+    """A product of integer powers of symbols, in the units of the structure."""
 
-    Attributes
-    ----------
-    name : str
-        As the field writes it: `vvr`, `0u`, `dd`, `|v|r`.
-    powers : tuple of (str, int)
-        Symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative.
-    """
-
-    name: str
+    name: str  # as the field writes it: `vvr`, `0u`, `dd`, `|v|r`
+    # symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative
     powers: tuple[tuple[str, int], ...]
 
     def power(self, *symbols: str) -> int:

@@ -1,7 +1,5 @@
 """Which column of a file holds which channel, in which unit, and where a sample stands in the file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

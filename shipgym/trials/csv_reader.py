@@ -1,7 +1,5 @@
 """Reading numbers from CSV files: fast where the file is sound, exact about the place where it is not."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -30,7 +28,7 @@ class CsvTable:
     header: tuple[str, ...]  # names of the columns, stripped of blanks
     rows: list[str]  # the rows that are not blank
     line_numbers: list[int]  # line of the file on which each row stands; the file begins with line 1
-    delimiter: str  # Comma, semicolon or tab
+    delimiter: str  # comma, semicolon or tab
 
     def place(self, row: int) -> str:
         """Return the place of a row for a message: ``line 12 (data row 11)``."""

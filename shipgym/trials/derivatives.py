@@ -1,7 +1,5 @@
 """Time derivatives of sampled and noisy signals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

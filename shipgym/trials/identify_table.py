@@ -33,7 +33,7 @@ class Option:
     """What is known of an option."""
 
     section: str  # part of the documentation that it belongs to
-    kind: str  # A key of `KINDS`; in Python some options take objects besides
+    kind: str  # a key of `KINDS`; in Python some options take objects besides
     meaning: str  # what it sets, as the help of the command line says it
     # meaning of each value that it may have; empty where there is no fixed set of them
     choices: Mapping[str, str] = field(default_factory=dict)

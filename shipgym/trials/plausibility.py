@@ -1,7 +1,5 @@
 """Values that no ship can have, and channels that contradict each other: most often a wrong unit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -9,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
@@ -91,7 +89,7 @@ def check_consistency(t: Floats, channels: Mapping[str, Floats], frame: str, sou
 
 
 def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
-    turned, expected = (_detrended(t, part) for part in (psi, _integral(t, r)))
+    turned, expected = (_detrended(t, part) for part in (psi, integral(t, r)))
     if max(np.ptp(turned), np.ptp(expected)) < 2.0 * _DEGREE:
         return
     gain, misfit = _fit(np.diff(expected), np.diff(turned))
@@ -114,7 +112,7 @@ def _check_velocity(t: Floats, channels: Mapping[str, Floats], frame: str, sourc
     moved = np.diff(_at_windows(channels["x"] + 1j * channels["y"]))
     velocity = channels["u"] + 1j * channels["v"]
     velocities = {"body": velocity * np.exp(1j * channels["psi"]), "earth": velocity}
-    fits = {name: _fit(np.diff(_at_windows(_integral(t, part))), moved) for name, part in velocities.items()}
+    fits = {name: _fit(np.diff(_at_windows(integral(t, part))), moved) for name, part in velocities.items()}
     gain, misfit = fits.pop(frame)
     ((other, (other_gain, other_misfit)),) = fits.items()
     x, y, u, v = (source.columns[channel].name for channel in ("x", "y", "u", "v"))
@@ -129,11 +127,6 @@ def _check_velocity(t: Floats, channels: Mapping[str, Floats], frame: str, sourc
             f"{head}: the position changes {abs(gain):.3g} times as fast as the velocities say, expected 1; "
             f"likely a wrong unit of '{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
         )
-
-
-def _integral(t: Floats, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    steps = 0.5 * np.diff(t) * (values[1:] + values[:-1])
-    return np.concatenate([np.zeros(1), np.cumsum(steps)])
 
 
 def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:

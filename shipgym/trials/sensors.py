@@ -1,7 +1,5 @@
 """Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType

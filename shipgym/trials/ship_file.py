@@ -40,27 +40,14 @@ class TrialEntry:
 
 @dataclass(frozen=True)
 class ShipFile:
-    """A ship file, read and checked; :meth:`load` makes one.
+    """A ship file, read and checked; :meth:`load` makes one."""
 
-    Attributes
-    ----------
-    path : Path
-        The TOML file.
-    particulars : Particulars
-        As given; ``particulars.completed()`` estimates the rest.
-    steering : SteeringGear or None
-        None where the file has no ``[steering]``.
-    identify : dict
-        Defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`.
-    entries : tuple of TrialEntry
-        The trials, not read yet.
-    """
-
-    path: Path
-    particulars: Particulars
-    steering: SteeringGear | None
+    path: Path  # the TOML file
+    particulars: Particulars  # as given; ``particulars.completed()`` estimates the rest
+    steering: SteeringGear | None  # none where the file has no ``[steering]``
+    # defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`
     identify: dict[str, Any]
-    entries: tuple[TrialEntry, ...]
+    entries: tuple[TrialEntry, ...]  # the trials, not read yet
 
     @classmethod
     def load(cls, path: str | Path) -> ShipFile:

@@ -1,7 +1,5 @@
 """From the columns of a CSV file to channels in SI units with the project's signs, frame and origin."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Channels of a trial and the units in which a file may hold them."""
 
-from __future__ import annotations
-
 import math
 
 from shipgym.checks import did_you_mean, quoted
