@@ -85,8 +85,8 @@ REQUIREMENTS = (
         "R3",
         "The model is identifiable",
         "The regressors of one trial have full rank and no coefficient's interval contains 0, where the "
-        "thesis' four terms of surge and seven of steering drift; collinear terms are named, and the next manoeuvre "
-        "is advised.",
+        "thesis' four terms of surge and seven of steering drift; collinear terms are named, and the next "
+        "manoeuvre is advised.",
         (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_recovered",
          f"{_LSSVM}::test_collinear_terms_are_named",
          "tests/identification/test_experiment.py::test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit"),
