@@ -35,7 +35,7 @@ def load_file(path: Path) -> ModuleType:
     sys.modules[name] = module
     try:
         # compiled here, because Python's own cache takes a file changed within a second for the same
-        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))  # noqa: S102
+        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
     except Exception as error:
         del sys.modules[name]
         line = _line_in(resolved, error)
