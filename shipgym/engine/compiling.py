@@ -54,7 +54,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
 
     tag = fingerprint(loop, parts)
     if numba.config.DISABLE_JIT:
-        return Specialisation(parts, tag, None).copy(loop)
+        return plain(loop, parts)
     from shipgym.engine.disk_cache import DiskCache
 
     copy = Specialisation(parts, tag, numba.njit).copy(loop)
@@ -71,6 +71,11 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
         kept = dispatcher._cache.holds(signature)  # another process may have been first
         _compile(dispatcher, signature, what, quiet=kept)
     return dispatcher
+
+
+def plain(loop: Any, parts: Parts) -> Any:
+    """The same loop in plain Python, for a debugger; without vectors to fill up with lanes that hold no ship."""
+    return Specialisation({**parts, "GROUP": 1}, "plain", None).copy(loop)
 
 
 def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) -> None:

@@ -41,7 +41,8 @@ class Outputs:
         self.flags: NDArray[np.bool_] = np.ndarray((n_flags, num_envs), np.bool_, block, seen + shown)
         start = block.__array_interface__["data"][0]
         self.words = (
-            start + seen, num_envs, n_observed, start, n_outcomes, num_envs, start + seen + shown, n_flags, num_envs,
+            start + seen, num_envs, n_observed, start, n_outcomes, num_envs, start + seen + shown,
+            n_flags, num_envs,
         )  # fmt: skip
 
     def take(self, other: Outputs) -> None:
