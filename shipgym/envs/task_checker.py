@@ -61,7 +61,7 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     """Look for what is wrong with a task.
 
     Its records and functions; compilation; some steps in plain Python, whose errors name the line; some
-    hundred steps of many ships by orders that a beginner gives: rewards, state and observations finite and within
+    hundred steps of many ships by orders of a beginner: rewards, state and observations finite and within
     their bounds; the same results compiled and in plain Python, for one ship and for many.
 
     Parameters
@@ -167,7 +167,7 @@ def _not_finite(engine: Engine) -> Iterator[str]:
     found: set[str] = set()
     for step in range(min(STEPS, engine.task.episode_steps)):
         seen, *_ = engine.step(_orders(engine, step))
-        numbers = {f"State.{name}": engine.read(name) for name in names}
+        numbers: dict[str, NDArray[Any]] = {f"State.{name}": engine.read(name) for name in names}
         numbers |= {name: engine.info(name) for name in engine.task.reward_parts}
         observed = engine.task.observed(engine.model)
         numbers |= {f"Observation.{quantity.path}": seen[:, k] for k, quantity in enumerate(observed)}
