@@ -43,6 +43,7 @@ def fairway(tmp_path):
 
 def test_the_example_is_a_task_of_one_screen_and_sound():
     assert FAIRWAY.count("\n") < 80
+    assert f"```python\n{FAIRWAY}```" in PAGE
     assert str(check_task(ROOT / "examples" / "fairway.py", **SHIP)) == "fairway: sound"
 
 
