@@ -77,7 +77,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
 
 
 def plain(loop: Any, parts: Parts) -> Any:
-    """The same loop in plain Python, for a debugger; without vectors to fill up with lanes that hold no ship."""
+    """The same loop in plain Python, without lanes that hold no ship and fill up vectors."""
     return Specialisation({**parts, "GROUP": 1}, "plain", None).copy(loop)
 
 

@@ -29,8 +29,8 @@ is the task's after the interval, and may define `worst_cost`. A sensor file def
 `measure` and `readings` (`shipgym/instruments/perfect.py` is one); its settings are keywords too.
 
 `step`, `observe`, `reward`, `measure` and `readings` are compiled into a loop over ships: they call functions
-of `math` that the compiler vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose by
-`pick` or a conditional expression. The other functions are called ship by ship and may do what Numba can.
+of `math` that the compiler vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose
+by `pick` or a conditional expression. The other functions are called ship by ship and may do what Numba can.
 """
 
 from __future__ import annotations
