@@ -76,6 +76,11 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     return dispatcher
 
 
+def plain(loop: Any, parts: Parts) -> Any:
+    """The same loop in plain Python, without lanes that hold no ship and fill up vectors."""
+    return Specialisation({**parts, "GROUP": 1}, "plain", None).copy(loop)
+
+
 def plain_python() -> bool:
     """Whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
     import numba
