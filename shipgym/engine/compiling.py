@@ -45,11 +45,11 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     InputError
         If a part does not compile, naming its function, the line and Numba's reason.
     """
+    tag = fingerprint(loop, parts)
+    if plain_python():
+        return Specialisation(parts, tag, None).copy(loop)
     import numba
 
-    tag = fingerprint(loop, parts)
-    if numba.config.DISABLE_JIT:
-        return Specialisation(parts, tag, None).copy(loop)
     from shipgym.engine.disk_cache import DiskCache
     from shipgym.engine.lean_numba import LeanCompiler, without_scipy
 
@@ -70,6 +70,13 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
             _announce(what, folder)
         _compile(dispatcher, signature, what)
     return dispatcher
+
+
+def plain_python() -> bool:
+    """Whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
+    import numba
+
+    return bool(numba.config.DISABLE_JIT)
 
 
 def _compile(dispatcher: Any, signature: str, what: str) -> None:
