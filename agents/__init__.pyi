@@ -17,16 +17,13 @@ from .controllers.pid import PID as PID
 from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
 from .controllers.robustness import MarginUncertainty as MarginUncertainty
-from .controllers.robustness import margin_spread as margin_spread
 from .controllers.robustness import margin_uncertainty as margin_uncertainty
 from .controllers.scheduled_lq import ScheduledLQ as ScheduledLQ
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .policies.shield import Shielded as Shielded
 from .policies.shield import interventions as interventions
 from .rollouts.course_keeping import Episodes as Episodes
-from .rollouts.course_keeping import Flights as Flights
 from .rollouts.course_keeping import StepResponses as StepResponses
-from .rollouts.course_keeping import fly as fly
 from .rollouts.course_keeping import sail as sail
 from .rollouts.course_keeping import step_response as step_response
 from .rollouts.rollout import Rollout as Rollout

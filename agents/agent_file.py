@@ -64,10 +64,7 @@ def list_pretrained() -> list[str]:
 def find_agent(name: str | Path) -> Path:
     """The file of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
 
-    Raises
-    ------
-    InputError
-        If it is neither, with the nearest pretrained name.
+    Raises InputError if it is neither, with the nearest pretrained name.
     """
     given = Path(name)
     if given.suffix == ".json" or given.is_file():

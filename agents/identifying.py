@@ -16,28 +16,15 @@ from shipgym.trials.identify_table import check_options
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
-RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it tells the structure
+RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it implies the structure
 MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
 
 
 def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of `identify`: those given, else the ship file's; the others are left to their defaults.
 
-    Parameters
-    ----------
-    ship : ShipFile
-        Files that it names are found from its folder.
-    given : mapping
-        By option; None for those that were not given.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        For an option that does not exist or has a value of another kind.
+    `ship`: files that it names are found from its folder; `given`: by option; None for those that were not
+    given. Raises InputError for an option that does not exist or has a value of another kind.
     """
     own = dict(ship.identify)
     for option in MODELS:
@@ -64,16 +51,7 @@ def trials_of(ship: ShipFile, settings: Mapping[str, Any]) -> tuple[list[Trial],
 def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> IdentificationResult:
     """`identify` on a ship file, which its errors name.
 
-    Parameters
-    ----------
-    ship : ShipFile
-        Its trials are read.
-    settings : mapping
-        From `identification_settings`.
-
-    Returns
-    -------
-    IdentificationResult
+    `ship`: its trials are read; `settings`: from `identification_settings`.
     """
     trials, arguments = trials_of(ship, settings)
     return identify_trials(ship, trials, arguments)
@@ -90,18 +68,8 @@ def identify_trials(
 def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | None) -> Comparison:
     """`compare_methods` on a ship file.
 
-    Parameters
-    ----------
-    ship : ShipFile
-        Its trials are read.
-    settings : mapping
-        From `identification_settings`; their method does not count.
-    methods : str or None
-        Names with commas between, "all", or None for the usual ones.
-
-    Returns
-    -------
-    Comparison
+    `ship`: its trials are read; `settings`: from `identification_settings`; their method does not count;
+    `methods`: names with commas between, "all", or None for the usual ones.
     """
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)

@@ -1,4 +1,4 @@
-"""Folders of results: written whole or not at all, and never over somebody else's files."""
+"""Folders of results: written whole or not at all, and never over files that are not results."""
 
 from __future__ import annotations
 
@@ -15,12 +15,8 @@ from shipgym.errors import InputError
 def check_folder(folder: Path, names: Collection[str]) -> None:
     """Refuse a folder that results cannot be written to, or that holds anything but the files `names`.
 
-    A folder with only these is replaced as a whole; it need not exist.
-
-    Raises
-    ------
-    InputError
-        If it is a file, holds anything else, or cannot be written.
+    A folder with only these is replaced as a whole; it need not exist. Raises InputError if it is a file,
+    holds anything else, or cannot be written.
     """
     target = folder.absolute()
     if target.is_symlink() or (target.exists() and not target.is_dir()):
@@ -46,10 +42,7 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 def check_page(path: Path) -> None:
     """Refuse a file for a page: one that does not end in .html, a folder, or one that cannot be written.
 
-    Raises
-    ------
-    InputError
-        Naming the file.
+    Raises InputError naming the file.
     """
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
@@ -64,22 +57,9 @@ def check_page(path: Path) -> None:
 def whole_folder(folder: Path, names: Collection[str]) -> Iterator[Path]:
     """A temporary folder beside `folder` that takes its place when the block ends without an error.
 
-    Parameters
-    ----------
-    folder : Path
-        Where the results shall go.
-    names : collection of str
-        As in `check_folder`.
-
-    Yields
-    ------
-    Path
-        The folder to write to. After an error or an interruption nothing of it is left.
-
-    Raises
-    ------
-    InputError
-        As `check_folder`, or if the folder cannot be written.
+    `folder`: where the results shall go; `names`: as in `check_folder`. Yields the folder to write to. After
+    an error or an interruption nothing of it is left. Raises InputError as `check_folder`, or if the folder
+    cannot be written.
     """
     check_folder(folder, names)
     target = folder.absolute()

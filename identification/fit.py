@@ -17,43 +17,24 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """An identified model and how it came about.
+    """An identified model and how it came about."""
 
-    Attributes
-    ----------
-    model : ShipModel
-        With covariance, envelope and provenance.
-    stable : bool
-        Whether the model passed every simulation of the guard and sails every recorded trial, those held out
-        too; if not, its predictions are not to be used. Its file says the same.
-    metrics : dict
-        For each trial by its name the errors of the open-loop prediction and the manoeuvre's indices.
-    diagnostics : dict of str to EquationDiagnostics
-        Of each equation: those of `u`, `v`, `r` that the structure has.
-    predictions : dict of str to Trial or None
-        The open-loop predictions by trial; None where the model ran away.
-    trials : tuple of Trial
-        Those predicted, as they were given, marked "fit" or "validate".
-    samples : Samples
-        The regression.
-    estimators : dict of str to Estimator
-        Fitted to it, by equation.
-    settings : dict
-        The arguments that `identify` was called with, defaults among them, as JSON knows them.
-    searches : dict of str to SearchResult
-        How the settings of each equation were found, for methods that search: log10 C, or
-        the insensitive band of RM-SVM.
-    """
-
-    model: ShipModel
+    model: ShipModel  # with covariance, envelope and provenance
+    #: whether the model passed every simulation of the guard and sails every recorded trial, those held
+    #: out too; if not, its predictions are not to be used. Its file says the same
     stable: bool
+    #: for each trial by its name the errors of the open-loop prediction and the manoeuvre's indices
     metrics: dict[str, Any]
+    #: of each equation: those of `u`, `v`, `r` that the structure has
     diagnostics: dict[str, EquationDiagnostics]
-    predictions: dict[str, Trial | None]
-    trials: tuple[Trial, ...]
-    samples: Samples
-    estimators: dict[str, Estimator]
+    predictions: dict[str, Trial | None]  # the open-loop predictions by trial; None where the model ran away
+    trials: tuple[Trial, ...]  # those predicted, as they were given, marked "fit" or "validate"
+    samples: Samples  # the regression
+    estimators: dict[str, Estimator]  # fitted to it, by equation
+    #: the arguments that `identify` was called with, defaults among them, as JSON knows them
     settings: dict[str, Any]
+    #: how the settings of each equation were found, for methods that search: log10 C, or the insensitive
+    #: band of RM-SVM
     searches: dict[str, SearchResult] = field(default_factory=dict)
 
     @property

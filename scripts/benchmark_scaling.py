@@ -58,7 +58,7 @@ def monte_carlo_table() -> None:
     ship = load_model("mariner-tls-svm")
     pilots = [PID.from_model(ship), LQ.from_model(ship)]
     monte_carlo(pilots, ship, 25)  # compiles
-    head("Monte Carlo over the posterior")
+    head("Monte Carlo over the estimated covariance")
     for draws in (100, 400, 1600):
         for workers in WORKERS:
             where = JobEngine(workers=workers)

@@ -140,7 +140,7 @@ def run_oracle(
     seeds: ArrayLike,
     start: Policy | None = None,
     settings: OracleSettings | None = None,
-    variety: Randomisation | None = None,
+    randomisation: Randomisation | None = None,
 ) -> OracleRun:
     """Steer episodes as well as sampling on the true ship can.
 
@@ -156,7 +156,7 @@ def run_oracle(
         What each plan begins with; by default `LQ.from_model(model)`.
     settings : OracleSettings, optional
         How hard is searched.
-    variety : Randomisation, optional
+    randomisation : Randomisation, optional
         What differs from episode to episode beside the task's own.
 
     Returns
@@ -176,7 +176,9 @@ def run_oracle(
     feedback = _feedback(start, model, task)
     groups = np.split(numbers, range(asked.group, len(numbers), asked.group))
     runs = [
-        _Search(Engine(model, len(one), task, variety), one, feedback, asked, variety).run(start or feedback)
+        _Search(Engine(model, len(one), task, randomisation), one, feedback, asked, randomisation).run(
+            start or feedback
+        )
         for one in groups
     ]
     joined = (np.concatenate([getattr(one, item.name) for one in runs]) for item in fields(OracleRun))
@@ -240,9 +242,9 @@ class _Search:
 
     def __init__(
         self, engine: Engine, seeds: NDArray[Any], feedback: Controller, settings: OracleSettings,
-        variety: Randomisation | None,
+        randomisation: Randomisation | None,
     ) -> None:  # fmt: skip
-        self.task, self.seeds, self.settings, self.variety = engine.task, seeds, settings, variety
+        self.task, self.seeds, self.settings, self.randomisation = engine.task, seeds, settings, randomisation
         self.n = len(seeds)
         self.ships = _Ships(engine, feedback)
         self._sizes: dict[int, _Ships] = {}
@@ -381,7 +383,9 @@ class _Search:
         """Ships for the candidates of so many episodes."""
         if episodes not in self._sizes:
             own, n = self.ships.engine, episodes * self.settings.candidates
-            self._sizes[episodes] = _Ships(Engine(own.model, n, self.task, self.variety), self.ships.feedback)
+            self._sizes[episodes] = _Ships(
+                Engine(own.model, n, self.task, self.randomisation), self.ships.feedback
+            )
         return self._sizes[episodes]
 
 

@@ -25,7 +25,7 @@ import shipgym
 from shipgym.envs.registration import TASKS, VARIANTS
 
 ROWS = 256
-CHECK_EVERY = 50  # steps between looks at infos and states
+CHECK_EVERY = 50  # steps between checks of infos and states
 WARM = 20  # steps after which memory must not grow
 MOST_GROWTH = 50.0  # MiB
 KINDS = ("random", "extreme", "adversarial")

@@ -24,12 +24,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from direct_search import tune
 from numpy.typing import NDArray
 from real_ships.data import Data
 from real_ships.recipe import fitted
 
 from agents.agent_file import load_agent
-from agents.benchmarking.direct_search import tune
 from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
 from agents.cli.terminal import progress_bars
 from agents.controllers.controller import Controller, Policy
@@ -85,7 +85,7 @@ class TransferCase:
         """The task in which a learner learns."""
         if learner == REFERENCE:
             return self.task
-        uncertain = {"model_uncertainty": "posterior"} if learner == COVARIANCE else {}
+        uncertain = {"model_uncertainty": "covariance"} if learner == COVARIANCE else {}
         options = {**self.task.options, **uncertain}
         name = f"{self.task.name}-{learner}"
         return BenchmarkTask(name, self.task.environment, self.identified, self.task.why, options)

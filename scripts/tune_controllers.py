@@ -14,7 +14,8 @@ import time
 from dataclasses import asdict
 from typing import Any
 
-from agents.benchmarking.direct_search import EPISODES, EVALUATIONS, FIRST_SEED, tunable, tune
+from direct_search import EPISODES, EVALUATIONS, FIRST_SEED, tunable, tune
+
 from agents.controllers.designs import CLASSICAL
 from agents.suites.reference import load_tuned
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file

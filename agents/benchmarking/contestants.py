@@ -45,18 +45,11 @@ ORACLE = "oracle"
 
 @dataclass(frozen=True, eq=False)
 class Contestant:
-    """One who takes part.
+    """One who takes part."""
 
-    Attributes
-    ----------
-    name : str
-        In tables and files.
-    source : str, Policy, callable, or sequence of them
-        A text as in the module's docstring; a controller; a factory, given a `BenchmarkTask`; or several,
-        each a training run.
-    """
-
-    name: str
+    name: str  # in tables and files
+    #: a text as in the module's docstring; a controller; a factory, given a `BenchmarkTask`; or several,
+    #: each a training run
     source: Any
 
     @property
@@ -67,10 +60,7 @@ class Contestant:
     def policies(self, task: BenchmarkTask, suite: str) -> tuple[Policy, ...]:
         """Its controllers for a task, one for each training run.
 
-        Raises
-        ------
-        InputError
-            If it cannot be made for this task, or was made for other observations.
+        Raises InputError if it cannot be made for this task, or was made for other observations.
         """
         made = tuple(_made(self.source, task, suite))
         for policy in made:
@@ -87,10 +77,7 @@ class Contestant:
 def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     """Refuse, before anything is run, files of agents that cannot be read, or fit none of the tasks.
 
-    Raises
-    ------
-    InputError
-        Naming the file and what is wrong with it.
+    Raises InputError naming the file and what is wrong with it.
     """
     if not one.is_text or _is_factory(one.source):
         return
@@ -109,16 +96,8 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
 def contestants(given: Any) -> tuple[Contestant, ...]:
     """Contestants from what a user gave.
 
-    Parameters
-    ----------
-    given : str, sequence, or mapping of str
-        Texts (several in one are separated by commas), contestants, controllers with a `name`; or any
-        source by name.
-
-    Raises
-    ------
-    InputError
-        For an unknown one, with the nearest known; or two of one name.
+    `given`: texts (several in one are separated by commas), contestants, controllers with a `name`; or any
+    source by name. Raises InputError for an unknown one, with the nearest known; or two of one name.
     """
     if isinstance(given, Mapping):
         found = [_named(str(name), source) for name, source in given.items()]
@@ -267,10 +246,7 @@ def _policy(source: Any, task: BenchmarkTask) -> Policy:
 def file_hash(path: str | Path) -> str:
     """SHA-256 of a file.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read.
+    Raises InputError if it cannot be read.
     """
     try:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()

@@ -24,12 +24,7 @@ COUNTS = ("interventions",)
 def joined(
     parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]],
 ) -> Columns:
-    """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN.
-
-    Parameters
-    ----------
-    parts : sequence of (contestant, task, run, seeds, figures)
-    """
+    """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN."""
     names = list(dict.fromkeys(name for *_, figures in parts for name in figures))
     counts = [len(seeds) for *_, seeds, _ in parts]
     columns: Columns = {
@@ -48,10 +43,7 @@ def joined(
 def check_library() -> None:
     """Refuse to go on without pyarrow.
 
-    Raises
-    ------
-    InputError
-        Saying how it is installed.
+    Raises InputError saying how it is installed.
     """
     _arrow()
 
@@ -59,10 +51,7 @@ def check_library() -> None:
 def write_episodes(columns: Columns, path: Path) -> None:
     """Write a table as Parquet, to a temporary name and then renamed.
 
-    Raises
-    ------
-    InputError
-        If it cannot be written.
+    Raises InputError if it cannot be written.
     """
     arrow, parquet = _arrow()
     arrays = {name: _array(arrow, name, values) for name, values in columns.items()}
@@ -73,10 +62,7 @@ def write_episodes(columns: Columns, path: Path) -> None:
 def read_episodes(path: Path) -> Columns:
     """Read what `write_episodes` wrote; figures as float64, null as NaN.
 
-    Raises
-    ------
-    InputError
-        If it is missing or no such file.
+    Raises InputError if it is missing or no such file.
     """
     arrow, parquet = _arrow()
     try:

@@ -64,7 +64,7 @@ def hardest_of(result: BenchmarkResult, task: str) -> int:
 def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str, list[EpisodeId]]]:
     """What may be replayed of a task: for whom, and the episodes to lay over each other, the first chosen.
 
-    At first all contestants in the hardest episode, for nobody in particular; then the worst episodes of
+    At first all contestants in the hardest episode, of the task as a whole; then the worst episodes of
     each, beside the task's best contestant in the same.
     """
     who, seed = contestants_of(result, task), hardest_of(result, task)
@@ -80,11 +80,7 @@ def entries_of(result: BenchmarkResult, task: str, count: int) -> list[tuple[str
 def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeId]]:
     """How many of the worst episodes of each contestant a page has room for, and all that it shows.
 
-    Parameters
-    ----------
-    result : BenchmarkResult
-    wanted : int
-        Fewer are taken if together they are too many; at least one.
+    `wanted`: fewer are taken if together they are too many; at least one.
     """
     for count in range(wanted, 0, -1):
         entries = [entry for task in result.tasks for entry in entries_of(result, task, count)]
@@ -97,13 +93,9 @@ def replayable(result: BenchmarkResult, wanted: int) -> tuple[int, list[EpisodeI
 def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, Any]:
     """All that the page's script needs to replay episodes, ready for JSON.
 
-    Returns
-    -------
-    dict
-        page : the player, with a mark where its runs go.
-        quantities : what it shows over time.
-        runs : short forms of them (`short`).
-        entries : what may be chosen, by task: for whom, seed, cost, outcome and numbers of the runs.
+    Returns `page`, the player, with a mark where its runs go; `quantities`, what it shows over time; `runs`,
+    in their short form (`short`); `entries`, what may be chosen, by task: for whom, seed, cost, outcome and
+    numbers of the runs.
     """
     kept: dict[EpisodeId, int] = {}
     runs: list[dict[str, Any]] = []

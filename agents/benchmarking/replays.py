@@ -33,21 +33,12 @@ class EpisodeId(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Rerun:
-    """Episodes that were run once more.
+    """Episodes that were run once more."""
 
-    Attributes
-    ----------
-    episodes : dict of EpisodeId to Episode
-        Those that could be; one whose controller failed at once has no step and is not among them.
-    refused : dict of (contestant, task) to str
-        Why others could not.
-    different : tuple of EpisodeId
-        Whose cost is not the one in the results.
-    """
-
+    #: those that could be; one whose controller failed at once has no step and is not among them
     episodes: dict[EpisodeId, Episode] = field(default_factory=dict)
-    refused: dict[tuple[str, str], str] = field(default_factory=dict)
-    different: tuple[EpisodeId, ...] = ()
+    refused: dict[tuple[str, str], str] = field(default_factory=dict)  # why others could not
+    different: tuple[EpisodeId, ...] = ()  # whose cost is not the one in the results
 
 
 def rerun(
@@ -59,21 +50,10 @@ def rerun(
 ) -> Rerun:
     """Run episodes of a benchmark again, from their seeds.
 
-    Parameters
-    ----------
-    result : BenchmarkResult
-        Whose contestants and tasks they are of.
-    episodes : sequence of EpisodeId
-    controllers : optional
-        As `benchmark` was given them. Contestants that were given as objects are known from here only.
-    workers : int or None
-        Processes; None for as many as there are cores. Objects steer in this process.
-    progress : callable, optional
-        Told what is done, how many of it, and the total.
-
-    Returns
-    -------
-    Rerun
+    `result`: whose contestants and tasks they are of. `controllers`: as `benchmark` was given them.
+    Contestants that were given as objects are known from here only. `workers`: processes; None for as many as
+    there are cores. Objects steer in this process. `progress`: told what is done, how many of it, and the
+    total.
     """
     given = {} if controllers is None else {one.name: one for one in contestants(controllers)}
     wanted: dict[tuple[str, str], dict[int, list[int]]] = {}

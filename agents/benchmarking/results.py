@@ -129,10 +129,7 @@ class BenchmarkResult:
 def check_new(folder: Path, resume: bool) -> Path:
     """Refuse a folder that cannot take results, or that holds some and is not to be gone on with.
 
-    Raises
-    ------
-    InputError
-        Saying what to do.
+    Raises InputError saying what to do.
     """
     check_library()
     if not folder.exists():
@@ -155,17 +152,8 @@ def gathered(
 ) -> BenchmarkResult:
     """Put together what was done.
 
-    Parameters
-    ----------
-    suite : str
-        Its name.
-    tasks : sequence of BenchmarkTask
-        Those that were run.
-    who : sequence of Contestant
-    done : dict of (contestant, task) to dict
-        See `agents.benchmarking.run.results_of`.
-    episodes : int
-        Number of episodes of each task.
+    `suite`: its name; `tasks`: those that were run; `done`: see `agents.benchmarking.run.results_of`;
+    `episodes`: number of episodes of each task.
     """
     seeds = FIRST_SEED + np.arange(episodes)
     table = joined(

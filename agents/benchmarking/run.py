@@ -116,12 +116,8 @@ def run_job(job: dict[str, Any]) -> dict[str, Any]:
 def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
     """Run one task with every training run of one contestant.
 
-    Returns
-    -------
-    dict
-        refused : why it cannot take part in this task, else empty.
-        runs : for each training run its `episodes` (arrays by name), `failure`, `seconds_per_action` and
-            `policy_sha256`.
+    Returns `refused`, why it cannot take part in this task, else empty, and `runs`, for each training run its
+    `episodes` (arrays by name), `failure`, `seconds_per_action` and `policy_sha256`.
     """
     try:
         if one.source == ORACLE:

@@ -110,15 +110,8 @@ def interquartile_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> 
 def weighted_interquartile_mean(values: Floats, weights: NDArray[np.int64]) -> Floats:
     """Interquartile means of samples given by how often they hold each value.
 
-    Parameters
-    ----------
-    values : array of shape (n,)
-    weights : int array of shape (n_samples, n)
-        Each row of the same sum.
-
-    Returns
-    -------
-    array of shape (n_samples,)
+    `values`: shape (n,); `weights`: each row of the same sum, shape (n_samples, n). Returns an array of shape
+    (n_samples,).
     """
     order = np.argsort(values, kind="stable")
     upper = np.cumsum(weights[:, order], axis=1)
@@ -151,15 +144,8 @@ def aggregate_score(
 ) -> Interval:
     """Interquartile mean of the scores of all runs and tasks.
 
-    Parameters
-    ----------
-    costs : sequence of array of shape (n_runs, n_episodes)
-        Of each task.
-    references : sequence of tuple
-        Costs of the best constant-gain PID and of the oracle in each task.
-    draws : Draws
-    tasks : sequence of int
-    who : int
+    `costs`: of each task, shape (n_runs, n_episodes); `references`: costs of the best constant-gain PID and
+    of the oracle in each task.
     """
     found, drawn = [], []
     for task, cost, (pid, oracle) in zip(tasks, costs, references, strict=True):
@@ -174,13 +160,8 @@ def improvement(
 ) -> Interval:
     """Probability that a run of one costs less than a run of the other in the same episode; ties count half.
 
-    Parameters
-    ----------
-    one, other : dict of int to array of shape (n_runs, n_episodes)
-        Costs by task; the mean over the tasks that both took part in is taken.
-    draws : Draws
-    who : tuple of int
-        Of both.
+    `one`, `other`: costs by task; the mean over the tasks that both took part in is taken, shape (n_runs,
+    n_episodes); `who`: of both.
     """
     common = sorted(set(one) & set(other))
     if not common:

@@ -34,14 +34,8 @@ NOTHING: dict[str, float | None] = {"value": None, "low": None, "high": None}
 def summary_of(suite: str, tasks: Sequence[str], names: Sequence[str], done: Done) -> dict[str, Any]:
     """The fields `tasks`, `reference`, `ranking`, `improvement` and `profile` of the results.
 
-    Parameters
-    ----------
-    suite : str
-        Its name.
-    tasks, names : sequence of str
-        Of the tasks that were run, and of the contestants.
-    done : dict of (contestant, task) to dict
-        See `agents.benchmarking.run.results_of`.
+    `suite`: its name; `tasks`, `names`: of the tasks that were run, and of the contestants; `done`: see
+    `agents.benchmarking.run.results_of`.
     """
     return _Summary(suite, tasks, names, done).fields()
 

@@ -25,31 +25,16 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True)
 class Check:
-    """One contestant and task, all episodes and training runs of it run again.
-
-    Attributes
-    ----------
-    contestant, task : str
-        Which.
-    episodes : int
-        How many were compared.
-    difference : float
-        Largest relative difference of an episode's cost; 0 if all figures are the same bit for bit.
-    exact : bool
-        Whether they are.
-    allowed : float
-        Difference up to which it passes.
-    note : str
-        What is wrong, or why a difference is allowed.
-    """
+    """One contestant and task, all episodes and training runs of it run again."""
 
     contestant: str
     task: str
-    episodes: int
+    episodes: int  # how many were compared
+    #: largest relative difference of an episode's cost; 0 if all figures are the same bit for bit
     difference: float
-    exact: bool
-    allowed: float
-    note: str
+    exact: bool  # whether they are
+    allowed: float  # difference up to which it passes
+    note: str  # what is wrong, or why a difference is allowed
 
     @property
     def passed(self) -> bool:
@@ -72,29 +57,12 @@ def verify(
 ) -> list[Check]:
     """Run a sample of a benchmark again and compare.
 
-    Parameters
-    ----------
-    path : str or Path
-        Folder of the results, or their `results.json`.
-    sample : int
-        Pairs of a contestant and a task; all their episodes are run, at most all pairs there are.
-    seed : int
-        Of the sample.
-    tolerance : float, optional
-        Largest relative difference of an episode's cost. By default 0, and 1e-6 for a learned policy or
-        where processor or versions differ from those the file was written with.
-    workers : int or None
-        As in `benchmark`.
-
-    Returns
-    -------
-    list of Check
-
-    Raises
-    ------
-    InputError
-        If the files are broken, written on another suite of the name, or hold nothing that can be run
-        again: contestants that were given as objects.
+    `path`: folder of the results, or their `results.json`. `sample`: pairs of a contestant and a task; all
+    their episodes are run, at most all pairs there are. `seed`: of the sample. `tolerance`: largest relative
+    difference of an episode's cost. By default 0, and 1e-6 for a learned policy or where processor or
+    versions differ from those the file was written with. `workers`: as in `benchmark`. Raises InputError if
+    the files are broken, written on another suite of the name, or hold nothing that can be run again:
+    contestants that were given as objects.
     """
     result = load_results(path)
     check_whole(sample, "sample", at_least=1)

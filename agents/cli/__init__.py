@@ -7,15 +7,25 @@ standard error and nothing written; 130 interrupted.
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import FAILED, Address, EngineName, Json, ShipFileArgument, Workers, answered, fail
+from agents.cli.command import (
+    FAILED,
+    Address,
+    EngineName,
+    IdentifyCommand,
+    IdentifyOptions,
+    Json,
+    ShipFileArgument,
+    Workers,
+    answered,
+    fail,
+)
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
-from agents.cli.identify_options import takes_identify_options
 from agents.cli.reproduction import reproduce_command
 from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
@@ -51,9 +61,9 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
-app.command("identify")(identify_command)
-app.command("advise")(advise_command)
-app.command("reduce")(reduce_command)
+app.command("identify", cls=IdentifyCommand)(identify_command)
+app.command("advise", cls=IdentifyCommand)(advise_command)
+app.command("reduce", cls=IdentifyCommand)(reduce_command)
 app.command("export")(export_command)
 app.command("train")(train_command)
 app.command("tune")(tune_command)
@@ -125,16 +135,15 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
         console.print(f"\nwritten: {page}", soft_wrap=True)
 
 
-@app.command("autopilot")
+@app.command("autopilot", cls=IdentifyCommand)
 @answered
-@takes_identify_options
 def autopilot_command(
     ship: ShipFileArgument,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
     draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
     seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes.")] = 0,
     *,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     agents: Annotated[
         list[str] | None,
         typer.Option(

@@ -6,9 +6,10 @@ import functools
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, ParamSpec
+from typing import Annotated, Any, ParamSpec
 
 import typer
+from typer.core import TyperCommand
 
 P = ParamSpec("P")
 
@@ -37,6 +38,7 @@ Workers = Annotated[int, typer.Option(min=1, help="Jobs done at once; the result
 Address = Annotated[
     str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this computer.")
 ]
+IdentifyOptions = Annotated[dict[str, Any], typer.Option(parser=dict, hidden=True)]  # see IdentifyCommand
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
 
 
@@ -69,3 +71,15 @@ def fail(message: str, code: int) -> None:
 
     tell(message)
     raise typer.Exit(code) from None
+
+
+class IdentifyCommand(TyperCommand):
+    """A command that takes the options of `identify`, which are read, with numpy, only when it is called."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> Any:
+        """The context of the same command with these options in place of its parameter `options`."""
+        from agents.cli.identify_options import takes_identify_options
+
+        app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+        app.command(self.name)(takes_identify_options(self.callback.__wrapped__))  # type: ignore[union-attr]
+        return typer.main.get_command(app).make_context(*args, **kwargs)

@@ -1,4 +1,4 @@
-"""What `shipgym doctor` looks at: versions, the cache of compiled ships, optional packages, names."""
+"""What `shipgym doctor` checks: versions, the cache of compiled ships, optional packages, names."""
 
 from __future__ import annotations
 
@@ -32,20 +32,13 @@ OURS = ("shipgym", "identification", "agents")
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing looked at.
-
-    Attributes
-    ----------
-    what : str
-    state : {"fine", "absent", "wrong"}
-        "absent": an option that is not installed; "wrong": something does not work.
-    detail : str
-        What was found and, where needed, what to do.
-    """
+    """The result of one check."""
 
     what: str
+    #: "fine", "absent", "wrong": "absent": an option that is not installed; "wrong": something does not
+    #: work
     state: str
-    detail: str
+    detail: str  # what was found and, where needed, what to do
 
     def to_dict(self) -> dict[str, str]:
         """Plain values, ready for JSON."""

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from agents.cli.command import (
-    FAILED,
-    Json,
-    ShipFileArgument,
-    answered,
-    fail,
-)
-from agents.cli.identify_options import takes_identify_options
+from agents.cli.command import FAILED, IdentifyOptions, Json, ShipFileArgument, answered, fail
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -24,12 +17,11 @@ Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the result
 
 
 @answered
-@takes_identify_options
 def identify_command(
     ship: ShipFileArgument,
     out: Out,
     *,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     compare: Annotated[
         bool, typer.Option("--compare", help="Fit several methods and rank them on the trials held out.")
     ] = False,
@@ -124,7 +116,6 @@ def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str |
 
 
 @answered
-@takes_identify_options
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
@@ -135,7 +126,7 @@ def advise_command(
     ] = None,
     number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
     *,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     as_json: Json = False,
 ) -> None:
     """Show how much the trials say about each coefficient, and which manoeuvres to run next.
@@ -162,7 +153,6 @@ def advise_command(
 
 
 @answered
-@takes_identify_options
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
@@ -173,7 +163,7 @@ def reduce_command(
         float, typer.Option(min=0.0, help="By how much the R2 of stretches held out may fall.")
     ] = 1e-3,
     *,
-    options: dict[str, Any],
+    options: IdentifyOptions,
     as_json: Json = False,
 ) -> None:
     """Drop the terms that the trials do not need, and identify with those that are left.

@@ -85,10 +85,7 @@ def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, A
 def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
     """Options written as on the command line, `name=value` with a value as in the ship file.
 
-    Raises
-    ------
-    InputError
-        For one that is not, or has no such name.
+    Raises InputError for one that is not, or has no such name.
     """
     found: dict[str, Any] = {}
     for text in texts:
@@ -100,7 +97,7 @@ def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
 
 
 def _value(text: str) -> Any:
-    """A value of TOML; what is none is a text without quotes."""
+    """A value of TOML; anything else is a text without quotes."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:

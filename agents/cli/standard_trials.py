@@ -20,33 +20,16 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class StandardTrials:
-    """Standard manoeuvres of a model, and of models drawn from its covariance.
+    """Standard manoeuvres of a model, and of models drawn from its covariance."""
 
-    Attributes
-    ----------
-    families : dict of str to dict of str to Manoeuvre
-        The manoeuvres by family and name.
-    sailed : dict of str to Trial or Spiral
-        By manoeuvre, as simulated with the model itself.
-    indices : dict of str to dict of str to IndexInterval
-        By manoeuvre and index, units in the names.
-    criteria : dict of str to Criterion
-        The criteria of IMO resolution MSC.137(76); none in shallow water, which they are not made for.
-    refused : dict of str to str
-        Why a manoeuvre could not be sailed.
-    draws : int
-        Models drawn.
-    water_depth : float
-        m.
-    """
-
-    families: dict[str, dict[str, Manoeuvre]]
-    sailed: dict[str, Trial | Spiral]
-    indices: dict[str, dict[str, IndexInterval]]
+    families: dict[str, dict[str, Manoeuvre]]  # the manoeuvres by family and name
+    sailed: dict[str, Trial | Spiral]  # by manoeuvre, as simulated with the model itself
+    indices: dict[str, dict[str, IndexInterval]]  # by manoeuvre and index, units in the names
+    #: the criteria of IMO resolution MSC.137(76); none in shallow water, which they are not made for
     criteria: dict[str, Criterion]
-    refused: dict[str, str]
-    draws: int
-    water_depth: float = np.inf
+    refused: dict[str, str]  # why a manoeuvre could not be sailed
+    draws: int  # models drawn
+    water_depth: float = np.inf  # m
 
     @property
     def water(self) -> str:
@@ -76,25 +59,10 @@ def standard_trials(
 ) -> StandardTrials:
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    draws : int
-        Models drawn from its covariance; a ship without one has none.
-    seed : int
-        Of the draws.
-    progress : callable, optional
-        Told the number of draws done.
-    water_depth : float
-        m, for ships that know shallow water.
-
-    Raises
-    ------
-    InputError
-        For water that is too shallow, or shallow water in a ship that knows none.
-    UnstableModelError
-        If the ship itself runs away.
+    `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the
+    draws; `progress`: told the number of draws done; `water_depth`: m, for ships that know shallow water.
+    Raises InputError for water that is too shallow, or shallow water in a ship that knows none;
+    UnstableModelError if the ship itself runs away.
     """
     families = families_of(model, water_depth)
     manoeuvres = {name: one for family in families.values() for name, one in family.items()}

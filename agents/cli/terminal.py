@@ -58,15 +58,7 @@ def fail(message: str) -> None:
 def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage.
 
-    Parameters
-    ----------
-    shown : bool
-        Whether to show any.
-
-    Yields
-    ------
-    callable or None
-        To be told stage, units done and total.
+    Yields a function to be told the stage, units done and total; None where nothing is `shown`.
     """
     if not shown or not err.is_terminal:
         yield None
@@ -89,15 +81,7 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
 def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | None]:
     """A bar of a training on standard error, or a line for each evaluation where that is no terminal.
 
-    Parameters
-    ----------
-    shown : bool
-        Whether to show anything.
-
-    Yields
-    ------
-    callable or None
-        To be told the progress.
+    Yields a function to be told the progress; None where nothing is `shown`.
     """
     if not shown:
         yield None
@@ -153,7 +137,7 @@ def comparison_table(comparison: Comparison) -> Table:
     headings = (
         "method",
         "model",
-        ">error by\nspread",
+        ">error by\nstd. dev.",
         ">heading\ndeg",
         ">yaw rate\ndeg/s",
         ">ran away\ntrials",

@@ -23,10 +23,7 @@ UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"
 def check_page(path: Path) -> None:
     """Refuse a file for figures that cannot be written, before any work.
 
-    Raises
-    ------
-    InputError
-        If plotly is missing, the ending is not .html, or the folder cannot be written.
+    Raises InputError if plotly is missing, the ending is not .html, or the folder cannot be written.
     """
     graph_objects()
     output.check_page(path)

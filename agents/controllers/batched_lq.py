@@ -29,19 +29,9 @@ def lq_rows(
 ) -> Floats:
     """Feedback rows of order = row x that minimise the environment's cost, one a ship.
 
-    Parameters
-    ----------
-    A, B : arrays of shape (n, 5, 5) and (n, 5)
-        Sampled ships.
-    dt : float
-        Control interval, s.
-    rate_weight, integral_time, rudder_weight : float
-        As in `agents.controllers.lq.lq_gain`.
-
-    Returns
-    -------
-    array of shape (n, 5)
-        NaN where no stabilising gain was found.
+    `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s; `rate_weight`,
+    `integral_time`, `rudder_weight`: as in `agents.controllers.lq.lq_gain`. Returns the gains, shape (n, 5),
+    NaN where no stabilising one was found.
     """
     weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
@@ -59,21 +49,14 @@ def lq_rows(
 def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
     """Stabilising solutions X of X = A'X (I + G X)^-1 A + H, by doubling.
 
-    Parameters
-    ----------
-    A, G, H : arrays of shape (n, m, m)
-        G and H symmetric, not negative; all are overwritten.
-
-    Returns
-    -------
-    array of shape (n, m, m)
-        NaN where the doubling did not settle.
+    `A`, `G`, `H`: G and H symmetric, not negative; all are overwritten, shape (n, m, m). Returns the
+    solutions, shape (n, m, m), NaN where the doubling did not converge.
     """
     eye = np.eye(A.shape[-1])
-    settled = np.zeros(len(A), dtype=np.bool_)
+    converged = np.zeros(len(A), dtype=np.bool_)
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(DOUBLINGS):
-            going = ~settled & np.isfinite(H).all(axis=(1, 2))
+            going = ~converged & np.isfinite(H).all(axis=(1, 2))
             if not going.any():
                 break
             a, g, h = A[going], G[going], H[going]
@@ -83,6 +66,6 @@ def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
             more = at @ h @ wa
             A[going], G[going], H[going] = a @ wa, g + a @ wg @ at, h + 0.5 * (more + more.transpose(0, 2, 1))
             size = np.abs(H[going]).max(axis=(1, 2))
-            settled[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
-    H[~settled] = np.nan
+            converged[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
+    H[~converged] = np.nan
     return H

@@ -109,7 +109,7 @@ def _check_observations(controller: Any, model: ShipModel, task: Task, who: str)
 
 
 def _answer(controller: Policy, seen: Any, state: Any, starts: Any, where: str) -> tuple[Any, Any]:
-    """A controller's answer, asked three times with what must stay as it is."""
+    """A controller's answer, computed three times from inputs that it must not change."""
     shown, kept = np.copy(seen), deepcopy(state)
     answer: Any = controller.predict(seen, state, starts, True)
     if not isinstance(answer, tuple) or len(answer) != 2:

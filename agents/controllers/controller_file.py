@@ -42,10 +42,7 @@ POLICIES = ("learned", "shielded")  # whose files are described in `agents.polic
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     """A classical controller from what `Controller.to_dict` returned.
 
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
+    Raises InputError naming the field at fault.
     """
     if "format" in content and content["format"] != FORMAT:
         raise InputError(

@@ -26,19 +26,10 @@ INNER = "lq_"  # before settings of the LQ that a guidance law leads
 def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = None) -> Controller:
     """A classical controller for a task.
 
-    Parameters
-    ----------
-    kind : str
-        As registered (`agents.controllers.registry`).
-    task : BenchmarkTask
-        Its ship and control interval; of a guidance law also its path's lookahead and corridor.
-    settings : mapping of str, optional
-        Keywords of `from_model`; of a guidance law also those of the LQ that it leads, after `lq_`.
-
-    Raises
-    ------
-    InputError
-        If there is no such design for the ship, or guidance has no path to follow.
+    `kind`: as registered (`agents.controllers.registry`); `task`: its ship and control interval; of a
+    guidance law also its path's lookahead and corridor; `settings`: keywords of `from_model`; of a guidance
+    law also those of the LQ that it leads, after `lq_`. Raises InputError if there is no such design for the
+    ship, or guidance has no path to follow.
     """
     made: Any = controller_class(kind)
     given = settings or {}
@@ -56,18 +47,8 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
 def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
     """A classical controller with the settings found for a task of a suite.
 
-    Parameters
-    ----------
-    kind : str
-        Of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`.
-    task : BenchmarkTask
-    suite : str
-        Its name.
-
-    Raises
-    ------
-    InputError
-        If there are no such settings.
+    `kind`: of `CLASSICAL`; "best" is that which cost least, "base" likewise without `NO_BASES`; `suite`: its
+    name. Raises InputError if there are no such settings.
     """
     found = load_tuned(suite).get(task.name, {})
     without = {"best": (), "base": NO_BASES}.get(kind)

@@ -30,7 +30,7 @@ N_MEMORY = NOTCHES + 8
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FilteredPID(Stateful):
-    """PID whose course is a smooth reference, whose integral does not wind up, and which is deaf to waves.
+    """PID with a reference filter, an integral that does not wind up, and a notch filter for waves.
 
     order = neutral + proportional * (reference - heading) + derivative * (reference's rate - yaw rate)
     + integral of that error. The integral is its own, not the environment's: what the rudder's limit cuts off
@@ -82,9 +82,8 @@ class FilteredPID(Stateful):
         )
         interval = plain.design["dt"]
         frequency_share = _rate(reference_share, "reference_share")
-        tracking = _rate(tracking_lengths, "tracking_lengths") and 1.0 / (
-            tracking_lengths * length_time(model)
-        )
+        limited = _rate(tracking_lengths, "tracking_lengths") > 0.0
+        tracking = 1.0 / (tracking_lengths * length_time(model)) if limited else 0.0
         turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
@@ -169,8 +168,8 @@ class FilteredPID(Stateful):
     def loop(self) -> Compensator:
         """Integral, and the notch where there is one; the reference is outside of the loop."""
         dt, gains, frequency = self.design["dt"], self.gains, self.design["wave_frequency"]
-        look = np.zeros((2, len(SIGNALS)))
-        look[0, ERROR] = look[1, YAW_RATE] = 1.0
+        measure = np.zeros((2, len(SIGNALS)))
+        measure[0, ERROR] = measure[1, YAW_RATE] = 1.0
         row = np.array([gains["proportional"] + gains["integral"] * dt, -gains["derivative"]])
         inner = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.eye(2)
         if frequency:
@@ -179,9 +178,9 @@ class FilteredPID(Stateful):
         n = len(a)
         A = np.zeros((n + 1, n + 1))
         A[:n, :n], A[n, n], A[n, :n] = a, 1.0, dt * c[0]
-        B = np.vstack([b @ look, dt * d[:1] @ look])
+        B = np.vstack([b @ measure, dt * d[:1] @ measure])
         C = np.append(row @ c, gains["integral"])[None]
-        return Compensator(A, B, C, (row @ d @ look)[None])
+        return Compensator(A, B, C, (row @ d @ measure)[None])
 
 
 def _rate(value: float, name: str) -> float:
@@ -192,14 +191,8 @@ def _rate(value: float, name: str) -> float:
 def notch_band(turn: float) -> tuple[float, float, float]:
     """Band-pass that a notch takes away, discretised bilinearly at `turn` rad an interval.
 
-    Parameters
-    ----------
-    turn : float
-
-    Returns
-    -------
-    band, once, twice : float
-        taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice taken[k - 2].
+    Returns `band, once, twice`: taken[k] = band (signal[k] - signal[k - 2]) - once taken[k - 1] - twice
+    taken[k - 2].
     """
     k = np.tan(0.5 * turn)
     per = 1.0 / (1.0 + 2.0 * WIDE * k + k * k)

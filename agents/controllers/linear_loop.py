@@ -35,48 +35,25 @@ class Margins:
 
     The loop is opened where the ship's motions are fed back; the rudder's own feedback, if there is one,
     belongs to the steering gear and stays closed.
-
-    Attributes
-    ----------
-    gain_margin : float
-        Factor by which the loop gain may be raised; infinite where there is no limit.
-    phase_margin_deg : float
-        Phase that may be lost, degrees.
-    delay_margin_s : float
-        Delay that may be added, s.
-    bandwidth_rad_s : float
-        Of the heading following its set-point, to -3 dB, rad/s.
-    lowest_gain : float
-        Factor down to which the loop gain may be lowered; 0 where there is no limit. The integral, and a
-        ship unstable on its course, need some.
     """
 
-    gain_margin: float
-    phase_margin_deg: float
-    delay_margin_s: float
-    bandwidth_rad_s: float
+    gain_margin: float  # factor by which the loop gain may be raised; infinite where there is no limit
+    phase_margin_deg: float  # phase that may be lost, degrees
+    delay_margin_s: float  # delay that may be added, s
+    bandwidth_rad_s: float  # of the heading following its set-point, to -3 dB, rad/s
+    #: factor down to which the loop gain may be lowered; 0 where there is no limit. The integral, and a
+    #: ship unstable on its course, need some
     lowest_gain: float = field(default=0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class SampledShip:
-    """Small motions about straight running, from one control interval to the next.
+    """Small motions about straight running, from one control interval to the next."""
 
-    Attributes
-    ----------
-    A : array of shape (5, 5)
-    B : array of shape (5, 1)
-        x[k + 1] = A x[k] + B order[k], x in the order of `SIGNALS`.
-    dt : float
-        Control interval, s.
-    about : StraightRunning
-        The state about which motions are small.
-    """
-
-    A: Floats
-    B: Floats
-    dt: float
-    about: StraightRunning
+    A: Floats  # shape (5, 5)
+    B: Floats  # x[k + 1] = A x[k] + B order[k], x in the order of `SIGNALS`, shape (5, 1)
+    dt: float  # control interval, s
+    about: StraightRunning  # the state about which motions are small
 
 
 def length_time(model: ShipModel) -> float:
@@ -101,26 +78,9 @@ def sample_ship(
     """The linearised ship with its steering gear, sampled with the command held (zero-order hold).
 
     A gear without lag is taken to reach its order within the interval. Of a table with a memory of yaw the
-    memory stands in the place of sway.
-
-    Parameters
-    ----------
-    model : ShipModel
-    dt : float
-        Control interval, s.
-    first_order : bool
-        Whether yaw is reduced to K / (1 + T s), without sway or memory.
-    speed : float, optional
-        Surge speed at which the ship is linearised, m/s; by default that of straight running.
-
-    Returns
-    -------
-    SampledShip
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course.
+    memory stands in the place of sway. `dt`: control interval, s; `first_order`: whether yaw is reduced to K
+    / (1 + T s), without sway or memory; `speed`: surge speed at which the ship is linearised, m/s; by default
+    that of straight running. Raises InputError if the model has no straight course.
     """
     about = straight_running(model, speed)
     steering, rudder = linearise(model, about)
@@ -136,19 +96,9 @@ def sample_ship(
 def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats]:
     """Ships with their steering gear, the command held over a control interval (zero-order hold).
 
-    Parameters
-    ----------
-    linear : array of shape (n, 2, 3)
-        d/dt (v, r) per sway, yaw rate and rudder, SI units.
-    lag : float
-        Of the steering gear, s; 0 for one that follows within the interval.
-    dt : float
-        Control interval, s.
-
-    Returns
-    -------
-    A : array of shape (n, 5, 5)
-    B : array of shape (n, 5)
+    `linear`: d/dt (v, r) per sway, yaw rate and rudder, SI units, shape (n, 2, 3); `lag`: of the steering
+    gear, s; 0 for one that follows within the interval; `dt`: control interval, s. Returns `A`: shape (n, 5,
+    5); `B`: shape (n, 5).
     """
     from scipy.linalg import expm
 
@@ -174,21 +124,12 @@ def sampled_ships(linear: Floats, lag: float, dt: float) -> tuple[Floats, Floats
 
 @dataclass(frozen=True, eq=False)
 class Compensator:
-    """A linear controller with a memory: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k].
+    """A linear controller with a memory: s[k + 1] = A s[k] + B y[k], order[k] = C s[k] + D y[k]."""
 
-    Attributes
-    ----------
-    A : array of shape (n_memory, n_memory)
-    B : array of shape (n_memory, 5)
-    C : array of shape (1, n_memory)
-    D : array of shape (1, 5)
-        y in the order of `SIGNALS`, deviations in SI units.
-    """
-
-    A: Floats
-    B: Floats
-    C: Floats
-    D: Floats
+    A: Floats  # shape (n_memory, n_memory)
+    B: Floats  # shape (n_memory, 5)
+    C: Floats  # shape (1, n_memory)
+    D: Floats  # y in the order of `SIGNALS`, deviations in SI units, shape (1, 5)
 
     @classmethod
     def static(cls, row: Floats) -> Compensator:
@@ -208,22 +149,8 @@ class Compensator:
 def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) -> Margins:
     """Stability margins and bandwidth of any linear controller.
 
-    Parameters
-    ----------
-    ship : SampledShip
-    compensator : Compensator
-    name : str
-        Of the design, for the message.
-
-    Returns
-    -------
-    Margins
-        From the frequency response of the sampled loop (`control.stability_margins`).
-
-    Raises
-    ------
-    InputError
-        If the closed loop is unstable.
+    The margins follow from the frequency response of the sampled loop (`control.stability_margins`); `name`,
+    of the design, is for the message. Raises InputError if the closed loop is unstable.
     """
     import control
 

@@ -39,18 +39,13 @@ class Guided(Controller):
 
     The state that `predict` takes and returns is a pair: what the guidance remembers of each ship, and the
     autopilot's own state.
-
-    Attributes
-    ----------
-    autopilot : Policy
-        Steers by the first eight observations, those of course keeping.
     """
 
     observes: ClassVar[tuple[str, ...]] = (*OBSERVATION_NAMES, "cross_track")
     gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead", "integral")
     has_autopilot: ClassVar[bool] = True
 
-    autopilot: Policy
+    autopilot: Policy  # steers by the first eight observations, those of course keeping
 
     @classmethod
     def from_model(

@@ -102,10 +102,7 @@ def lq_settings(
 ) -> tuple[float, float]:
     """Control interval, s, and weight of the rudder rate, s^2, of a design; its arguments are checked.
 
-    Raises
-    ------
-    InputError
-        If an argument is out of its range.
+    Raises InputError if an argument is out of its range.
     """
     check_number(integral_lengths, "integral_lengths", above=0.0)
     check_number(rudder_weight, "rudder_weight", above=0.0)
@@ -124,23 +121,10 @@ def lq_gain(
 ) -> Floats:
     """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship.
 
-    The reward of an interval is on the state at its end, so the cost is that of the outputs
-    z[k] = C x[k] + D order[k] = (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1],
-    which couples state and input.
-
-    Parameters
-    ----------
-    ship : SampledShip
-    rate_weight : float
-        Weight of the rudder rate, s^2.
-    integral_time : float
-        Time for an offset to decay, s.
-    rudder_weight : float
-        Weight of the rudder; by default the environment's.
-
-    Returns
-    -------
-    array of shape (5,)
+    The reward of an interval is on the state at its end, so the cost is that of the outputs z[k] = C x[k] + D
+    order[k] = (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which couples state
+    and input. `rate_weight`: weight of the rudder rate, s^2; `integral_time`: time for an offset to decay, s;
+    `rudder_weight`: weight of the rudder; by default the environment's. Returns an array of shape (5,).
     """
     import control  # here, because it takes a second to import
 

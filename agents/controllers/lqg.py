@@ -35,7 +35,7 @@ from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL
 
 OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
-COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two looks at it, rad
+COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two measurements, rad
 NEW_COURSE = np.radians(1.0)  # least jump of the heading error that is a new course, rad
 GATE = 6.0  # such a jump in standard deviations of what noise explains
 WAVE_DAMPING = 0.1  # of the model of first-order motion (Fossen 2011, 8.2.6)
@@ -53,7 +53,7 @@ class LQG(Stateful):
     Attributes
     ----------
     transition : array of shape (n_states, n_states)
-        From one look to the next.
+        From one measurement to the next.
     input : array of shape (n_states,)
         Effect of the mean rudder in between.
     kalman : array of shape (n_states, 2)
@@ -126,27 +126,21 @@ class LQG(Stateful):
             transition, effect, process, output = _with_waves(transition, effect, process, output, motion)
         deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
         kalman, deviations = kalman_gain(transition, process, output, np.diag(deviation**2))
-        return cls.designed(
-            model,
-            ship,
-            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
-            design={
-                "integral_lengths": float(integral_lengths),
-                "rate_weight_s2": weight,
-                "noise": float(noise),
-                "disturbance_deg": float(disturbance_deg),
-                "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
-                **({} if wave_period is None else {"wave_period": float(wave_period)}),
-            },
-            transition=transition,
-            input=effect,
-            kalman=kalman,
-            output=output,
-        )
+        design = {
+            "integral_lengths": float(integral_lengths),
+            "rate_weight_s2": weight,
+            "noise": float(noise),
+            "disturbance_deg": float(disturbance_deg),
+            "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
+            **({} if wave_period is None else {"wave_period": float(wave_period)}),
+        }
+        gains = dict(zip(SIGNALS, (-gain).tolist(), strict=True))
+        filters = {"transition": transition, "input": effect, "kalman": kalman, "output": output}
+        return cls.designed(model, ship, gains=gains, design=design, **filters)
 
     @property
     def memory_size(self) -> int:
-        """The estimate, and the rudder at the last look."""
+        """The estimate, and the rudder at the last measurement."""
         return len(self.input) + 1
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
@@ -173,12 +167,12 @@ class LQG(Stateful):
     def loop(self) -> Compensator:
         """Filter and feedback together; the course does not jump."""
         n = len(self.input)
-        look = np.zeros((2, len(SIGNALS)))
-        look[[0, 1], list(OUTPUTS)] = 1.0
+        measure = np.zeros((2, len(SIGNALS)))
+        measure[[0, 1], list(OUTPUTS)] = 1.0
         trusted = np.eye(n) - self.kalman @ self.output
         rudder = np.eye(len(SIGNALS))[RUDDER]
         remember = np.column_stack([trusted @ self.transition, 0.5 * trusted @ self.input])
-        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ look
+        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ measure
         row = np.zeros(n)
         row[: ERROR + 1] = [self.gains[signal] for signal in SIGNALS[: ERROR + 1]]
         at_once = self.gains["rudder"] * rudder
@@ -216,19 +210,8 @@ def _with_waves(
 def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:
     """Sway, yaw rate and heading error with the rudder held over an interval.
 
-    Parameters
-    ----------
-    model : ShipModel
-    about : StraightRunning
-        Where small motions are about.
-    dt : float
-        s.
-
-    Returns
-    -------
-    transition : array of shape (3, 3)
-    effect : array of shape (3,)
-        Of the rudder angle, per rad.
+    `about`: where small motions are about; `dt`: s. Returns `transition`: shape (3, 3); `effect`: of the
+    rudder angle, per rad, shape (3,).
     """
     A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
     return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
@@ -237,21 +220,9 @@ def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tupl
 def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floats]:
     """First-order heading in waves as a lightly damped oscillator driven by noise (Fossen 2011, 8.2.6).
 
-    Parameters
-    ----------
-    period : float
-        s.
-    deviation : float
-        Standard deviation of the heading, rad.
-    dt : float
-        Interval, s.
-
-    Returns
-    -------
-    transition : array of shape (2, 2)
-        Of heading and its rate.
-    covariance : array of shape (2, 2)
-        Of what drives them in an interval, which keeps the deviation as it is.
+    `period`: s; `deviation`: standard deviation of the heading, rad; `dt`: interval, s. Returns `transition`:
+    of heading and its rate, shape (2, 2); `covariance`: of what drives them in an interval, which keeps the
+    deviation as it is, shape (2, 2).
     """
     from scipy.linalg import expm
 
@@ -266,21 +237,10 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
 def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
 
-    Parameters
-    ----------
-    transition : array of shape (n, n)
-    process : array of shape (n, n)
-        Covariance of what disturbs the states in an interval.
-    output : array of shape (m, n)
-    noise : array of shape (m, m)
-        Covariance of the measurements' noise.
-
-    Returns
-    -------
-    gain : array of shape (n, m)
-        `transition @ gain` is the predictor's gain, that of `control.dlqe`.
-    deviation : array of shape (m,)
-        Standard deviation of the innovations.
+    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an interval, shape (n,
+    n); `output`: shape (m, n); `noise`: covariance of the measurements' noise, shape (m, m). Returns `gain`:
+    `transition @ gain` is the predictor's gain, that of `control.dlqe`, shape (n, m); `deviation`: standard
+    deviation of the innovations, shape (m,).
     """
     import control
 

@@ -19,10 +19,7 @@ def checked_observation(
 ) -> NDArray[Any]:
     """Observations as an array of shape (n_ships, n_observations) or (n_observations,), no fewer than names.
 
-    Raises
-    ------
-    InputError
-        If there are fewer entries or another number of dimensions.
+    Raises InputError if there are fewer entries or another number of dimensions.
     """
     given, n = np.asarray(observation, dtype=dtype), len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
@@ -36,10 +33,7 @@ def checked_observation(
 def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
     """Where episodes begin, an array of the shape of the ships; None is nowhere.
 
-    Raises
-    ------
-    InputError
-        If there is neither one for all ships nor one for each.
+    Raises InputError if there is neither one for all ships nor one for each.
     """
     flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
     n = int(np.prod(shape))
@@ -51,10 +45,7 @@ def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
 def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """Return the memory of ships, which must have a shape.
 
-    Raises
-    ------
-    InputError
-        If it is that of another number of ships, or of another controller.
+    Raises InputError if it is that of another number of ships, or of another controller.
     """
     if np.shape(memory) != shape:
         raise InputError(
@@ -67,21 +58,9 @@ def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
 def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[Floats, Flags]:
     """Memory of each ship, a copy with zeros where an episode begins, and where it does.
 
-    Parameters
-    ----------
-    memory : array of shape (*shape, size) or None
-        What the last `predict` returned; None where all episodes begin.
-    starts : bool, array-like of bool or None
-        Where an episode begins and the memory is that of the one before.
-    shape : tuple of int
-        (n_ships,), or () for a single ship.
-    size : int
-        Numbers remembered of a ship.
-
-    Raises
-    ------
-    InputError
-        As `checked_memory` and `checked_starts`.
+    `memory`: what the last `predict` returned; None where all episodes begin, shape (*shape, size); `starts`:
+    where an episode begins and the memory is that of the one before; `shape`: (n_ships,), or () for a single
+    ship; `size`: numbers remembered of a ship. Raises InputError as `checked_memory` and `checked_starts`.
     """
     if memory is None:
         return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)

@@ -35,18 +35,12 @@ STEP_SIZE = 2.0  # of the solver (its rho), fixed so that an answer depends on t
 
 
 class Plan(NamedTuple):
-    """Plans over the horizon, deviations from straight running: the numbers that are limited.
+    """Plans over the horizon, deviations from straight running: the numbers that are limited."""
 
-    Attributes
-    ----------
-    by_state : array of shape (2 * horizon, 5)
-        Commands, then changes of the rudder in an interval, of LQ's own plan, per state.
-    by_correction : array of shape (2 * horizon, horizon)
-        The same per correction of LQ's commands.
-    """
-
+    #: commands, then changes of the rudder in an interval, of LQ's own plan, per state, shape (2 *
+    #: horizon, 5)
     by_state: Floats
-    by_correction: Floats
+    by_correction: Floats  # the same per correction of LQ's commands, shape (2 * horizon, horizon)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -106,21 +106,9 @@ class PID(Controller):
 def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
     """Natural frequency and damping that the steering cost asks for.
 
-    They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and
-    rudder rate, for the first-order Nomoto form with the rudder rate as input.
-
-    Parameters
-    ----------
-    response : Nomoto
-        Its first-order form is used.
-    rate_weight : float
-        Weight of the rudder rate, s^2.
-
-    Returns
-    -------
-    frequency : float
-        rad/s.
-    damping : float
+    They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and rudder
+    rate, for the first-order Nomoto form with the rudder rate as input. `response`: its first-order form is
+    used; `rate_weight`: weight of the rudder rate, s^2. Returns `frequency`: rad/s.
     """
     import control  # here, because it takes a second to import
 
@@ -140,22 +128,9 @@ def place_poles(
     """PID gains for a pair of poles and a slow one on Nomoto's first-order form with a gear.
 
     The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki) has a fixed sum of
-    roots, which leaves the fourth to the gear.
-
-    Parameters
-    ----------
-    response : Nomoto
-    lag : float
-        Of the gear and the held command, s.
-    frequency, damping : float
-        Of the pair of poles, rad/s and ratio.
-    slow : float
-        The pole of the integral action, 1/s.
-
-    Returns
-    -------
-    dict of str to float
-        `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
+    roots, which leaves the fourth to the gear. `lag`: of the gear and the held command, s; `frequency`,
+    `damping`: of the pair of poles, rad/s and ratio; `slow`: the pole of the integral action, 1/s. Returns
+    `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
     """
     fourth = 1.0 / lag + 1.0 / response.T - 2.0 * damping * frequency - slow
     pair = np.array([1.0, 2.0 * damping * frequency, frequency**2])

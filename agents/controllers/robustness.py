@@ -82,6 +82,3 @@ def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> M
         row[:] = [getattr(found, name) for name in names]
     by_name = dict(zip(names, table.T.copy(), strict=True))
     return MarginUncertainty(controller.margins, by_name, ~np.isnan(table[:, 0]))
-
-
-margin_spread = margin_uncertainty  # its older name

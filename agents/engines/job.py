@@ -47,10 +47,7 @@ def do_job(function: JobFunction, text: str) -> Outcome:
 def check_outcome(outcome: dict[str, Any], job: str) -> dict[str, Any]:
     """Return the outcome of a job that was done.
 
-    Raises
-    ------
-    InputError, JobError
-        If it was not, naming the job.
+    Raises InputError, JobError if it was not, naming the job.
     """
     if "wrong" in outcome:
         raise InputError(f"{job}: {outcome['wrong']}")
@@ -70,7 +67,7 @@ def died_too_often(text: str, retries: int) -> WorkerDiedError:
 
 
 def with_modules(function: JobFunction, modules: Sequence[str], job: dict[str, Any]) -> Any:
-    """Do a job after importing modules: in another process nobody else has."""
+    """Do a job after importing modules, which another process has not imported."""
     for module in modules:
         import_module(module)
     return function(job)

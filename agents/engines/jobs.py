@@ -55,8 +55,7 @@ def run_jobs(
     Parameters
     ----------
     function : callable
-        Given a job, returns its result: numbers, texts, arrays, and lists and dicts of them. It is to
-        depend on nothing but the job, and to be at the top level of a module.
+        Top-level function of a module: of a job and nothing else, numbers, texts, arrays, lists or dicts.
     jobs : sequence of dict
         What JSON can hold. Equal jobs are done once.
     engine : {"local", "ray"}
@@ -86,13 +85,11 @@ def run_jobs(
         Naming the job, if it raises anything else, or its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
-    check_whole(retries, "retries", at_least=0)
-    _check_function(function)
+    _check_work(function, retries)
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
     found = {} if kept is None else kept.load_all(copies)
-
     tell = progress or (lambda done, total: None)
     tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]
@@ -127,10 +124,7 @@ def _outcomes(
 def check_engine(engine: str, workers: int | None, address: str | None) -> None:
     """Refuse wrong arguments of `run_jobs`; whether a cluster answers is asked when it is needed.
 
-    Raises
-    ------
-    InputError
-        Naming the argument.
+    Raises InputError naming the argument.
     """
     check_choice(engine, ENGINES, "engine")
     if workers is not None:
@@ -139,7 +133,8 @@ def check_engine(engine: str, workers: int | None, address: str | None) -> None:
         raise InputError(f"address: '{address}' found with engine '{engine}'; it is for engine 'ray'")
 
 
-def _check_function(function: JobFunction) -> None:
+def _check_work(function: JobFunction, retries: int) -> None:
+    check_whole(retries, "retries", at_least=0)
     name = getattr(function, "__qualname__", None)
     if name is None or "<" in name:
         raise InputError(

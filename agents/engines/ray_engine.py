@@ -26,12 +26,8 @@ def on_ray(
 ) -> Iterator[Outcome]:
     """Do jobs on ray: see `agents.engines.jobs.run_jobs`.
 
-    Raises
-    ------
-    InputError
-        If ray is not installed, or there is no cluster at the address.
-    WorkerDiedError
-        If the worker of a job dies more often than `retries`.
+    Raises InputError if ray is not installed, or there is no cluster at the address; WorkerDiedError if the
+    worker of a job dies more often than `retries`.
     """
     with _connected(workers, address) as ray:
         at_once = workers or max(1, int(ray.cluster_resources().get("CPU", 1)))
@@ -93,17 +89,9 @@ def check_answers(
 ) -> None:
     """Refuse an address at which no ray cluster answers.
 
-    Parameters
-    ----------
-    address : str
-        Host and port, with ``ray://`` for a client's; or ``"auto"``.
-    patience_s, ray_patience_s : float
-        How long to wait for anything to answer, and for ray to connect, s.
-
-    Raises
-    ------
-    InputError
-        Naming what is wrong with the address or what ray says of it.
+    `address`: host and port, with ``ray://`` for a client's; or ``"auto"``; `patience_s`, `ray_patience_s`:
+    how long to wait for anything to answer, and for ray to connect, s. Raises InputError naming what is wrong
+    with the address or what ray says of it.
     """
     if address != "auto":
         host, _, port = address.removeprefix("ray://").rpartition(":")

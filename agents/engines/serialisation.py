@@ -27,10 +27,7 @@ LONGEST_IN_MESSAGE = 200  # characters
 def serialised(job: Any, where: str) -> str:
     """A job as text, its keys in the order in which they are.
 
-    Raises
-    ------
-    InputError
-        If it is not a dict that JSON can hold.
+    Raises InputError if it is not a dict that JSON can hold.
     """
     if not isinstance(job, Mapping):
         raise InputError(f"{where}: {job!r} found, expected a dict")
@@ -50,10 +47,7 @@ def shortened(text: str) -> str:
 def pack(value: Any) -> Any:
     """A result as JSON holds it: arrays become text, tuples lists, numbers of NumPy numbers.
 
-    Raises
-    ------
-    TypeError
-        For anything else than numbers, texts, arrays, and lists and dicts of them.
+    Raises TypeError for anything else than numbers, texts, arrays, and lists and dicts of them.
     """
     if isinstance(value, np.ndarray):
         if value.dtype.kind not in "biufcU":
@@ -129,10 +123,7 @@ class KeptResults:
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job; the file is written whole or not at all.
 
-        Raises
-        ------
-        InputError
-            If it cannot be written.
+        Raises InputError if it cannot be written.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)

@@ -27,24 +27,12 @@ OUTPUTS = ("linear", "tanh")
 class Network:
     """Dense layers with one activation between them.
 
-    Attributes
-    ----------
-    layers : tuple of (weight, bias)
-        float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them.
-    activation : {"relu", "tanh"}
-        After every layer but the last.
-    output : {"linear", "tanh"}
-        After the last.
-
-    Raises
-    ------
-    InputError
-        If shapes do not fit, or a number is not finite.
+    Raises InputError if shapes do not fit, or a number is not finite.
     """
 
-    layers: tuple[Layer, ...]
-    activation: str = "relu"
-    output: str = "linear"
+    layers: tuple[Layer, ...]  # float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them
+    activation: str = "relu"  # relu or tanh, after every layer but the last
+    output: str = "linear"  # linear or tanh, after the last
 
     def __post_init__(self) -> None:
         check_choice(self.activation, ACTIVATIONS, "network.activation")

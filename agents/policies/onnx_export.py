@@ -38,16 +38,8 @@ OPERATORS = {"relu": "Relu", "tanh": "Tanh"}
 def export_onnx(policy: Any, path: str | Path) -> None:
     """Write a learned policy as an ONNX file.
 
-    Parameters
-    ----------
-    policy : LearnedPolicy
-        With a frame stack or a base too: see the inputs above.
-    path : str or Path
-
-    Raises
-    ------
-    InputError
-        If it is not a learned policy, if the file cannot be written, or onnx is not installed.
+    `policy`: with a frame stack or a base too: see the inputs above. Raises InputError if it is not a learned
+    policy, if the file cannot be written, or onnx is not installed.
     """
     write_bytes(onnx_model(policy).SerializeToString(), Path(path))
 

@@ -48,21 +48,14 @@ SHOWING = ("action", "roll", "corridor", "ground")
 
 
 class Memory(NamedTuple):
-    """What a policy with a frame stack, a base or an action repeat remembers.
+    """What a policy with a frame stack, a base or an action repeat remembers."""
 
-    Attributes
-    ----------
-    seen : float32 array of shape (n, frame_stack - 1, n_observations)
-        Past observations, oldest first; for a single observation without the first axis.
-    base : Any
-        State of the base.
-    repeated : float32 array of shape (n, 1 + n_outputs)
-        Control intervals until the next decision, and the network's outputs of the last one; for a single
-        observation without the first axis.
-    """
-
+    #: past observations, oldest first; for a single observation without the first axis, shape (n,
+    #: frame_stack - 1, n_observations)
     seen: Numbers
-    base: Any
+    base: Any  # state of the base
+    #: control intervals until the next decision, and the network's outputs of the last one; for a single
+    #: observation without the first axis, shape (n, 1 + n_outputs)
     repeated: Numbers
 
 
@@ -284,15 +277,8 @@ class LearnedPolicy:
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
     """Numbers of discrete rudder orders, for environments with the action "rudder-discrete".
 
-    Parameters
-    ----------
-    action : array-like of shape (..., 1)
-        As `LearnedPolicy.predict` hands them back.
-
-    Returns
-    -------
-    int array of shape (...)
-        Of the nearest order.
+    `action`: as `LearnedPolicy.predict` hands them back, shape (..., 1). Returns the index of the nearest
+    order, shape (...).
     """
     given = np.asarray(action, dtype=np.float32)
     numbers: NDArray[np.int64] = np.abs(given - ORDERS).argmin(axis=-1)

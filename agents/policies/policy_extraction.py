@@ -31,21 +31,9 @@ AGREEMENT = 1e-4  # of the commands found with torch and without, far above roun
 def sb3_fields(agent: Any, env: Any = None) -> dict[str, Any]:
     """Fields of `LearnedPolicy` from an agent and its environment.
 
-    Parameters
-    ----------
-    agent : BaseAlgorithm
-        PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy".
-    env : VecEnv, optional
-        The environment that it learned in, with its wrappers; by default the agent's own.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        For an agent or a wrapper that cannot be written as a learned policy.
+    `agent`: PPO, A2C, SAC, TD3, DDPG or TQC with "MlpPolicy"; `env`: the environment that it learned in, with
+    its wrappers; by default the agent's own. Raises InputError for an agent or a wrapper that cannot be
+    written as a learned policy.
     """
     given = agent.get_env() if env is None else env
     if given is None:

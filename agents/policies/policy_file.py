@@ -64,10 +64,7 @@ SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shielded:
     """A learned or shielded policy from the JSON at `path`, and the weights beside it.
 
-    Raises
-    ------
-    InputError
-        Naming the file and the field at fault.
+    Raises InputError naming the file and the field at fault.
     """
     where = str(path)
     learned = content["kind"] == "learned"

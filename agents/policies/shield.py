@@ -1,6 +1,6 @@
 """A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
 
-It looks at observations alone and takes over
+It uses observations alone and takes over
 
 * where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
   for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such
@@ -42,29 +42,18 @@ N_WATCHED = 7
 
 @dataclass(frozen=True)
 class Limits:
-    """When the fallback takes over, and when it hands back.
+    """When the fallback takes over, and when it hands back."""
 
-    Attributes
-    ----------
-    envelope_out, envelope_back : float
-        Distance from the training data (1 is its edge) beyond which it takes over, and within which it may
-        hand back.
-    out_lengths : float
-        How long it must be beyond before it takes over, in times to travel one ship length: noise is shorter.
-    runaway_deg : float
-        How far the ship may turn away from her course, degrees.
-    back_deg : float
-        Heading error within which it may hand back, degrees.
-    calm_lengths : float
-        How long both must hold before it does, in times to travel one ship length.
-    """
-
+    #: distance from the training data (1 is its edge) beyond which it takes over, and within which it may
+    #: hand back
     envelope_out: float = 1.5
     envelope_back: float = 1.1
+    #: how long it must be beyond before it takes over, in times to travel one ship length: noise is
+    #: shorter
     out_lengths: float = 0.25
-    runaway_deg: float = 10.0
-    back_deg: float = 5.0
-    calm_lengths: float = 1.0
+    runaway_deg: float = 10.0  # how far the ship may turn away from her course, degrees
+    back_deg: float = 5.0  # heading error within which it may hand back, degrees
+    calm_lengths: float = 1.0  # how long both must hold before it does, in times to travel one ship length
 
     def __post_init__(self) -> None:
         check_number(self.envelope_out, "limits.envelope_out", at_least=1.0)
@@ -79,38 +68,21 @@ class Limits:
 
 
 class ShieldState(NamedTuple):
-    """What a shield remembers.
+    """What a shield remembers."""
 
-    Attributes
-    ----------
-    policy, fallback : Any
-        Their own states; both go on while the other steers.
-    watch : array of shape (n, 7) or (7,)
-        Of each ship; `interventions` reads it.
-    """
-
+    #: their own states; both go on while the other steers
     policy: Any
     fallback: Any
-    watch: Floats
+    watch: Floats  # of each ship; `interventions` reads it, shape (n, 7) or (7,)
 
 
 @dataclass(frozen=True, eq=False)
 class Interventions:
-    """How often and how long a fallback steered, since the episode of each ship began; shapes (n,) or ().
+    """How often and how long a fallback steered, since the episode of each ship began; shapes (n,) or ()."""
 
-    Attributes
-    ----------
-    count : int array
-        How often it took over.
-    intervals : int array
-        Control intervals that it steered.
-    steering : bool array
-        Whether it steers now.
-    """
-
-    count: NDArray[np.int64]
-    intervals: NDArray[np.int64]
-    steering: Flags
+    count: NDArray[np.int64]  # how often it took over
+    intervals: NDArray[np.int64]  # control intervals that it steered
+    steering: Flags  # whether it steers now
 
 
 def interventions(state: ShieldState) -> Interventions:

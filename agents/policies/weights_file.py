@@ -29,19 +29,9 @@ REMEDY = "take another copy of both files"
 def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:
     """Write NAME.json and, first, NAME.safetensors.
 
-    Parameters
-    ----------
-    content : mapping
-        What stands in the JSON.
-    tensors : dict of str to array
-        The weights; none where a policy has none.
-    path : Path
-        NAME.json.
-
-    Raises
-    ------
-    InputError
-        If the name does not end in .json, the folder cannot be written, or JSON cannot hold the content.
+    `content`: what stands in the JSON; `tensors`: the weights; none where a policy has none; `path`:
+    NAME.json. Raises InputError if the name does not end in .json, the folder cannot be written, or JSON
+    cannot hold the content.
     """
     if path.suffix != ".json":
         raise InputError(f"{path}: a policy's file ends in .json, with the weights beside it in .safetensors")
@@ -67,10 +57,7 @@ def weights_path(path: Path) -> Path:
 def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
     """The weights at `path`, whose hash stands in `json_path`.
 
-    Raises
-    ------
-    InputError
-        If they are missing, broken, or those of another policy.
+    Raises InputError if they are missing, broken, or those of another policy.
     """
     try:
         content = path.read_bytes()

@@ -253,6 +253,3 @@ def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:
     if not fleet:
         raise InputError("models: none found, expected at least one")
     return fleet
-
-
-fly, Flights = sail, Episodes  # their first names, kept for those who use them

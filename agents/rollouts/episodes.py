@@ -32,18 +32,8 @@ class Recorded(NamedTuple):
 def recorded(policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = SAMPLES) -> Recorded:
     """Sail episodes of a task side by side and keep their histories.
 
-    Parameters
-    ----------
-    policy : Policy
-    task : BenchmarkTask
-    seeds : sequence of int
-    samples : int
-        Of an episode of full length at most: the histories have one sample for several control intervals,
-        in which rewards are summed. The last one is filled up: the ship stays where her episode ended.
-
-    Returns
-    -------
-    Recorded
+    `samples`: of an episode of full length at most: the histories have one sample for several control
+    intervals, in which rewards are summed. The last one is filled up: the ship stays where her episode ended.
     """
     engine = task.engine(len(seeds))
     run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)

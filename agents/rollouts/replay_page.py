@@ -41,20 +41,8 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
 def replay_page(episodes: Mapping[str, Episode]) -> str:
     """The page of episodes by name.
 
-    Parameters
-    ----------
-    episodes : mapping of str to Episode
-        What the legend calls each.
-
-    Returns
-    -------
-    str
-        HTML that loads nothing.
-
-    Raises
-    ------
-    InputError
-        If there is none.
+    `episodes`: what the legend calls each. Returns HTML that loads nothing. Raises InputError if there is
+    none.
     """
     if not episodes:
         raise InputError("episodes: none found, expected at least one")
@@ -66,17 +54,8 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
 def player(title: str, data: Any) -> str:
     """The page that replays runs.
 
-    Parameters
-    ----------
-    title : str
-        Of the window.
-    data : dict or str
-        `runs` and `quantities` (`agents.rollouts.replay_series`); or a placeholder for them.
-
-    Returns
-    -------
-    str
-        HTML that loads nothing.
+    `title`: of the window; `data`: `runs` and `quantities` (`agents.rollouts.replay_series`); or a
+    placeholder for them. Returns HTML that loads nothing.
     """
     return render("agents.rollouts/replay.html", title=title, data=data)
 

@@ -47,17 +47,8 @@ QUANTITIES = (
 def run(name: str, episode: Episode) -> dict[str, Any]:
     """An episode ready for the page's JSON.
 
-    Parameters
-    ----------
-    name : str
-        What the legend calls it.
-    episode : Episode
-
-    Returns
-    -------
-    dict
-        What it is, the ship to draw, the path, series of n + 1 values each, and under `other` what was
-        recorded besides, SI units.
+    `name`: what the legend calls it. Returns what it is, the ship to draw, the path, series of n + 1 values
+    each, and under `other` what was recorded besides, SI units.
     """
     recorded, path = {**episode.info, **episode.states}, episode.waypoints
     shown = {*SHOWN, _first(COURSE_ORDERS, recorded), _first(CROSS_TRACK, recorded)}

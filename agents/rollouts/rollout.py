@@ -135,19 +135,8 @@ def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> F
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     """Refuse a policy made for other observations than a task shows of a ship.
 
-    Parameters
-    ----------
-    policy : Policy
-        Without a method `check_fits` it steers by anything.
-    task : Task
-    ship : ShipModel
-    where : str
-        Start of the message.
-
-    Raises
-    ------
-    InputError
-        Naming the first difference.
+    `policy`: without a method `check_fits` it steers by anything; `where`: start of the message. Raises
+    InputError naming the first difference.
     """
     check = getattr(policy, "check_fits", None)
     if check is not None:

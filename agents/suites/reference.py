@@ -25,15 +25,7 @@ REMEDY = "take another copy"
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
     """Costs that are scores of 0 and 1, by task: of the best constant-gain PID and of the oracle.
 
-    Returns
-    -------
-    dict of str to tuple
-        Empty where the suite has no such file.
-
-    Raises
-    ------
-    InputError
-        Naming the field of the file at fault.
+    Empty where the suite has no such file. Raises InputError naming the field of the file at fault.
     """
     path = suite_file(suite, "reference")
     if not path.exists():
@@ -49,10 +41,7 @@ def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
 def oracle_costs(task: BenchmarkTask, suite: str) -> NDArray[np.float64]:
     """The oracle's cost of each scored episode, shape (100,).
 
-    Raises
-    ------
-    InputError
-        If there are none for this task, or the file is broken.
+    Raises InputError if there are none for this task, or the file is broken.
     """
     path = suite_file(suite, "oracle")
     costs = read_json(path, "file of the suite", REMEDY).get(task.name) if path.exists() else None
@@ -66,15 +55,8 @@ def oracle_costs(task: BenchmarkTask, suite: str) -> NDArray[np.float64]:
 def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
     """Settings of the classical controllers found for each task by direct search.
 
-    Returns
-    -------
-    dict
-        By task and controller, as in the file (format in the module's docstring).
-
-    Raises
-    ------
-    InputError
-        If the suite has none, or the file is broken.
+    Returns them by task and controller, as in the file (format in the module's docstring). Raises InputError
+    if the suite has none, or the file is broken.
     """
     path = suite_file(suite, "tuned")
     content = read_json(path, "file of tuned settings", "make it again with scripts/tune_controllers.py")

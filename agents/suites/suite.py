@@ -51,27 +51,13 @@ FIELDS = ("environment", "model", "why", "sea", "options")
 
 @dataclass(frozen=True)
 class BenchmarkTask:
-    """One task of a suite.
+    """One task of a suite."""
 
-    Attributes
-    ----------
-    name : str
-        Unique in its suite.
-    environment : {"course-keeping", "path-following"}
-        Which environment.
-    model : str
-        Shipped model that is steered.
-    why : str
-        What the task is there for.
-    options : dict
-        Keywords of the environment, `sea` among them.
-    """
-
-    name: str
-    environment: str
-    model: str
-    why: str = ""
-    options: Mapping[str, Any] = field(default_factory=dict)
+    name: str  # unique in its suite
+    environment: str  # course-keeping or path-following
+    model: str  # shipped model that is steered
+    why: str = ""  # what the task is there for
+    options: Mapping[str, Any] = field(default_factory=dict)  # keywords of the environment, `sea` among them
 
     def __post_init__(self) -> None:
         check_choice(self.environment, ENVIRONMENTS, f"task '{self.name}': environment")
@@ -104,32 +90,21 @@ class BenchmarkTask:
 
     def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
         """Many ships at once under this task, by default with its own ship."""
-        ship, task, variety = self.parts
-        return Engine(ship if model is None else model, num_envs, task, variety, threads=threads)
+        ship, task, randomisation = self.parts
+        return Engine(ship if model is None else model, num_envs, task, randomisation, threads=threads)
 
 
 @dataclass(frozen=True)
 class Suite:
-    """Tasks on which controllers are compared.
+    """Tasks on which controllers are compared."""
 
-    Attributes
-    ----------
-    name : str
-        With its version: a task never changes under the same name.
-    tasks : tuple of BenchmarkTask
-        In the order of the file.
-    """
-
-    name: str
-    tasks: tuple[BenchmarkTask, ...]
+    name: str  # with its version: a task never changes under the same name
+    tasks: tuple[BenchmarkTask, ...]  # in the order of the file
 
     def task(self, name: str) -> BenchmarkTask:
         """The task by its name.
 
-        Raises
-        ------
-        InputError
-            For an unknown name, with the nearest known one.
+        Raises InputError for an unknown name, with the nearest known one.
         """
         known = {task.name: task for task in self.tasks}
         if name not in known:
@@ -149,10 +124,7 @@ def list_suites() -> list[str]:
 def load_suite(name: str = DEFAULT_SUITE) -> Suite:
     """Read a shipped suite.
 
-    Raises
-    ------
-    InputError
-        For an unknown name, or naming the field at fault.
+    Raises InputError for an unknown name, or naming the field at fault.
     """
     return parse_suite(_suite_text(name), f"suite '{name}'")
 
@@ -175,10 +147,7 @@ def _suite_text(name: str) -> str:
 def parse_suite(text: str, where: str) -> Suite:
     """A suite from its TOML text (format in the module's docstring).
 
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
+    Raises InputError naming the field at fault.
     """
     try:
         content = tomllib.loads(text)

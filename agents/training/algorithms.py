@@ -83,16 +83,7 @@ def scaled_rewards(ships: VecEnv, settings: Settings) -> VecEnv:
 def make_agent(plan: Plan, base: Controller | None) -> Any:
     """An agent that has learned nothing yet, with its ships.
 
-    Parameters
-    ----------
-    plan : Plan
-    base : Controller or None
-        What it adds to.
-
-    Returns
-    -------
-    BaseAlgorithm
-        Its seed is also that of the ships; random numbers begin anew.
+    `base`: what it adds to. The agent's seed is also that of the ships; random numbers begin anew.
     """
     kind = algorithm_class(plan.algorithm)
     ships = make_ships(plan, base)
@@ -117,11 +108,7 @@ def begin_as_base(agent: Any) -> None:
 def sb3_arguments(settings: Settings, action_shape: tuple[int, ...] = (1,)) -> dict[str, Any]:
     """Keywords of the algorithm's class in stable-baselines3 or sb3-contrib for our settings.
 
-    Parameters
-    ----------
-    settings : Settings
-    action_shape : tuple of int
-        Of one ship's actions.
+    `action_shape`: of one ship's actions.
     """
     arguments = {
         one.name: getattr(settings, one.name) for one in fields(settings) if one.name not in _ELSEWHERE
@@ -164,10 +151,7 @@ def set_deviation(agent: Any, settings: Settings) -> None:
 def algorithm_class(name: str) -> Any:
     """The class of an algorithm by its name.
 
-    Raises
-    ------
-    InputError
-        If its package is not installed.
+    Raises InputError if its package is not installed.
     """
     if name != "tqc":
         return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]

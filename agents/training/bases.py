@@ -12,22 +12,10 @@ from shipgym.errors import InputError
 def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     """The controller of the setting `base`.
 
-    Parameters
-    ----------
-    name : str
-        "none"; a kind of controller, which is designed on the task's ship; "tuned", the best of those that
-        were tuned for the suite's task, without `NO_BASES`; or a controller's file.
-    task : BenchmarkTask
-        The ship, the control interval and the path.
-
-    Returns
-    -------
-    Controller or None
-
-    Raises
-    ------
-    InputError
-        If the ship has no such controller, the file is not one for her, or guidance has no path to follow.
+    `name`: "none"; a kind of controller, which is designed on the task's ship; "tuned", the best of those
+    that were tuned for the suite's task, without `NO_BASES`; or a controller's file; `task`: the ship, the
+    control interval and the path. Raises InputError if the ship has no such controller, the file is not one
+    for her, or guidance has no path to follow.
     """
     if name == "none":
         return None

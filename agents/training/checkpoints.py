@@ -31,15 +31,8 @@ STORED = ("observations", "next_observations", "actions", "rewards", "dones", "t
 def take(agent: Any) -> Memory:
     """The state of an agent of stable-baselines3 and of its ships.
 
-    Parameters
-    ----------
-    agent : BaseAlgorithm
-        Between a rollout and the next, its ships begun.
-
-    Returns
-    -------
-    dict
-        Nested; `safe_file.write_values` takes it.
+    `agent`: between a rollout and the next, its ships begun. Returns nested values for
+    `safe_file.write_values`.
     """
     _, variables = agent._get_torch_save_params()
     return {

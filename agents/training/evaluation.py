@@ -19,20 +19,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Episodes of a task that are not learned from, and what LQ costs on them.
+    """Episodes of a task that are not learned from, and what LQ costs on them."""
 
-    Attributes
-    ----------
-    engine : Engine
-        With a lane for each.
-    seeds : int array of shape (n,)
-    lq_cost : float or None
-        Mean cost of LQ designed on the task's ship; None where there is none for her.
-    """
-
-    engine: Engine
-    seeds: NDArray[np.int64]
-    lq_cost: float | None
+    engine: Engine  # with a lane for each
+    seeds: NDArray[np.int64]  # shape (n,)
+    lq_cost: float | None  # mean cost of LQ designed on the task's ship; None where there is none for her
 
     @classmethod
     def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:

@@ -38,32 +38,16 @@ NO_TASK = ""
 class Plan:
     """A run of training.
 
-    Attributes
-    ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
-    task : BenchmarkTask
-        Environment, model and options; evaluation is on it as it is.
-    settings : Settings
-        Of the algorithm.
-    seed : int
-        0 to 799: of networks, exploration and the ships' episodes.
-    randomise : bool
-        Whether the ships that learn differ (`training_options`).
-    threads : int
-        Of torch and of the kernels.
-
-    Raises
-    ------
-    InputError
-        For settings of another algorithm, commands that are not continuous, or a value out of its range.
+    Raises InputError for settings of another algorithm, commands that are not continuous, or a value out of
+    its range.
     """
 
-    algorithm: str
-    task: BenchmarkTask
-    settings: Settings
-    seed: int = 0
-    randomise: bool = False
-    threads: int = 1
+    algorithm: str  # "ppo", "sac", "td3", "tqc"
+    task: BenchmarkTask  # environment, model and options; evaluation is on it as it is
+    settings: Settings  # of the algorithm
+    seed: int = 0  # 0 to 799: of networks, exploration and the ships' episodes
+    randomise: bool = False  # whether the ships that learn differ (`training_options`)
+    threads: int = 1  # of torch and of the kernels
 
     def __post_init__(self) -> None:
         kind = ALGORITHMS[check_choice(self.algorithm, ALGORITHMS, "algorithm")]
@@ -127,35 +111,18 @@ class Plan:
 
 @dataclass(frozen=True)
 class Given:
-    """What a user gives; None, or nothing, for what is left to the defaults, or to the run that is resumed.
-
-    Attributes
-    ----------
-    algorithm : str
-    environment : str or None
-        "course-keeping", "path-following", or an id.
-    model, sea : str or None
-        Name or file of a model, and a sea state.
-    task : str or None
-        Task of the suite, which says environment, model, sea and options.
-    options : mapping
-        Further keywords of the environment.
-    settings_file : Path or None
-        TOML.
-    settings : mapping
-        By name; they go before the file.
-    seed, randomise, threads : optional
-        As in `Plan`.
-    """
+    """What a user gives; None or nothing for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
-    environment: str | None = None
+    environment: str | None = None  # "course-keeping", "path-following", or an id
+    #: name or file of a model, and a sea state
     model: str | None = None
     sea: str | None = None
-    task: str | None = None
-    options: Mapping[str, Any] = field(default_factory=dict)
-    settings_file: Path | None = None
-    settings: Mapping[str, Any] = field(default_factory=dict)
+    task: str | None = None  # task of the suite, which says environment, model, sea and options
+    options: Mapping[str, Any] = field(default_factory=dict)  # further keywords of the environment
+    settings_file: Path | None = None  # TOML
+    settings: Mapping[str, Any] = field(default_factory=dict)  # by name; they go before the file
+    #: as in `Plan`
     seed: int | None = None
     randomise: bool | None = None
     threads: int | None = None
@@ -218,10 +185,7 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
 def read_environment(name: str) -> tuple[str, dict[str, Any]]:
     """An environment's short name and the options of its variant, from that name or from an id.
 
-    Raises
-    ------
-    InputError
-        For an unknown one, with the nearest known one.
+    Raises InputError for an unknown one, with the nearest known one.
     """
     ids = {
         f"shipgym/{task}{variant}-v0": (short, dict(options))
@@ -245,7 +209,7 @@ def training_options(plan: Plan) -> dict[str, Any]:
         return options
     ship, task = plan.task.ship, plan.task.task
     if ship.covariance is not None:
-        options.setdefault("model_uncertainty", "posterior")
+        options.setdefault("model_uncertainty", "covariance")
     options.setdefault("speed_range", SPEED_RANGE)
     names = {sea.name for sea in task.seas}
     current = task.weather.current

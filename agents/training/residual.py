@@ -93,9 +93,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     def reset(self) -> Floats:
         """Begin an episode in each row.
 
-        Returns
-        -------
-        float32 array of shape (num_envs, frame_stack * n_observations + n_commands); 0 commands without base
+        Returns an array of shape (num_envs, frame_stack * n_observations + n_commands).
         """
         observations = self.venv.reset()
         self._state = None
@@ -109,10 +107,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     def step_wait(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
         """`action_repeat` control intervals; `terminal_observation` is what the agent would have seen next.
 
-        Returns
-        -------
-        observations, rewards, dones, infos
-            As those of the ships inside; rewards summed up to the end of an episode, infos of that end.
+        Returns what the ships inside return, rewards summed up to the end of an episode, infos of that end.
         """
         observations, rewards, dones, infos = self._interval()
         infos = list(infos)  # the ships fill theirs anew

@@ -45,10 +45,7 @@ def versions() -> dict[str, str]:
 def check_new(folder: Path) -> None:
     """Refuse a folder in which there is something already.
 
-    Raises
-    ------
-    InputError
-        Which says how to go on with a run that is there.
+    Raises InputError which says how to go on with a run that is there.
     """
     if (folder / RUN).is_file():
         raise InputError(
@@ -61,10 +58,7 @@ def check_new(folder: Path) -> None:
 def begin_folder(folder: Path, plan: Plan, command: str) -> None:
     """Make the folder of a new run, whole or not at all.
 
-    Raises
-    ------
-    InputError
-        If there is something already, or it cannot be written.
+    Raises InputError if there is something already, or it cannot be written.
     """
     check_new(folder)
     content = {
@@ -78,10 +72,7 @@ def begin_folder(folder: Path, plan: Plan, command: str) -> None:
 def read_plan(folder: Path) -> Plan:
     """The run that a folder is of.
 
-    Raises
-    ------
-    InputError
-        If there is none, its file is broken, or its model has changed since.
+    Raises InputError if there is none, its file is broken, or its model has changed since.
     """
     content = _content(folder)
     where = f"{folder / RUN}"
@@ -99,10 +90,7 @@ def read_plan(folder: Path) -> Plan:
 def check_resumable(folder: Path, plan: Plan) -> None:
     """Refuse to go on with a run of another configuration, naming the first difference.
 
-    Raises
-    ------
-    InputError
-        As `read_plan`, or for a difference.
+    Raises InputError as `read_plan`, or for a difference.
     """
     check_same(plan.configuration(), _content(folder)["configuration"], str(folder))
 

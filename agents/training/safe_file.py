@@ -18,18 +18,8 @@ CONTENT = "content"  # entry of the file's metadata: what is not an array, as JS
 def write_values(value: Any, path: Path) -> None:
     """Write a nested value to a temporary name beside the file, then rename it.
 
-    Parameters
-    ----------
-    value
-        Dictionaries, lists and tuples of arrays, torch's tensors, numbers, texts and None.
-    path : Path
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    TypeError
-        For anything else in it.
+    `value`: dictionaries, lists and tuples of arrays, torch's tensors, numbers, texts and None. Raises
+    InputError if the file cannot be written; TypeError for anything else in it.
     """
     from safetensors.numpy import save
 
@@ -41,10 +31,7 @@ def write_values(value: Any, path: Path) -> None:
 def read_values(path: Path, what: str) -> Any:
     """What `write_values` wrote, tensors as tensors.
 
-    Raises
-    ------
-    InputError
-        If the file is missing, cut short or another.
+    Raises InputError if the file is missing, cut short or another.
     """
     from safetensors import SafetensorError, safe_open
 

@@ -283,10 +283,7 @@ def _of(content: Mapping[str, Any], table: str, name: str, where: str) -> Any:
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     """Settings by name, all of them.
 
-    Raises
-    ------
-    InputError
-        For an unknown one, one that is missing, or a value out of its range.
+    Raises InputError for an unknown one, one that is missing, or a value out of its range.
     """
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     table = _settings(values, kind, f"settings of {algorithm}")
@@ -299,10 +296,7 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
 def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
     """The settings with others in the place of some.
 
-    Raises
-    ------
-    InputError
-        For an unknown one, or a value out of its range.
+    Raises InputError for an unknown one, or a value out of its range.
     """
     return replace(settings, **_settings(given, type(settings), "settings"))
 
@@ -310,10 +304,7 @@ def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     """Settings in a TOML file of a user's own.
 
-    Raises
-    ------
-    InputError
-        If it cannot be read, or names an unknown setting.
+    Raises InputError if it cannot be read, or names an unknown setting.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -328,10 +319,7 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:
     """Settings of the command line, `name=value` with a value as in TOML; anything else is text.
 
-    Raises
-    ------
-    InputError
-        For one that is written otherwise.
+    Raises InputError for one that is written otherwise.
     """
     found: dict[str, Any] = {}
     for text in texts:

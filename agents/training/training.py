@@ -40,65 +40,35 @@ CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a min
 
 
 class Progress(NamedTuple):
-    """How far a training is.
+    """How far a training is."""
 
-    Attributes
-    ----------
-    steps, total : int
-        Decisions learned from, and to learn from.
-    seconds : float
-        Spent so far, those before it was resumed among them.
-    cost, best_cost, lq_cost : float or None
-        Mean cost of the episodes held out, at the last evaluation, at the best one, and of LQ.
-    evaluated : bool
-        Whether there is a new evaluation.
-    """
-
+    #: decisions learned from, and to learn from
     steps: int
     total: int
-    seconds: float
+    seconds: float  # spent so far, those before it was resumed among them
+    #: mean cost of the episodes held out, at the last evaluation, at the best one, and of LQ
     cost: float | None
     best_cost: float | None
     lq_cost: float | None
-    evaluated: bool = False
+    evaluated: bool = False  # whether there is a new evaluation
 
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """What came out.
+    """What came out."""
 
-    Attributes
-    ----------
-    plan : Plan
-        The run.
-    policy : LearnedPolicy
-        The best one.
-    curve : tuple of dict
-        Evaluations: steps, seconds, cost on the episodes held out, mean return of those learned from.
-    best_cost : float
-        Mean cost of the policy on the episodes held out, which it was chosen by.
-    best_steps, steps : int
-        When the policy was found, and when the training ended.
-    lq_cost : float or None
-        Of LQ on the same episodes.
-    seconds : float
-        Of training and evaluation, those before it was resumed among them.
-    finished : bool
-        False where the time was up before.
-    resumed_from : int or None
-        Steps of the checkpoint that it went on from.
-    """
-
-    plan: Plan
-    policy: LearnedPolicy
+    plan: Plan  # the run
+    policy: LearnedPolicy  # the best one
+    #: evaluations: steps, seconds, cost on the episodes held out, mean return of those learned from
     curve: tuple[Mapping[str, Any], ...]
-    best_cost: float
+    best_cost: float  # mean cost of the policy on the episodes held out, which it was chosen by
+    #: when the policy was found, and when the training ended
     best_steps: int
     steps: int
-    lq_cost: float | None
-    seconds: float
-    finished: bool
-    resumed_from: int | None
+    lq_cost: float | None  # of LQ on the same episodes
+    seconds: float  # of training and evaluation, those before it was resumed among them
+    finished: bool  # false where the time was up before
+    resumed_from: int | None  # steps of the checkpoint that it went on from
 
     @property
     def lq_reached(self) -> Mapping[str, Any] | None:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.engines.jobs import HERE, JobEngine, run_jobs
+from agents.engines.jobs import HERE, JobEngine
 from agents.training.plan import Plan, check_same
 from agents.training.settings import changed
 from shipgym.checks import check_whole
@@ -48,29 +48,15 @@ Curve = Sequence[tuple[int, float]]
 
 @dataclass(frozen=True)
 class Trial:
-    """One training with settings of its own.
+    """One training with settings of its own."""
 
-    Attributes
-    ----------
-    number : int
-        From 0 on, in the order in which they were proposed.
-    parameters : dict
-        What was varied; none for the first, which has the settings as they are.
-    settings : dict
-        All settings.
-    cost : float or None
-        Mean cost of an episode held out of its best policy; None if it was stopped early or diverged.
-    curve : tuple of (int, float)
-        Cost of each evaluation, by its steps.
-    ended : {"finished", "stopped early", "diverged"}
-    """
-
-    number: int
-    parameters: Mapping[str, Any]
-    settings: Mapping[str, Any]
+    number: int  # from 0 on, in the order in which they were proposed
+    parameters: Mapping[str, Any]  # what was varied; none for the first, which has the settings as they are
+    settings: Mapping[str, Any]  # all settings
+    #: mean cost of an episode held out of its best policy; None if it was stopped early or diverged
     cost: float | None
-    curve: tuple[tuple[int, float], ...]
-    ended: str
+    curve: tuple[tuple[int, float], ...]  # cost of each evaluation, by its steps
+    ended: str  # "finished", "stopped early", "diverged"
 
 
 @dataclass(frozen=True)
@@ -123,18 +109,14 @@ def tune(
     found: list[Trial] = []
     for first in range(0, trials, BATCH):
         proposed = _proposed(plan, found, min(BATCH, trials - first), fixed)
+        best = min((trial.cost for trial in found if trial.cost is not None), default=None)
 
-        def tell(done: int, _: int, before: int = first) -> None:
+        def tell(done: int, _: int, before: int = first, best: float | None = best) -> None:
             if progress is not None:
-                best = min((trial.cost for trial in found if trial.cost is not None), default=None)
                 progress(before + done, trials, best)
 
-        results = run_jobs(
-            training or train_trial,
-            [_job(plan, settings, found) for _, settings in proposed],
-            engine=where.engine, workers=where.workers, address=where.address, keep=folder / KEPT,
-            progress=tell,
-        )  # fmt: skip
+        jobs = [_job(plan, settings, found) for _, settings in proposed]
+        results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
         for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
             found.append(_trial(first + k, parameters, settings, result))
         _record(study, found, plan, fixed)
@@ -145,7 +127,7 @@ def tune(
 
 
 def evaluated_evenly(plan: Plan) -> Plan:
-    """The plan with ten evaluations on the way, which stopping early lives on."""
+    """The plan with ten evaluations on the way, which early stopping needs."""
     every = max(1, plan.settings.total_steps // EVALUATIONS)
     return replace(plan, settings=changed(plan.settings, {"evaluate_every": every}))
 
@@ -181,7 +163,7 @@ class _StoppedEarlyError(Exception):
 
 
 def limits(trials: Sequence[Trial], total_steps: int) -> list[tuple[int, float]]:
-    """Steps, and the median over finished trials of the best cost that they had come to by then."""
+    """Steps, and the median over finished trials of their best cost by then."""
     finished = [trial.curve for trial in trials if trial.ended == "finished"]
     if len(finished) < TRIALS_BEFORE_STOPPING:
         return []

@@ -55,39 +55,21 @@ def build_autopilot(
 ) -> AutopilotResult:
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
-    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the
-    model is unstable only the first two. It is written whole or not at all.
-
-    Parameters
-    ----------
-    ship_file : str or Path
-        The ship file (TOML) with its trials.
-    out : str or Path
-        Folder of the results; an earlier report there is replaced, anything else is refused.
-    draws : int
-        Number of models drawn from the coefficient covariance, at least 2.
-    seed : int
-        Of the draws and of the episodes.
-    options : mapping, optional
-        Of `identify`, by name, trials by file; those not given are the ship file's.
-    agents : sequence of str or Path
-        Files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`).
-    progress : callable, optional
-        Called as the work goes on.
-    where : JobEngine
-        Where the models drawn are worked on; the results are the same.
-
-    Raises
-    ------
-    InputError
-        For anything wrong with the files or arguments; nothing is written then.
+    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the model is
+    unstable only the first two. It is written whole or not at all. `ship_file`: the ship file (TOML) with its
+    trials; `out`: folder of the results; an earlier report there is replaced, anything else is refused;
+    `draws`: number of models drawn from the coefficient covariance, at least 2; `seed`: of the draws and of
+    the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
+    `agents`: files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`);
+    `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the
+    same. Raises InputError for anything wrong with the files or arguments; nothing is written then.
     """
     folder = Path(out)
     where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     check_folder(folder, FILES)
-    graph_objects()  # a missing extra shall be told now, not after the work
+    graph_objects()  # a missing extra is reported now, not after the work
     result = examine(
         ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
         where=where,
@@ -153,21 +135,9 @@ def verify(
 ) -> Verification:
     """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.
 
-    Parameters
-    ----------
-    model : ShipModel
-        With a covariance.
-    draws, seed, progress, where
-        See `build_autopilot`.
-    guests : sequence of Controller, LearnedPolicy or Shielded
-        Further autopilots.
-
-    Raises
-    ------
-    UnstableModelError
-        If the model itself runs away.
-    InputError
-        If no autopilot can be designed on it.
+    `model`: with a covariance; `draws`, `seed`, `progress`, `where`: see `build_autopilot`; `guests`: further
+    autopilots. Raises UnstableModelError if the model itself runs away; InputError if no autopilot can be
+    designed on it.
     """
     stage = "models drawn"
     _tell(progress, stage, 0, draws)
@@ -220,10 +190,7 @@ def _told_apart(names: Sequence[str]) -> list[str]:
 def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
     """The autopilots, and why others could not be designed.
 
-    Raises
-    ------
-    InputError
-        If none could.
+    Raises InputError if none could.
     """
     controllers: list[Controller] = []
     refused: dict[str, str] = {}

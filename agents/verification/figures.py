@@ -121,14 +121,8 @@ def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
 def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step_deg: float) -> Figure:
     """Change of course under each autopilot: heading above, rudder below.
 
-    Parameters
-    ----------
-    t : array of shape (n_samples,)
-        s.
-    responses : mapping of str to (heading, rudder)
-        By autopilot, each of shape (1 + n_draws, n_samples), rad, the identified model first.
-    step_deg : float
-        The change of course, degrees.
+    `t`: s, shape (n_samples,); `responses`: by autopilot, each of shape (1 + n_draws, n_samples), rad, the
+    identified model first; `step_deg`: the change of course, degrees.
     """
     figure = subplots(2, 1, shared_xaxes=True, vertical_spacing=0.06, row_heights=[0.58, 0.42])
     for row in (1, 2):
@@ -149,10 +143,7 @@ def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:
     """Box plot of the cost of each autopilot over the models drawn.
 
-    Parameters
-    ----------
-    costs : mapping of str to array of shape (n_draws,)
-        By autopilot.
+    `costs`: by autopilot, shape (n_draws,).
     """
     go = graph_objects()
     figure = go.Figure()

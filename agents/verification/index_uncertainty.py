@@ -27,39 +27,21 @@ PATHS_KEPT = 40  # turning circles of draws that a report draws
 
 @dataclass(frozen=True)
 class ManoeuvreUncertainty:
-    """Standard manoeuvres of a model and of its draws.
+    """Standard manoeuvres of a model and of its draws."""
 
-    Attributes
-    ----------
-    criteria : dict of str to Criterion
-        By the names of `imo_assessment`, each with its interval over the draws; those that can be assessed.
-    unstable : bool array of shape (n_draws,)
-        Draws that run away in one of the manoeuvres.
-    zigzag : Trial
-        20/20 zigzag of the identified model.
-    zigzag_headings : array of shape (n_stable, n_samples)
-        Heading change of each stable draw in it, rad.
-    circle : Trial
-        Turning circle of the identified model.
-    circle_paths : tuple of array of shape (n_samples, 2)
-        North and east of some stable draws, m.
-    """
-
+    #: by the names of `imo_assessment`, each with its interval over the draws; those that can be assessed
     criteria: dict[str, Criterion]
-    unstable: NDArray[np.bool_]
-    zigzag: Trial
-    zigzag_headings: Floats
-    circle: Trial
-    circle_paths: tuple[Floats, ...]
+    unstable: NDArray[np.bool_]  # draws that run away in one of the manoeuvres, shape (n_draws,)
+    zigzag: Trial  # 20/20 zigzag of the identified model
+    zigzag_headings: Floats  # heading change of each stable draw in it, rad, shape (n_stable, n_samples)
+    circle: Trial  # turning circle of the identified model
+    circle_paths: tuple[Floats, ...]  # north and east of some stable draws, m, shape (n_samples, 2)
 
 
 def nominal_runs(model: ShipModel) -> tuple[Trial, Trial]:
     """Zigzag and turning circle of the model itself.
 
-    Raises
-    ------
-    UnstableModelError
-        If it runs away.
+    Raises UnstableModelError if it runs away.
     """
     return _zigzag(model), _circle(model)
 
@@ -67,14 +49,10 @@ def nominal_runs(model: ShipModel) -> tuple[Trial, Trial]:
 def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
     """Put models drawn from one through the standard manoeuvres.
 
-    Returns
-    -------
-    dict
-        values : by manoeuvre and index, arrays of shape (n_draws,); NaN where there is none.
-        ran_away : by manoeuvre, bool arrays of shape (n_draws,).
-        lost : bool array of shape (n_draws,), draws that run away in the two runs that are kept.
-        headings : array of shape (n_draws, n_samples), in the zigzag, rad; of lost draws 0, as paths are.
-        paths : array of shape (n_draws, n_samples, 2), north and east in the circle, m.
+    Returns `values` by manoeuvre and index, shape (n_draws,), NaN where there is none; `ran_away` by
+    manoeuvre, shape (n_draws,); `lost`, draws that run away in the two runs that are kept, shape (n_draws,);
+    `headings` in the zigzag, rad, shape (n_draws, n_samples), and `paths`, north and east in the circle, m,
+    shape (n_draws, n_samples, 2), both 0 for lost draws.
     """
     needed = imo_manoeuvres(model)
     empty = {name: test.no_indices for name, test in needed.items()}

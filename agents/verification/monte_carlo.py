@@ -32,24 +32,13 @@ DRAWS_A_JOB = 25
 
 @dataclass(frozen=True, eq=False)
 class MonteCarlo:
-    """What became of the models drawn.
+    """What became of the models drawn."""
 
-    Attributes
-    ----------
-    draws : tuple of ShipModel
-        The models drawn.
-    manoeuvres : ManoeuvreUncertainty
-        Standard manoeuvres and IMO criteria over the draws.
-    course_unstable : bool array of shape (n_draws,)
-        Draws that do not keep a straight course with the rudder fixed.
-    episodes : tuple of Episodes
-        Of each controller, one episode on each draw.
-    """
-
-    draws: tuple[ShipModel, ...]
-    manoeuvres: ManoeuvreUncertainty
+    draws: tuple[ShipModel, ...]  # the models drawn
+    manoeuvres: ManoeuvreUncertainty  # standard manoeuvres and IMO criteria over the draws
+    #: draws that do not keep a straight course with the rudder fixed, shape (n_draws,)
     course_unstable: NDArray[np.bool_]
-    episodes: tuple[Episodes, ...]
+    episodes: tuple[Episodes, ...]  # of each controller, one episode on each draw
 
 
 def monte_carlo(

@@ -36,19 +36,8 @@ SIGNALS = {
 def write_report(result: AutopilotResult, path: str | Path) -> None:
     """Write the report.
 
-    Of an unstable model it says that it is, and what to do; it shows no numbers of the model's own.
-
-    Parameters
-    ----------
-    result : AutopilotResult
-        What the chain found.
-    path : str or Path
-        The HTML file.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
+    Of an unstable model it says that it is, and what to do; it shows no numbers of the model's own. `result`:
+    what the chain found; `path`: the HTML file. Raises InputError if plotly is not installed.
     """
     found, provenance = result.verification, result.model.provenance or {}
     figures = {} if found is None else trial_figures(result.identification) | _figures(result, found)

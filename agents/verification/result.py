@@ -27,24 +27,12 @@ STEP_DEG = 20.0
 
 @dataclass(frozen=True, eq=False)
 class Pilot:
-    """One autopilot and what it costs over the models drawn.
+    """One autopilot and what it costs over the models drawn."""
 
-    Attributes
-    ----------
-    key : str
-        Its name in metrics, no other's: that of the controller, with a number where there are several.
-    controller : Controller, LearnedPolicy or Shielded
-        With gains and margins if it is a Controller.
-    episodes : Episodes
-        One episode on each model drawn.
-    step : StepResponses
-        Of the identified model, first, and of the stable models drawn.
-    """
-
-    key: str
-    controller: Agent
-    episodes: Episodes
-    step: StepResponses
+    key: str  # its name in metrics, no other's: that of the controller, with a number where there are several
+    controller: Agent  # with gains and margins if it is a Controller
+    episodes: Episodes  # one episode on each model drawn
+    step: StepResponses  # of the identified model, first, and of the stable models drawn
 
     @property
     def name(self) -> str:
@@ -59,58 +47,27 @@ class Pilot:
 
 @dataclass(frozen=True, eq=False)
 class Verification:
-    """What was found out about a stable model and its autopilots.
+    """What was found out about a stable model and its autopilots."""
 
-    Attributes
-    ----------
-    draws : int
-        Number of models drawn from the coefficient covariance.
-    seed : int
-        Of the draw and of the episodes.
-    manoeuvres : ManoeuvreUncertainty
-        Indices and IMO criteria of the model and its draws.
-    course_unstable : bool array of shape (n_draws,)
-        Draws that do not hold a straight course with the rudder held.
-    nomoto : Nomoto
-        Of the identified model.
-    pilots : tuple of Pilot
-        Ranked: the lowest mean cost first.
-    refused : dict of str to str
-        Autopilots that could not be designed on the model, and why.
-    """
-
-    draws: int
-    seed: int
-    manoeuvres: ManoeuvreUncertainty
+    draws: int  # number of models drawn from the coefficient covariance
+    seed: int  # of the draw and of the episodes
+    manoeuvres: ManoeuvreUncertainty  # indices and IMO criteria of the model and its draws
+    #: draws that do not hold a straight course with the rudder held, shape (n_draws,)
     course_unstable: NDArray[np.bool_]
-    nomoto: Nomoto
-    pilots: tuple[Pilot, ...]
-    refused: dict[str, str]
+    nomoto: Nomoto  # of the identified model
+    pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
+    refused: dict[str, str]  # autopilots that could not be designed on the model, and why
 
 
 @dataclass(frozen=True, eq=False)
 class AutopilotResult:
-    """All that the report tells.
+    """Everything in the report."""
 
-    Attributes
-    ----------
-    ship : ShipFile
-        What was read.
-    trials : tuple of Trial
-        In the order of the file.
-    identification : IdentificationResult
-        The model and its predictions.
-    instability : str or None
-        Why the model must not be used; None where it is stable.
-    verification : Verification or None
-        None where the model is unstable.
-    """
-
-    ship: ShipFile
-    trials: tuple[Trial, ...]
-    identification: IdentificationResult
-    instability: str | None
-    verification: Verification | None
+    ship: ShipFile  # what was read
+    trials: tuple[Trial, ...]  # in the order of the file
+    identification: IdentificationResult  # the model and its predictions
+    instability: str | None  # why the model must not be used; None where it is stable
+    verification: Verification | None  # none where the model is unstable
 
     @property
     def model(self) -> ShipModel:
@@ -138,7 +95,7 @@ class AutopilotResult:
 
 
 def verification_metrics(found: Verification) -> dict[str, Any]:
-    """What metrics.json tells of a verification."""
+    """What metrics.json says of a verification."""
     return {
         "draws": {
             "count": found.draws,
@@ -147,7 +104,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "course_unstable": int(found.course_unstable.sum()),
         },
         "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
-        "imo": {name: spread.to_dict() for name, spread in found.manoeuvres.criteria.items()},
+        "imo": {name: criterion.to_dict() for name, criterion in found.manoeuvres.criteria.items()},
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,

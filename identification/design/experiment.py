@@ -39,23 +39,13 @@ JITTER = 1e-12
 
 @dataclass(frozen=True, eq=False)
 class TrialInformation:
-    """What one trial says about the coefficients.
+    """What one trial says about the coefficients."""
 
-    Attributes
-    ----------
-    name : str
-        Of the trial.
-    condition_number : dict of str to float
-        By equation, of the features scaled to a root mean square of 1.
-    inflation : dict of str to float
-        By coefficient of the accelerations' terms: how much the other terms increase its variance.
-    information : array of shape (n_coefficients, n_coefficients)
-        Fisher information of the model's coefficients.
-    """
-
-    name: str
-    condition_number: dict[str, float]
+    name: str  # of the trial
+    condition_number: dict[str, float]  # by equation, of the features scaled to a root mean square of 1
+    #: by coefficient of the accelerations' terms: how much the other terms increase its variance
     inflation: dict[str, float]
+    #: Fisher information of the model's coefficients, shape (n_coefficients, n_coefficients)
     information: Floats
 
 
@@ -246,7 +236,7 @@ def advise(
 def _gains(
     total: Floats, offers: Mapping[str, Floats], size: Floats, criterion: str, at: int
 ) -> dict[str, float]:
-    """By what factor each candidate would shrink what the criterion looks at."""
+    """By what factor each candidate would shrink what the criterion measures."""
     now = _uncertainty(total, size, criterion, at)
     return {name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()}
 

@@ -33,29 +33,17 @@ SENSED = ("u", "v", "r", "psi")
 
 @dataclass(frozen=True)
 class ReductionStep:
-    """A model on the path.
+    """A model on the path."""
 
-    Attributes
-    ----------
-    terms : tuple of str
-        Its terms.
-    changed : str
-        The term dropped or added to get here; empty for the first model of an elimination.
-    coefficients, relative_errors : dict of str to float
-        Of each term: coefficient, and standard error by its size.
-    r_squared, held_out : float
-        Share of the targets that is explained: of all samples, and of stretches predicted from the others.
-    error_reduction : float
-        Share that the change explains of all (negative for a term that was dropped).
-    """
-
-    terms: tuple[str, ...]
-    changed: str
+    terms: tuple[str, ...]  # its terms
+    changed: str  # the term dropped or added to get here; empty for the first model of an elimination
+    #: of each term: coefficient, and standard error by its size
     coefficients: dict[str, float]
     relative_errors: dict[str, float]
+    #: share of the targets that is explained: of all samples, and of stretches predicted from the others
     r_squared: float
     held_out: float
-    error_reduction: float
+    error_reduction: float  # share that the change explains of all (negative for a term that was dropped)
 
 
 @dataclass(frozen=True)

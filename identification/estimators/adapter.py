@@ -37,10 +37,8 @@ class Adapted:
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to features of shape (n_samples, n_features) and targets of shape (n_samples,).
 
-        Raises
-        ------
-        InputError
-            For an estimator that sets no `coef_`, or one that is not a finite number for each feature.
+        Raises InputError for an estimator that sets no `coef_`, or one that is not a finite number for each
+        feature.
         """
         features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
         self.inner.fit(features, targets)

@@ -27,37 +27,18 @@ BLOCK = 32  # columns that LAPACK handles at once
 
 @dataclass(frozen=True)
 class Decomposition:
-    """Thin singular value decomposition of centred and scaled features, and the targets in it.
+    """Thin singular value decomposition of centred and scaled features, and the targets in it."""
 
-    Attributes
-    ----------
-    singular_values : array of shape (n_directions,)
-        Descending.
-    directions : array of shape (n_directions, n_features)
-        Right singular vectors.
-    projections : array of shape (n_directions,)
-        Targets in the left singular vectors.
-    outside : float
-        Squared norm of the targets that no direction reaches.
-    n_free : int
-        Samples, less one where there is an intercept.
-    centre, scale : array of shape (n_features,)
-        What was subtracted from the features, and what they were divided by.
-    mean : float
-        What was subtracted from the targets.
-    n_samples : int
-        Number of samples.
-    """
-
-    singular_values: Floats
-    directions: Floats
-    projections: Floats
-    outside: float
-    n_free: int
+    singular_values: Floats  # descending, shape (n_directions,)
+    directions: Floats  # right singular vectors, shape (n_directions, n_features)
+    projections: Floats  # targets in the left singular vectors, shape (n_directions,)
+    outside: float  # squared norm of the targets that no direction reaches
+    n_free: int  # samples, less one where there is an intercept
+    #: what was subtracted from the features, and what they were divided by, shape (n_features,)
     centre: Floats
-    mean: float
+    mean: float  # what was subtracted from the targets
     scale: Floats
-    n_samples: int
+    n_samples: int  # number of samples
 
     @property
     def numerical_rank(self) -> int:

@@ -1,4 +1,4 @@
-"""What every estimator offers that `identify` may fit to an equation, and what a method may look at."""
+"""What every estimator offers that `identify` may fit to an equation, and what a method may use."""
 
 from __future__ import annotations
 
@@ -22,19 +22,13 @@ class Estimator(Protocol):
     Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the directions dropped),
     `weights_` (of the samples; all equal where absent), `search_` (how settings were chosen) and
     `chosen_` (the settings chosen, for the provenance).
-
-    Attributes
-    ----------
-    coef_ : array of shape (n_features,)
-        Coefficients of the features as given.
-    covariance_ : array of shape (n_features, n_features)
-        Of `coef_`, for exact features and independent errors.
-    inverse_moment_ : array of shape (n_features, n_features)
-        Regularised inverse M of X' W X: `coef_` is M X' W y with W the weights.
     """
 
-    coef_: Floats
+    coef_: Floats  # coefficients of the features as given, shape (n_features,)
+    #: of `coef_`, for exact features and independent errors, shape (n_features, n_features)
     covariance_: Floats
+    #: regularised inverse M of X' W X: `coef_` is M X' W y with W the weights, shape (n_features,
+    #: n_features)
     inverse_moment_: Floats
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
@@ -54,21 +48,11 @@ def weights(estimator: Estimator, features: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class FitTask:
-    """All that a method may look at.
+    """Everything that a method may use."""
 
-    Attributes
-    ----------
-    samples : Samples
-        The regression of each equation.
-    blank : ShipModel
-        The model but for its coefficients.
-    trials : sequence of Trial
-        Those behind the samples.
-    """
-
-    samples: Samples
-    blank: ShipModel
-    trials: Sequence[Trial]
+    samples: Samples  # the regression of each equation
+    blank: ShipModel  # the model but for its coefficients
+    trials: Sequence[Trial]  # those behind the samples
 
 
 Estimators = dict[str, Estimator]

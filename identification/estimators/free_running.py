@@ -44,17 +44,9 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
 def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSVM]:
     """Estimators of all equations, their C chosen together by the error of simulated trials.
 
-    Parameters
-    ----------
-    settings : TunedLSSVM
-        Not fitted; gives optimiser, bounds, seed and scale.
-    task : FitTask
-        Its trials are simulated.
-
-    Returns
-    -------
-    dict of str to TunedLSSVM
-        By equation; the variables of their common search are log10 C in the order of the equations.
+    `settings`: not fitted; gives optimiser, bounds, seed and scale; `task`: its trials are simulated. Returns
+    the estimators by equation; the variables of their common search are log10 C in the order of the
+    equations.
     """
     samples, blank, trials = task.samples, task.blank, task.trials
     equations = blank.table.regressed
@@ -80,7 +72,7 @@ def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSV
     for k, q in enumerate(equations):
         own = replace(search, x=search.x[k : k + 1], course=search.course[:, k : k + 1])
         estimator = TunedLSSVM(**settings.get_params(deep=False))
-        estimators[q] = estimator.settle(
+        estimators[q] = estimator.fit_with(
             samples.features[q], samples.targets[q], 10.0 ** float(search.x[k]), own
         )
     return estimators

@@ -16,29 +16,18 @@ SIGNIFICANCE = 0.1
 
 @dataclass(frozen=True)
 class LCurve:
-    """Norms of residual and solution of the solutions of rank 1, 2, ...
+    """Norms of residual and solution of the solutions of rank 1, 2, ..."""
 
-    Attributes
-    ----------
-    residual_norm : array of shape (n_ranks,)
-        Euclidean norm of the residuals of the fit of rank 1 to n_ranks.
-    solution_norm : array of shape (n_ranks,)
-        Norm of the scaled coefficients.
-    """
-
-    residual_norm: Floats
-    solution_norm: Floats
+    residual_norm: Floats  # euclidean norm of the residuals of the fit of rank 1 to n_ranks, shape (n_ranks,)
+    solution_norm: Floats  # norm of the scaled coefficients, shape (n_ranks,)
 
 
 def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outside: float) -> LCurve:
     """Norms for every rank from one singular value decomposition.
 
-    Parameters
-    ----------
-    singular_values, projections, filters : array of shape (n_ranks,)
-        Of the scaled features, descending; targets in the left singular vectors, U'y; s / (s^2 + 1/C).
-    outside : float
-        Squared norm of the part of the targets that no direction reaches.
+    `singular_values`, `projections`, `filters`: of the scaled features, descending; targets in the left
+    singular vectors, U'y; s / (s^2 + 1/C), shape (n_ranks,); `outside`: squared norm of the part of the
+    targets that no direction reaches.
     """
     missed = projections**2
     explained_miss = (projections * (1.0 - singular_values * filters)) ** 2

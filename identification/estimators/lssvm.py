@@ -55,7 +55,7 @@ class LSSVM(LinearRegressor):
         Of the poly kernel.
     robust : bool
         Whether outliers lose their influence: samples are weighted by their residuals and fitted again until
-        the weights settle (weighted LS-SVM, Suykens et al. 2002).
+        the weights converge (weighted LS-SVM, Suykens et al. 2002).
 
     Attributes
     ----------
@@ -260,7 +260,7 @@ def take(
 
 
 def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
-    """Fit once, or until the weights of the samples settle; returns the weights."""
+    """Fit once, or until the weights of the samples converge; returns the weights."""
     if robust:
         return reweighted(fit, float(np.max(np.abs(y))))
     fit(None)

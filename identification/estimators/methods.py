@@ -37,36 +37,20 @@ def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
 
 @dataclass(frozen=True)
 class Method:
-    """A way to fit the regressions.
+    """A way to fit the regressions."""
 
-    Attributes
-    ----------
-    name : str
-        As `identify` knows it.
-    estimator : callable
-        Makes an unfitted estimator from settings.
-    regularised : bool
-        Whether the guard against models that run away may penalise it.
-    fit : callable
-        Fits estimators, made by its first argument, to the task that is its second, and returns them by
-        equation. By default each equation by itself, from the samples alone.
-    refined : bool
-        Whether what was fitted is the start of a refinement by simulation (`refine`).
-    """
-
-    name: str
-    estimator: Callable[..., Estimator]
-    regularised: bool = True
+    name: str  # as `identify` knows it
+    estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
+    regularised: bool = True  # whether the guard against models that run away may penalise it
+    #: fits estimators, made by its first argument, to the task that is its second, and returns them by
+    #: equation. By default each equation by itself, from the samples alone
     fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = each_equation
-    refined: bool = False
+    refined: bool = False  # whether what was fitted is the start of a refinement by simulation (`refine`)
 
     def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
         """Estimators of all equations, fitted with the settings.
 
-        Raises
-        ------
-        InputError
-            For settings that the method does not know.
+        Raises InputError for settings that the method does not know.
         """
         unknown = [name for name in settings if not self.knows(name)]
         if unknown:
@@ -99,7 +83,7 @@ def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
 
 
 def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may look at trials: as blocks, or by simulating them."""
+    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
     template, samples = make(), task.samples
     assert isinstance(template, TunedLSSVM)
     if template.objective == "free-running":
@@ -136,7 +120,7 @@ METHODS = {
     )
 }
 
-#: Estimators that look at more than the samples of one equation.
+#: Estimators that use more than the samples of one equation.
 FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
 
 
@@ -144,12 +128,8 @@ def get_method(method: str | Any) -> Method:
     """A method by name, or that of an estimator object.
 
     The estimator of each equation is a copy of the object, without a constant term: the equations of motion
-    have none but that of the structure.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name, and for an object without `fit`.
+    have none but that of the structure. Raises InputError if there is none of that name, and for an object
+    without `fit`.
     """
     if isinstance(method, str):
         return METHODS[check_choice(method, METHODS, "method")]

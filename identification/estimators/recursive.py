@@ -84,15 +84,8 @@ class Recursion(LinearRegressor):
     def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
         """Fit, and return the estimate after each sample.
 
-        Parameters
-        ----------
-        X, y
-            As in `fit`.
-
-        Returns
-        -------
-        array of shape (n_samples, n_features)
-            While LS-SVR gathers its samples, what it will find from them.
+        `X`, `y`: as in `fit`. Returns the coefficients after each sample (while LS-SVR gathers its samples,
+        those that it will find from them), shape (n_samples, n_features).
         """
         self._check()
         features, targets = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
@@ -117,19 +110,10 @@ class Recursion(LinearRegressor):
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
 
-        Scales are fixed by the first call: give several samples first, or `scale`.
-
-        Parameters
-        ----------
-        phi : array-like of shape (n_features,), (n_samples, n_features) or (n_samples, n_signals, n_features)
-            Regressors; where signals share them, their axis may be absent.
-        y : float or array-like of shape (n_samples,) or (n_samples, n_signals)
-            What they explain.
-
-        Raises
-        ------
-        InputError
-            For shapes that do not fit and numbers that are not finite.
+        Scales are fixed by the first call: give several samples first, or `scale`. `phi`: regressors; where
+        signals share them, their axis may be absent, shape (n_features,), (n_samples, n_features) or
+        (n_samples, n_signals, n_features); `y`: what they explain, shape (n_samples,) or (n_samples,
+        n_signals). Raises InputError for shapes that do not fit and numbers that are not finite.
         """
         self._check()
         features, targets = _shaped(phi, y)

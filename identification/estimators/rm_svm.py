@@ -178,22 +178,9 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
 def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
-    Parameters
-    ----------
-    make : callable
-        Makes an unfitted `RMSVM` with the settings asked for.
-    task : FitTask
-        Its model is the bare reference ship as a model of the target.
-
-    Returns
-    -------
-    dict of str to RMSVM
-        With what was chosen in `chosen_`.
-
-    Raises
-    ------
-    InputError
-        For a model without a reference ship.
+    `make`: makes an unfitted `RMSVM` with the settings asked for; `task`: its model is the bare reference
+    ship as a model of the target. What was chosen is in `chosen_`. Raises InputError for a model without a
+    reference ship.
     """
     asked, samples = make(), task.samples
     assert isinstance(asked, RMSVM)

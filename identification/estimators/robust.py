@@ -32,7 +32,7 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
 
 
 def reweighted(fit: Callable[[Floats | None], Floats], largest: float) -> Floats:
-    """Fit, weight the samples by their residuals and fit again until the weights settle.
+    """Fit, weight the samples by their residuals and fit again until the weights converge.
 
     `fit` takes weights, None for equal ones, and returns the residuals; `largest` is the size of the largest
     target. Returns the weights of the last fit; after 50 rounds without settling the last ones are taken.

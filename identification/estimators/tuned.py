@@ -96,7 +96,7 @@ class TunedLSSVM(LinearRegressor):
         X, y = validated(self, X, y)
         objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
         search = optimiser.minimise(objective, [bounds], self.seed)
-        return self.settle(X, y, 10.0 ** float(search.x[0]), search)
+        return self.fit_with(X, y, 10.0 ** float(search.x[0]), search)
 
     def log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
@@ -113,7 +113,7 @@ class TunedLSSVM(LinearRegressor):
             )
         return float(np.log10(low)), float(np.log10(high))
 
-    def settle(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
+    def fit_with(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
         estimator = self._estimator(C).fit(X, y)

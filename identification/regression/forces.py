@@ -32,7 +32,7 @@ FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)
 JUMP = 20.0  # of the usual change of a velocity from sample to sample: another angle of a static test
 FEWEST = 4  # samples between jumps
-METHODS = ("ls", "tls-svm")
+METHODS = {"ls": "full", "tls-svm": "l-curve"}  # how each chooses the directions that it keeps
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,18 +183,9 @@ def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
 def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
     """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
 
-    Parameters
-    ----------
-    regression : ForceRegression
-        Of captive tests.
-    estimator : Estimator
-        Without intercept; it is fitted.
-
-    Returns
-    -------
-    coefficients : array of shape (n_coefficients,)
-    covariance : array of shape (n_coefficients, n_coefficients)
-        For white errors, whose size is that of each force's own residuals.
+    `regression`: of captive tests; `estimator`: without intercept; it is fitted. Returns `coefficients`:
+    shape (n_coefficients,); `covariance`: for white errors, whose size is that of each force's own residuals,
+    shape (n_coefficients, n_coefficients).
     """
     scales = regression.scales()
     features, targets = regression.features / scales[:, None], regression.targets / scales
@@ -210,18 +201,9 @@ def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Float
 def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
     """Variances of the errors of X, Y and N, each by its residuals.
 
-    Parameters
-    ----------
-    equation : array of shape (n_rows,)
-        0, 1, 2 for X, Y, N.
-    residuals : array of shape (n_rows, ...)
-        Of the fit.
-    leverages : array of shape (n_rows,)
-        Diagonal of the matrix that maps targets to fitted values.
-
-    Returns
-    -------
-    array of shape (3, ...)
+    `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape (n_rows, ...);
+    `leverages`: diagonal of the matrix that maps targets to fitted values, shape (n_rows,). Returns an array
+    of shape (3, ...).
     """
     found = []
     for i in range(len(FORCES)):
@@ -252,7 +234,7 @@ def identify_forces(
     structure : str
         `pmm38`, `pmm18` or another table of shares.
     method : {"tls-svm", "ls"}
-        Truncated LS-SVM, or least squares. X, Y and N count alike, each by its root mean square.
+        Truncated LS-SVM, or least squares; each of X, Y and N is scaled by its root mean square.
     rank : int, optional
         Directions that `tls-svm` keeps; by default by its L-curve.
     steering, name : optional
@@ -274,8 +256,7 @@ def identify_forces(
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
     regression = force_regression(trials, _captive_table(structure), particulars, model_inertia)
-    selection = "full" if method == "ls" else "l-curve"
-    estimator = TruncatedLSSVM(selection=selection, rank=rank, fit_intercept=False)
+    estimator = TruncatedLSSVM(selection=METHODS[method], rank=rank, fit_intercept=False)
     coefficients, covariance = fit_forces(regression, estimator)
     provenance = {
         "structure": structure,

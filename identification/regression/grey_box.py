@@ -36,25 +36,10 @@ def chosen_box(
 ) -> tuple[GreyBox, dict[str, float]]:
     """The grey box of a named reference ship, or of the one most like the target.
 
-    Parameters
-    ----------
-    reference : str or ShipModel, optional
-        A model, its name or file; "auto" chooses by `select_reference`.
-    particulars : Particulars
-        Of the target.
-    trials : sequence of Trial
-        Of the target; whether its shaft speed and roll are known.
-
-    Returns
-    -------
-    box : GreyBox
-    correlations : dict of str to float
-        Of the candidates, empty where the ship was named.
-
-    Raises
-    ------
-    InputError
-        For no reference, or one that does not exist.
+    `reference`: a model, its name or file; "auto" chooses by `select_reference`; `particulars`: of the
+    target; `trials`: of the target; whether its shaft speed and roll are known. Returns `correlations`: of
+    the candidates, empty where the ship was named. Raises InputError for no reference, or one that does not
+    exist.
     """
     if reference is None:
         raise InputError(

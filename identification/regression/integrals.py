@@ -41,23 +41,10 @@ def spline_integrals(
 ) -> Integrals:
     """Integrals over each step by Gauss quadrature on splines through the samples.
 
-    Parameters
-    ----------
-    t : array of shape (n_samples,)
-        s.
-    channels : mapping of str to array of shape (n_samples,)
-        By name.
-    equations : iterable of str
-        Whose terms are integrated.
-    terms : callable
-        The terms of an equation from the channels.
-    rudder : Rudder
-        Where the splines are broken.
-
-    Returns
-    -------
-    integrals, moments : dict of str to array of shape (n_samples - 1, n_terms)
-        By equation; moments about the end of the step.
+    `t`: s, shape (n_samples,); `channels`: by name, shape (n_samples,); `equations`: whose terms are
+    integrated; `terms`: the terms of an equation from the channels; `rudder`: where the splines are broken.
+    Returns `integrals, moments`: by equation; moments about the end of the step, shape (n_samples - 1,
+    n_terms).
     """
     edges = np.union1d(t, rudder.corners)
     middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)

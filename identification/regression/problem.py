@@ -28,26 +28,13 @@ ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What a method is given to fit.
+    """What a method is given to fit."""
 
-    Attributes
-    ----------
-    trials : tuple of Trial
-        All, those held out marked `validate`.
-    used : tuple of Trial
-        Those to fit, repaired where asked.
-    blank : ShipModel
-        The model but for its coefficients.
-    samples : Samples
-        The regression.
-    similarity : dict of str to float
-        Of the candidates for the reference ship of a grey box, where it was chosen among several.
-    """
-
-    trials: tuple[Trial, ...]
-    used: tuple[Trial, ...]
-    blank: ShipModel
-    samples: Samples
+    trials: tuple[Trial, ...]  # all, those held out marked `validate`
+    used: tuple[Trial, ...]  # those to fit, repaired where asked
+    blank: ShipModel  # the model but for its coefficients
+    samples: Samples  # the regression
+    #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
 
 
@@ -59,11 +46,8 @@ def pose(
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
-    Raises
-    ------
-    InputError
-        For trials that excite nothing, lack channels or samples or are of another ship, and for particulars
-        that do not suffice.
+    Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
+    particulars that do not suffice.
     """
     everything = _held_out(trials, options.hold_out)
     if not isinstance(steering, SteeringGear | None):

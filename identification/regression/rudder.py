@@ -34,35 +34,24 @@ FAST_QUANTILE = 0.995  # of the rates of records with noise
 
 @dataclass(frozen=True)
 class Rudder:
-    """Rudder angle as a function of time, through all samples.
+    """Rudder angle as a function of time, through all samples."""
 
-    Attributes
-    ----------
-    t, delta : array of shape (n_samples,)
-        The samples, s and rad.
-    rate, time_constant : float
-        Of the gear that explains them, rad/s and s; 0 where none does.
-    follows_gear : bool
-        Whether a steering gear explains the samples; if not, the rudder is taken straight between them.
-    before, after : array of shape (n_samples - 1,)
-        Order in the first and second part of each interval, rad; infinite where only its side is known.
-    switch : array of shape (n_samples - 1,)
-        Time from the interval's start at which the order changes, s.
-    corners : array of shape (n_corners,)
-        Times at which rate or acceleration of the rudder jump, s.
-    smoothness : array of shape (n_corners,)
-        Derivatives of the rudder that are continuous there: 0 where the rate jumps, 1 otherwise.
-    """
-
+    #: the samples, s and rad, shape (n_samples,)
     t: Floats
     delta: Floats
+    #: of the gear that explains them, rad/s and s; 0 where none does
     rate: float
     time_constant: float
+    #: whether a steering gear explains the samples; if not, the rudder is taken straight between them
     follows_gear: bool
+    #: order in the first and second part of each interval, rad; infinite where only its side is known,
+    #: shape (n_samples - 1,)
     before: Floats
     after: Floats
-    switch: Floats
-    corners: Floats
+    switch: Floats  # time from the interval's start at which the order changes, s, shape (n_samples - 1,)
+    corners: Floats  # times at which rate or acceleration of the rudder jump, s, shape (n_corners,)
+    #: derivatives of the rudder that are continuous there: 0 where the rate jumps, 1 otherwise, shape
+    #: (n_corners,)
     smoothness: NDArray[np.int64]
 
     def __call__(self, times: ArrayLike) -> Floats:
@@ -241,13 +230,9 @@ def _ramp_ends(
 def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     """Limit, rate and lag of a steering gear from the rudder angles of trials.
 
-    The limit is 35 degrees or the largest angle recorded. Rate and lag are those that explain records
-    without noise exactly; records with noise give the median rate of the fast moves, and no lag.
-
-    Parameters
-    ----------
-    trials : sequence of Trial
-        With `delta`.
+    The limit is 35 degrees or the largest angle recorded. Rate and lag are those that explain records without
+    noise exactly; records with noise give the median rate of the fast moves, and no lag. `trials`: with
+    `delta`.
     """
     limit = max(USUAL_LIMIT_DEG, *(float(np.degrees(np.abs(trial["delta"]).max())) for trial in trials))
     clean = [t for t in trials if not is_noisy(t.t, (t[channel] for channel in "uvr"))]

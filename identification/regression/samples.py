@@ -204,11 +204,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
     A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
     0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
     the regression is longer than a quarter of it. Pieces shorter than `fewest`, or 10, samples are left out.
-
-    Raises
-    ------
-    InputError
-        Where no piece is left.
+    Raises InputError where no piece is left.
     """
     steps = np.diff(trial.t)
     usual = np.maximum(np.median(steps), median_filter(steps, NEIGHBOURS, mode="mirror"))
@@ -257,12 +253,8 @@ def without_memory(part: Samples) -> Samples:
     integrated from the start of the trial, stand on the right; so their difference is free of it. That is the
     regression of the second-order equation weighted by two boxes convolved, a modulating function (Shinbrot
     1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a measured
-    channel is formed. The rows returned are those with a window after theirs.
-
-    Raises
-    ------
-    InputError
-        For a trial of fewer than two windows.
+    channel is formed. The rows returned are those with a window after theirs. Raises InputError for a trial
+    of fewer than two windows.
     """
     end = part.start + part.duration
     following = np.searchsorted(part.start, end - 1e-9 * part.duration)

@@ -24,10 +24,7 @@ LARGEST = 2.0  # error that the figure shows; larger ones lie on its edge
 def comparison_page(comparison: Ranking) -> str:
     """The page, as text; the same comparison gives the same text.
 
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
+    Raises InputError if plotly is not installed.
     """
     model = comparison.best.model
     return render(

@@ -16,12 +16,8 @@ TOLD_ELSEWHERE = ("trials", "particulars", "steering")  # settings that have tab
 def report_page(fit: Fit) -> str:
     """The page, as text; the same fit gives the same text.
 
-    The coefficients of an unstable model are in its file, marked, and not here.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
+    The coefficients of an unstable model are in its file, marked, and not here. Raises InputError if plotly
+    is not installed.
     """
     instability = why_unstable(fit)
     figures: dict[str, Any] = {"regression": regression_figures(fit)}

@@ -38,10 +38,7 @@ OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
     """An optimiser by name with its usual settings, as a table `{"name": "abc", "rounds": 60}`, or as given.
 
-    Raises
-    ------
-    InputError
-        For a name or a setting that is not known.
+    Raises InputError for a name or a setting that is not known.
     """
     if hasattr(optimiser, "minimise"):
         return optimiser

@@ -19,23 +19,13 @@ class ErrorOfC:
     """Mean squared error of the fits for each C, on the samples they were fitted to or on others.
 
     Its arrays are as large as the triangles of the folds, whatever the number of samples.
-
-    Attributes
-    ----------
-    offset : array of shape (n_folds, 1, n_rows)
-        Error of the mean alone.
-    gain : array of shape (n_folds, n_directions, n_rows)
-        What each direction explains of it, by 1 / (s^2 + 1/C).
-    squares : array of shape (n_folds, 1, n_directions)
-        Squares of the singular values s.
-    n_samples : int
-        Samples that the errors belong to.
     """
 
-    offset: Floats
+    offset: Floats  # error of the mean alone, shape (n_folds, 1, n_rows)
+    #: what each direction explains of it, by 1 / (s^2 + 1/C), shape (n_folds, n_directions, n_rows)
     gain: Floats
-    squares: Floats
-    n_samples: int
+    squares: Floats  # squares of the singular values s, shape (n_folds, 1, n_directions)
+    n_samples: int  # samples that the errors belong to
 
     def __call__(self, log_c: Floats) -> Floats:
         """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
@@ -107,24 +97,10 @@ def _errors(
 def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> NDArray[np.int64]:
     """Blocks of samples that follow each other, never shuffled: neighbours in time are alike.
 
-    Parameters
-    ----------
-    n_samples : int
-        In the order of time, one trial after the other.
-    folds : int or "trials"
-        Number of blocks, equally long but for one sample; "trials" makes a block of each trial.
-    groups : array-like of shape (n_samples,), optional
-        Trial of each sample; needed for folds="trials".
-
-    Returns
-    -------
-    array of shape (n_samples,)
-        Index of the block of each sample.
-
-    Raises
-    ------
-    InputError
-        For fewer than 2 blocks, and for more blocks than samples.
+    `n_samples`: in the order of time, one trial after the other; `folds`: number of blocks, equally long but
+    for one sample; "trials" makes a block of each trial; `groups`: trial of each sample; needed for
+    folds="trials", shape (n_samples,). Returns the index of the block of each sample, shape (n_samples,).
+    Raises InputError for fewer than 2 blocks, and for more blocks than samples.
     """
     if folds == "trials":
         found = np.zeros(0) if groups is None else np.unique(np.asarray(groups))

@@ -53,35 +53,20 @@ class Optimiser(Protocol):
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise.
 
-        Parameters
-        ----------
-        objective : callable
-            Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
-        bounds : array-like of shape (n_dimensions, 2)
-            Lower and upper bound of each dimension.
-        seed : int
-            The same seed gives the same search.
+        `objective`: values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions);
+        `bounds`: lower and upper bound of each dimension, shape (n_dimensions, 2); `seed`: the same seed
+        gives the same search.
         """
         ...
 
 
 @dataclass(eq=False)
 class Recorder:
-    """Evaluates candidates and keeps the best.
+    """Evaluates candidates and keeps the best."""
 
-    Attributes
-    ----------
-    objective : callable
-        As of `Optimiser.minimise`.
-    x : array of shape (n_dimensions,)
-        The best candidate so far.
-    value : float
-        Its objective.
-    """
-
-    objective: Objective
-    x: Floats = field(default_factory=lambda: np.empty(0))
-    value: float = np.inf
+    objective: Objective  # as of `Optimiser.minimise`
+    x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far, shape (n_dimensions,)
+    value: float = np.inf  # its objective
     evaluations: int = 0
     _history: list[float] = field(default_factory=list)
     _course: list[Floats] = field(default_factory=list)
@@ -116,10 +101,7 @@ class Recorder:
 def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     """Lower and upper bounds, arrays of shape (n_dimensions,).
 
-    Raises
-    ------
-    InputError
-        For bounds that are not finite, or of which the lower is not the lower one.
+    Raises InputError for bounds that are not finite, or of which the lower is not the lower one.
     """
     try:
         box = np.asarray(bounds, dtype=float)

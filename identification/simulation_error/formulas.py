@@ -83,24 +83,11 @@ def formula_coefficients(
 ) -> dict[str, tuple[Floats, NDArray[np.bool_]]]:
     """Coefficients of the SI features of a structure, as far as formulas give them.
 
-    Parameters
-    ----------
-    formula : {"clarke", "kijima"}
-        Which.
-    structure : Structure
-        With sway and yaw, and terms in v, r and delta alone, or times powers of the speed.
-    particulars : Particulars
-        Mass and added mass are estimated where absent.
-
-    Returns
-    -------
-    dict of str to (array of shape (n_terms,), array of bool of shape (n_terms,))
-        For each equation the coefficients, and which of them the formulas give; the others are zero.
-
-    Raises
-    ------
-    InputError
-        For a structure that the formulas do not cover, and for particulars that do not suffice.
+    `formula`: which, one of `clarke`, `kijima`; `structure`: with sway and yaw, and terms in v, r and delta
+    alone, or times powers of the speed; `particulars`: mass and added mass are estimated where absent.
+    Returns for each equation the coefficients, and which of them the formulas give; the others are zero,
+    shape (n_terms,). Raises InputError for a structure that the formulas do not cover, and for particulars
+    that do not suffice.
     """
     ship = particulars.completed()
     found = {q: [_linear_symbol(term) for term in terms] for q, terms in structure.equations.items()}

@@ -45,23 +45,14 @@ DURATION_LENGTHS, STEP_LENGTHS = 20.0, 0.05  # of the virtual trials, ship lengt
 
 @dataclass(frozen=True, eq=False)
 class Prior:
-    """What the coefficients of the SI features are pulled to.
+    """What the coefficients of the SI features are pulled to."""
 
-    Attributes
-    ----------
-    name : str
-        The reference ship, or whose formulas.
-    centre : dict of str to array of shape (n_terms,)
-        w0 of each equation.
-    roots : dict of str to array of shape (n_rows, n_terms)
-        Root of S per sample and second of window: S is strength^2 n_samples duration^2 root' root.
-    known : dict of str to array of bool of shape (n_terms,)
-        Which coefficients the prior determines; the others are free.
-    """
-
-    name: str
-    centre: dict[str, Floats]
+    name: str  # the reference ship, or whose formulas
+    centre: dict[str, Floats]  # w0 of each equation, shape (n_terms,)
+    #: root of S per sample and second of window: S is strength^2 n_samples duration^2 root' root, shape
+    #: (n_rows, n_terms)
     roots: dict[str, Floats]
+    #: which coefficients the prior determines; the others are free, shape (n_terms,)
     known: dict[str, NDArray[np.bool_]]
 
 
@@ -82,12 +73,8 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
     """The prior of a reference ship: its virtual trials at the target's scale, in the target's structure.
 
     A model, its name or file, or "auto" for the shipped one most like the target, which is complete but for
-    its coefficients.
-
-    Raises
-    ------
-    InputError
-        For a reference that does not exist, or too little known to choose one.
+    its coefficients. Raises InputError for a reference that does not exist, or too little known to choose
+    one.
     """
     ship, table = blank.particulars, blank.table
     model = _at_target(reference, blank)
@@ -142,24 +129,11 @@ def with_prior(
     """The method, with its coefficients pulled toward a prior.
 
     The method fits what the prior leaves: where it drops a direction, the prior's coefficients stay.
-
-    Parameters
-    ----------
-    method : Method
-        As asked for.
-    prior : str or ShipModel
-        "auto", "clarke", "kijima", or a reference ship.
-    strength : float, optional
-        0 leaves the method as it is, infinity gives the prior; None chooses by cross-validation.
-    blank : ShipModel
-        The target but for its coefficients.
-    folds : {"trials", "largest-rudder"}
-        What the strength is chosen by (`Pulled.chosen_strength`).
-
-    Raises
-    ------
-    InputError
-        For a grey box, which has a reference ship, and for a prior without coefficients for the structure.
+    `method`: as asked for; `prior`: "auto", "clarke", "kijima", or a reference ship; `strength`: 0 leaves the
+    method as it is, infinity gives the prior; None chooses by cross-validation; `blank`: the target but for
+    its coefficients; `folds`: what the strength is chosen by (`Pulled.chosen_strength`), one of `trials`,
+    `largest-rudder`. Raises InputError for a grey box, which has a reference ship, and for a prior without
+    coefficients for the structure.
     """
     if isinstance(blank.table, GreyBox):
         raise InputError(
@@ -182,23 +156,12 @@ def with_prior(
 
 @dataclass(frozen=True, eq=False)
 class Pulled:
-    """A method whose coefficients are pulled toward a prior.
+    """A method whose coefficients are pulled toward a prior."""
 
-    Attributes
-    ----------
-    method : Method
-        Fits where there is no pull.
-    make : callable
-        Makes an unfitted estimator.
-    prior : Prior
-    task : FitTask
-        With the regression.
-    """
-
-    method: Method
-    make: Callable[[], Estimator]
+    method: Method  # fits where there is no pull
+    make: Callable[[], Estimator]  # makes an unfitted estimator
     prior: Prior
-    task: FitTask
+    task: FitTask  # with the regression
 
     def at(self, strength: float, samples: Samples | None = None) -> Estimators:
         """Estimators fitted with a strength: 0 is the method as it is, infinity the prior."""

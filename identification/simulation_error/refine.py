@@ -47,43 +47,27 @@ ATTEMPTS = 4
 
 @dataclass(frozen=True, eq=False)
 class Refinement:
-    """Settings of the refinement.
+    """Settings of the refinement."""
 
-    Attributes
-    ----------
-    segment_lengths : float
-        Length of a segment: the time to sail that many ship lengths at service speed.
-    staggered : bool
-        Whether a second set of segments begins half a segment later.
-    segment_start : {"free", "measured"}
-        Whether the state at the start of each segment is fitted with it, which leaves no bias by noise, or
-        is the smoothed measurement.
-    pull : float
-        Strength of the pull toward the start: relative cost of a coefficient whose term changes by the whole
-        acceleration (root mean squares over the trials).
-    rudder_offsets : bool
-        Whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
-        the mean of them: its own terms give the neutral helm.
-    extra_trials : sequence of Trial
-        Further trials that the refinement alone sees, such as turns of a reference ship.
-    extra_weight : float
-        Of their squared residuals, relative to those of the trials.
-    anchor : str or ShipModel, optional
-        A reference ship whose turning circles, at the target's scale, join the extra trials: what holds the
-        steady turn, which lies outside all zigzags. "auto" for the shipped one most like the target.
-    anchor_weight : float
-        Of the squared residuals of those turns.
-    """
-
+    #: length of a segment: the time to sail that many ship lengths at service speed
     segment_lengths: float = 3.4
-    staggered: bool = True
+    staggered: bool = True  # whether a second set of segments begins half a segment later
+    #: whether the state at the start of each segment is fitted with it ("free"), which leaves
+    #: no bias by noise, or is the smoothed measurement
     segment_start: str = "free"
+    #: strength of the pull toward the start: relative cost of a coefficient whose term changes by the
+    #: whole acceleration (root mean squares over the trials)
     pull: float = 1e-6
+    #: whether the trials differ in the zero of their rudders, known beforehand to a degree. The model has
+    #: the mean of them: its own terms give the neutral helm
     rudder_offsets: bool = False
+    #: further trials that the refinement alone sees, such as turns of a reference ship
     extra_trials: Sequence[Trial] = ()
-    extra_weight: float = 1.0
+    extra_weight: float = 1.0  # of their squared residuals, relative to those of the trials
+    #: a reference ship whose turning circles, at the target's scale, join the extra trials: what holds the
+    #: steady turn, which lies outside all zigzags. "auto" for the shipped one most like the target
     anchor: str | ShipModel | None = None
-    anchor_weight: float = 1e-3
+    anchor_weight: float = 1e-3  # of the squared residuals of those turns
 
     def __post_init__(self) -> None:
         check_number(self.segment_lengths, "segment_lengths", above=0.0, hint="in ship lengths")
@@ -111,51 +95,26 @@ def split_settings(settings: Mapping[str, Any], refined: bool) -> tuple[Refineme
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """A refined fit.
+    """A refined fit."""
 
-    Attributes
-    ----------
-    fit : GuardedFit
-        As the start, with the refined model.
-    covariance : array of shape (n_coefficients, n_coefficients) or None
-        Of the coefficients of the accelerations; None where the start stayed.
-    influences : list of array of shape (n_stretches, n_coefficients)
-        By trial: by how much stretches of time moved those coefficients, for the bootstrap.
-    report : dict
-        For the provenance: settings, cost before and after, scales, offsets, decision.
-    width : float
-        Of the stretches, s.
-    """
-
-    fit: GuardedFit
+    fit: GuardedFit  # as the start, with the refined model
+    #: of the coefficients of the accelerations; None where the start stayed, shape (n_coefficients,
+    #: n_coefficients)
     covariance: Floats | None
+    #: by trial: by how much stretches of time moved those coefficients, for the bootstrap, shape
+    #: (n_stretches, n_coefficients)
     influences: list[Floats]
-    report: dict[str, Any]
-    width: float = 0.0
+    report: dict[str, Any]  # for the provenance: settings, cost before and after, scales, offsets, decision
+    width: float = 0.0  # of the stretches, s
 
 
 def refine(start: GuardedFit, task: FitTask, settings: Refinement, memory: float) -> Refined:
     """Refine a fit by the errors of what its model simulates in segments of the trials.
 
-    Parameters
-    ----------
-    start : GuardedFit
-        The fit to start from.
-    task : FitTask
-        Its regression, which shows how large the terms are in the trials, and the trials.
-    settings : Refinement
-    memory : float
-        Time over which residuals are taken to be correlated, s.
-
-    Returns
-    -------
-    Refined
-        The start itself where its model runs away already, or the refined ones do under every prior.
-
-    Raises
-    ------
-    InputError
-        For extra trials that lack channels.
+    `start`: the fit to start from; `task`: its regression, which shows how large the terms are in the trials,
+    and the trials; `memory`: time over which residuals are taken to be correlated, s. Returns the start
+    itself where its model runs away already, or the refined ones do under every prior. Raises InputError for
+    extra trials that lack channels.
     """
     problem = _Problem(start, task, settings)
     if not start.stable or not problem.finite():

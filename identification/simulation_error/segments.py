@@ -27,36 +27,17 @@ FEWEST_SAMPLES = 5
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """A stretch of a trial.
+    """A stretch of a trial."""
 
-    Attributes
-    ----------
-    trial : int
-        Index of the trial.
-    inputs : array of shape (n_points, 3)
-        Time, s, rudder, rad, and shaft speed, 1/s, on the grid of the integration.
-    samples : array of shape (n_points,)
-        Sample at each point of the grid, -1 for none.
-    measured : array of shape (n_samples, n_channels)
-        What is compared with.
-    blocks : array of shape (n_blocks,)
-        First sample of each block over which residuals are averaged.
-    times : array of shape (n_blocks,)
-        When the blocks begin, s.
-    start : array of shape (n_state,)
-        State at the first sample, in the order of the model's `state_names`.
-    weight : float
-        Of its squared residuals.
-    """
-
-    trial: int
+    trial: int  # index of the trial
+    #: time, s, rudder, rad, and shaft speed, 1/s, on the grid of the integration, shape (n_points, 3)
     inputs: Floats
-    samples: Integers
-    measured: Floats
-    blocks: Integers
-    times: Floats
-    start: Floats
-    weight: float = 1.0
+    samples: Integers  # sample at each point of the grid, -1 for none, shape (n_points,)
+    measured: Floats  # what is compared with, shape (n_samples, n_channels)
+    blocks: Integers  # first sample of each block over which residuals are averaged, shape (n_blocks,)
+    times: Floats  # when the blocks begin, s, shape (n_blocks,)
+    start: Floats  # state at the first sample, in the order of the model's `state_names`, shape (n_state,)
+    weight: float = 1.0  # of its squared residuals
 
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
@@ -149,22 +130,13 @@ def _segment(
 
 @dataclass(frozen=True, eq=False)
 class Shooting:
-    """What the segments of all trials say of a set of parameters.
+    """What the segments of all trials say of a set of parameters."""
 
-    Attributes
-    ----------
-    residuals : array of shape (n_rows,)
-        Simulated less measured, by the scale of the channel, blocks averaged.
-    jacobian : array of shape (n_rows, n_parameters)
-    moves : list of array of shape (n_free,)
-        By segment: how its start would move.
-    rows : list of slice
-        Rows of each segment; within it the blocks one after the other, the channels of a block together.
-    """
-
+    #: simulated less measured, by the scale of the channel, blocks averaged, shape (n_rows,)
     residuals: Floats
-    jacobian: Floats
-    moves: list[Floats]
+    jacobian: Floats  # shape (n_rows, n_parameters)
+    moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
+    #: rows of each segment; within it the blocks one after the other, the channels of a block together
     rows: list[slice]
 
 
@@ -205,24 +177,11 @@ class Shooter:
         """Residuals and Jacobian at some parameters, the starts of the segments projected out.
 
         The residual of a segment that may choose its start is what a linear step of the start leaves
-        (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal. 10(2), with the Jacobian of
-        Kaufman 1975).
-
-        Parameters
-        ----------
-        parameters : array of shape (n_coefficients + n_trials,)
-            Coefficients by `term_sizes`, then offsets of the rudder, rad (where there are any), of which only
-            the differences from their mean matter.
-        segments : sequence of Segment
-        scales : array of shape (n_channels,)
-            Residuals that count as 1.
-        n_trials : int
-            Trials with an offset.
-
-        Returns
-        -------
-        Shooting
-            Not finite where a ship ran away.
+        (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal. 10(2), with the Jacobian of Kaufman
+        1975). `parameters`: coefficients by `term_sizes`, then offsets of the rudder, rad (where there are
+        any), of which only the differences from their mean matter, shape (n_coefficients + n_trials,);
+        `scales`: residuals that count as 1, shape (n_channels,); `n_trials`: trials with an offset. Not
+        finite where a ship ran away.
         """
         residuals, jacobians, moves, rows = [], [], [], []
         n_terms, at = len(self.sizes), 0

@@ -44,12 +44,7 @@ def correlations(target: ArrayLike, candidates: Mapping[str, ArrayLike]) -> dict
     """Pearson correlation of each candidate's features with the target's, of shape (n_features,).
 
     Each feature is first divided by its 2-norm over all ships. Features that are nan for any ship are left
-    out.
-
-    Raises
-    ------
-    InputError
-        If fewer than three features are known of all ships.
+    out. Raises InputError if fewer than three features are known of all ships.
     """
     table = np.array([np.asarray(target, dtype=float), *map(np.asarray, candidates.values())], dtype=float)
     known = np.all(np.isfinite(table), axis=0)

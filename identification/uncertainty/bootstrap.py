@@ -42,25 +42,10 @@ def bootstrap_covariance(
     """Covariance of the coefficients of all equations by a block bootstrap over time.
 
     Estimators that choose their rank or regularisation keep what they chose. LS-SVMs are fitted again, other
-    linear estimators take the linear step that the drawn residuals give.
-
-    Parameters
-    ----------
-    estimators : mapping of str to Estimator
-        Fitted to `samples`, by equation.
-    samples : Samples
-        The regression.
-    memory : float
-        Length of the blocks, s; at least one row.
-    draws : int
-        Number of refits.
-    seed : int
-        Of the draws.
-
-    Returns
-    -------
-    array of shape (n_coefficients, n_coefficients)
-        In the order of the equations and their features.
+    linear estimators take the linear step that the drawn residuals give. `estimators`: fitted to `samples`,
+    by equation; `samples`: the regression; `memory`: length of the blocks, s; at least one row; `draws`:
+    number of refits; `seed`: of the draws. Returns the covariance in the order of the equations and their
+    features, shape (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)
     groups = [np.flatnonzero(samples.trial == trial) for trial in np.unique(samples.trial)]

@@ -24,26 +24,14 @@ def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
 def joint_covariance(estimators: Estimators, samples: Samples, memory: float = 0.0) -> Floats:
     """Covariance of the coefficients of all equations, residuals correlated across equations and in time.
 
-    With the coefficients of each equation a linear map of its targets, the covariance follows from that
-    of the residuals. Without memory they are independent in time (classical formula, with the
-    covariance of the residuals between equations); with memory it is estimated as by Newey & West
-    1987 (Econometrica 55(3)) with Bartlett's weights, each trial by itself. Exact features are assumed.
-    Of an estimator that weights its samples it is the residuals times their weights that count (Huber's
-    sandwich).
-
-    Parameters
-    ----------
-    estimators : mapping of str to Estimator
-        Fitted to `samples` without intercept, by equation.
-    samples : Samples
-        The regression.
-    memory : float
-        Time over which residuals are taken to be correlated, s.
-
-    Returns
-    -------
-    array of shape (n_coefficients, n_coefficients)
-        In the order of the equations and their features.
+    With the coefficients of each equation a linear map of its targets, the covariance follows from that of
+    the residuals. Without memory they are independent in time (classical formula, with the covariance of the
+    residuals between equations); with memory it is estimated as by Newey & West 1987 (Econometrica 55(3))
+    with Bartlett's weights, each trial by itself. Exact features are assumed. Of an estimator that weights
+    its samples it is the residuals times their weights that count (Huber's sandwich). `estimators`: fitted to
+    `samples` without intercept, by equation; `samples`: the regression; `memory`: time over which residuals
+    are taken to be correlated, s. Returns the covariance in the order of the equations and their features,
+    shape (n_coefficients, n_coefficients).
     """
     errors = {
         q: error * weights(estimators[q], samples.features[q])

@@ -30,40 +30,22 @@ MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll ra
 
 @dataclass(frozen=True)
 class EquationDiagnostics:
-    """Fit of one equation of motion.
+    """Fit of one equation of motion."""
 
-    Attributes
-    ----------
-    samples, terms : int
-        Rows and columns of the regression.
-    rank : int
-        Directions that were kept.
-    condition_number : float
-        Largest by smallest singular value of the features, each scaled to a root mean square of 1.
-    r_squared : float
-        Share of the change of velocity that is explained.
-    residual_rms : float
-        Root mean square of what is left of the change of velocity over a window, SI units.
-    residual_autocorrelation : tuple of float
-        Of the residuals at lags of 1 to 10 windows, without overlap.
-    variance_inflation : dict of str to float
-        By term: how much the others increase its variance.
-    collinear_pairs : tuple of (str, str, float)
-        Pairs of terms with a correlation beyond 0.98, and the correlation.
-    dropped : tuple of tuple of str
-        Terms that make up each dropped direction.
-    """
-
+    #: rows and columns of the regression
     samples: int
     terms: int
-    rank: int
+    rank: int  # directions that were kept
+    #: largest by smallest singular value of the features, each scaled to a root mean square of 1
     condition_number: float
-    r_squared: float
-    residual_rms: float
+    r_squared: float  # share of the change of velocity that is explained
+    residual_rms: float  # root mean square of what is left of the change of velocity over a window, SI units
+    #: of the residuals at lags of 1 to 10 windows, without overlap
     residual_autocorrelation: tuple[float, ...]
-    variance_inflation: dict[str, float]
+    variance_inflation: dict[str, float]  # by term: how much the others increase its variance
+    #: pairs of terms with a correlation beyond 0.98, and the correlation
     collinear_pairs: tuple[tuple[str, str, float], ...]
-    dropped: tuple[tuple[str, ...], ...]
+    dropped: tuple[tuple[str, ...], ...]  # terms that make up each dropped direction
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
@@ -73,10 +55,7 @@ class EquationDiagnostics:
 def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     """Refuse trials from which nothing can be identified.
 
-    Raises
-    ------
-    InputError
-        For no trial, a missing channel, times that nearly coincide, or rudders that never move.
+    Raises InputError for no trial, a missing channel, times that nearly coincide, or rudders that never move.
     """
     if structure.captive:
         raise InputError(
@@ -129,10 +108,7 @@ def _is_still(t: Floats, delta: Floats) -> bool:
 def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
     """Refuse a regression with fewer rows than terms, or of a motion that never changes.
 
-    Raises
-    ------
-    InputError
-        Naming the shortest trial, or the channel.
+    Raises InputError naming the shortest trial, or the channel.
     """
     for q, change in samples.targets.items():
         if not np.any(change):

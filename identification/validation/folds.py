@@ -18,13 +18,9 @@ LEAST_RUDDER_SHARE = 0.9  # of the largest rudder; from there on a rudder counts
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
     """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
 
-    The hard turn is in no zigzag. How well small rudders predict larger ones is the closest
-    substitute in the data. `where` is the argument that asks for it, for messages.
-
-    Raises
-    ------
-    InputError
-        If all of them have the same rudder.
+    The hard turn is in no zigzag. How well small rudders predict larger ones is the closest substitute in the
+    data. `where` is the argument that asks for it, for messages. Raises InputError if all of them have the
+    same rudder.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
     largest: NDArray[np.bool_] = rudders > LEAST_RUDDER_SHARE * rudders.max()

@@ -15,23 +15,12 @@ from shipgym.ships import ShipModel
 
 @dataclass(frozen=True)
 class GuardedFit:
-    """A fit and what the guard did to it.
+    """A fit and what the guard did to it."""
 
-    Attributes
-    ----------
-    model : ShipModel
-        With the identified coefficients.
-    estimators : dict of str to Estimator
-        By equation.
-    stable : bool
-        Whether the model passed the guard.
-    report : dict
-        For the provenance: `decision`, `strength` of the penalty, and why the fit without it was rejected.
-    """
-
-    model: ShipModel
-    estimators: dict[str, Estimator]
-    stable: bool
+    model: ShipModel  # with the identified coefficients
+    estimators: dict[str, Estimator]  # by equation
+    stable: bool  # whether the model passed the guard
+    #: for the provenance: `decision`, `strength` of the penalty, and why the fit without it was rejected
     report: dict[str, Any]
 
 
@@ -43,12 +32,8 @@ def guarded_fit(
 ) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
 
-    Not stable, and without a penalty, where none helped or it is not `guarded`.
-
-    Raises
-    ------
-    InputError
-        For settings that the method does not know.
+    Not stable, and without a penalty, where none helped or it is not `guarded`. Raises InputError for
+    settings that the method does not know.
     """
     samples, blank, trials = task.samples, task.blank, task.trials
     estimators = method.fitted(settings, task)

@@ -29,20 +29,9 @@ def predict(model: ShipModel, trial: Trial) -> Trial | None:
 def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> dict[str, Any]:
     """Errors of a prediction and the indices of measurement and prediction by the same function.
 
-    Parameters
-    ----------
-    model : ShipModel
-        Gives the ship's length.
-    trial : Trial
-        As measured.
-    prediction : Trial or None
-        From `predict`.
-
-    Returns
-    -------
-    dict
-        `use`, `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, None
-        where the manoeuvre has no such index or never got there.
+    `model`: gives the ship's length; `trial`: as measured; `prediction`: from `predict`. Returns `use`,
+    `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, None where the
+    manoeuvre has no such index or never got there.
     """
     metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None}
     metrics["rmse"] = {

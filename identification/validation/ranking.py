@@ -10,58 +10,31 @@ from identification.result import IdentificationResult
 
 @dataclass(frozen=True)
 class Standing:
-    """How well a method predicts the trials held out.
+    """How well a method predicts the trials held out."""
 
-    Attributes
-    ----------
-    method : str
-        Its name.
-    stable : bool
-        Whether its model passed the guard.
-    ran_away : int
-        Trials held out on which its simulation ran away.
-    error : float or None
-        Root mean square error of the simulated u, v, r and psi by the standard deviation of what was
-        measured, mean over channels and trials: 0 for perfect, 1 for no better than a constant. None where
-        one ran away.
-    heading_deg, yaw_rate_deg_s : float or None
-        Root mean square error, mean over the trials on which it did not run away.
-    errors : dict of str to float or None
-        `error` of each trial.
-    """
-
-    method: str
-    stable: bool
-    ran_away: int
+    method: str  # its name
+    stable: bool  # whether its model passed the guard
+    ran_away: int  # trials held out on which its simulation ran away
+    #: root mean square error of the simulated u, v, r and psi by the standard deviation of what was
+    #: measured, mean over channels and trials: 0 for perfect, 1 for no better than a constant. None where
+    #: one ran away
     error: float | None
+    #: root mean square error, mean over the trials on which it did not run away
     heading_deg: float | None
     yaw_rate_deg_s: float | None
-    errors: dict[str, float | None]
+    errors: dict[str, float | None]  # `error` of each trial
 
 
 @dataclass(frozen=True, eq=False)
 class Ranking:
-    """Methods on the same trials, ranked.
+    """Methods on the same trials, ranked."""
 
-    Attributes
-    ----------
-    standings : tuple of Standing
-        The best first: those that run away on fewest trials, and among them the smallest error.
-    results : dict of str to IdentificationResult
-        By method, identified from all trials to fit.
-    refused : dict of str to str
-        Why a method could not be fitted.
-    left_out : dict of str to tuple of str
-        Settings that a method does not know and was not given.
-    in_turn : bool
-        Whether no trial was marked `validate`, so that each trial to fit was held out in turn.
-    """
-
+    #: the best first: those that run away on fewest trials, and among them the smallest error
     standings: tuple[Standing, ...]
-    results: dict[str, IdentificationResult]
-    refused: dict[str, str]
-    left_out: dict[str, tuple[str, ...]]
-    in_turn: bool
+    results: dict[str, IdentificationResult]  # by method, identified from all trials to fit
+    refused: dict[str, str]  # why a method could not be fitted
+    left_out: dict[str, tuple[str, ...]]  # settings that a method does not know and was not given
+    in_turn: bool  # whether no trial was marked `validate`, so that each trial to fit was held out in turn
 
     @property
     def best(self) -> IdentificationResult:

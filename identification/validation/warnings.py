@@ -32,17 +32,9 @@ def why_unstable(fit: Fit) -> str | None:
 def model_warnings(fit: Fit) -> list[str]:
     """What a user has to know of a stable model before using it.
 
-    Parameters
-    ----------
-    fit : Fit
-        Of a stable model.
-
-    Returns
-    -------
-    list of str
-        One sentence each, without capital and full stop: a rudder that steers to the wrong side, a fit that
-        had to be penalised, terms that the data cannot separate, a heading that is lost, channels that were
-        not measured, no trial to validate, values that were estimated.
+    `fit`: of a stable model. Returns one sentence each, without capital and full stop: a rudder that steers
+    to the wrong side, a fit that had to be penalised, terms that the data cannot separate, a heading that is
+    lost, channels that were not measured, no trial to validate, values that were estimated.
     """
     model, provenance = fit.model, fit.model.provenance or {}
     found = []

@@ -84,9 +84,9 @@ REQUIREMENTS = (
     Requirement(
         "R3",
         "The model is identifiable",
-        "The regressors of one trial have full rank and no coefficient's interval holds 0, where the thesis' "
-        "four terms of surge and seven of steering drift; collinear terms are named, and the next manoeuvre "
-        "is advised.",
+        "The regressors of one trial have full rank and no coefficient's interval contains 0, where the "
+        "thesis' four terms of surge and seven of steering drift; collinear terms are named, and the next "
+        "manoeuvre is advised.",
         (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_recovered",
          f"{_LSSVM}::test_collinear_terms_are_named",
          "tests/identification/test_experiment.py::test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit"),
@@ -221,7 +221,7 @@ def simplicity_rows() -> Iterator[Row]:
 
 
 def uncertain(result: IdentificationResult) -> int:
-    """Coefficients whose 95 % interval holds 0."""
+    """Coefficients whose 95 % interval contains 0."""
     return sum(
         Z95 * error >= abs(result.coefficients[name]) for name, error in result.standard_errors.items()
     )
@@ -239,8 +239,8 @@ def identifiability_rows() -> Iterator[Row]:
     for what, many, theirs, ours in cases:
         count = uncertain(ours)
         yield Row(
-            "R3", f"coefficients of {what} whose 95 % interval holds 0", None, uncertain(theirs), count, "0",
-            count == 0, f"as the paper: {many} terms an equation",
+            "R3", f"coefficients of {what} whose 95 % interval contains 0", None, uncertain(theirs), count,
+            "0", count == 0, f"as the paper: {many} terms an equation",
         )  # fmt: skip
 
 
@@ -286,10 +286,10 @@ def start_rows() -> Iterator[Row]:
         found = np.array([
             TunedLSSVM(search, fit_intercept=False, seed=seed).fit(X, y).coef_ for seed in range(SEEDS)
         ])  # fmt: skip
-        spread = 100.0 * float(np.max(np.ptp(found, axis=0) / np.abs(found.mean(axis=0))))
+        width = 100.0 * float(np.max(np.ptp(found, axis=0) / np.abs(found.mean(axis=0))))
         yield Row(
-            "R6", f"largest spread of a coefficient over {SEEDS} starts of the search {search}, %", None,
-            None, spread, "below 0.01", spread < 0.01,
+            "R6", f"largest range of a coefficient over {SEEDS} starts of the search {search}, %", None,
+            None, width, "below 0.01", width < 0.01,
         )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ import re
 import sys
 import warnings
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -56,9 +56,12 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     import numba
 
     from shipgym.engine.disk_cache import DiskCache
+    from shipgym.engine.lean_numba import LeanCompiler, without_scipy
 
-    copy = Specialisation(parts, tag, numba.njit).copy(loop)
-    dispatcher = numba.njit(nogil=True, **SEMANTICS)(copy)
+    without_scipy()
+    jit = partial(numba.njit, pipeline_class=LeanCompiler, **SEMANTICS)
+    copy = Specialisation(parts, tag, jit).copy(loop)
+    dispatcher = jit(nogil=True)(copy)
     folder = _folder()
     if folder is None:
         _compile(dispatcher, signature, what)

@@ -280,7 +280,7 @@ def observe_lane(tile: Tile, lane: int) -> None:
 
 
 def let_events_come(tile: Tile) -> None:
-    """What comes seldom, for the lanes for which it is time."""
+    """Rare events, such as a new set-point, in the lanes in which one is due."""
     state, asked = tile.state, read_settings(tile.settings, 0)
     for lane in range(tile.lanes):
         course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
@@ -293,7 +293,7 @@ def let_events_come(tile: Tile) -> None:
 
 
 def show(tile: Tile, shown: Shown, whole: bool, begin: int, end: int) -> None:
-    """Hand observations, outcomes and flags of some lanes over, or all but what `step` answers."""
+    """Copy what is seen of some lanes into the users' arrays; reward and ends only if `whole`."""
     state, result, rows, first = tile.state, tile.result, shown.rows, tile.first
     at = 3
     for k in range(rows[0]):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES, flat
-from shipgym.engine.voyages import sensors_for, voyages
+from shipgym.engine.voyages import Sensors, sensors_for, voyages
 from shipgym.envs.outputs import STEP_OUTCOME, OutputPool, Outputs
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.stability import refuse_unstable
@@ -84,6 +84,8 @@ class Engine:
             raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
         self.windy = any(not sea.calm for _, sea in self.pool)
         sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
+        if task.sensors is not None:
+            sensors = Sensors(task.sensors)
         own = self.pool if drawn else [(model, task.seas[0]) for model in fleet]
         self._voyages = voyages(self.model.vessel, task.definition, sensors, self.windy, len(own) == 1)
         self._run = self._voyages.run
@@ -140,7 +142,9 @@ class Engine:
         )  # fmt: skip
         sensor = self._voyages.sensors.module.Settings
         noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
-        own = sensor(**{name: noise[name] for name in sensor._fields if name in noise})
+        own = task.sensor_settings or sensor(
+            **{name: noise[name] for name in sensor._fields if name in noise}
+        )
         return np.array([*rules, *flat(own), *flat(task.settings)], dtype=float)
 
     def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
@@ -366,6 +370,25 @@ class Engine:
         self.advance()
         shown = self.shown
         return self.observations, shown.outcomes[0].copy(), shown.terminated.copy(), shown.truncated.copy()
+
+    def refuse_rewards(self) -> None:
+        """Say which part of the last step's rewards is not finite, in which lane.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        bad = ~np.isfinite(self.reward_parts)
+        lane, part = (
+            np.argwhere(bad)[0] if bad.any() else (int(np.argmax(~np.isfinite(self.shown.outcomes[0]))), 0)
+        )
+        name = self.task.reward_parts[part]
+        raise InputError(
+            f"{self.task.definition.source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
+            f"{self.steps[lane]:g}, expected a finite number; look for a division by zero or a root of a "
+            "negative number (shipgym.check_task helps)"
+        )
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""

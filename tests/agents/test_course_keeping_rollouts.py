@@ -190,12 +190,6 @@ def test_a_model_found_unstable_is_steered_only_where_asked():
         )
 
 
-def test_the_first_names_still_work():
-    import agents
-
-    assert (agents.fly, agents.Flights) == (agents.sail, agents.Episodes)
-
-
 def test_more_ships_than_are_steered_at_once_are_steered_in_groups(monkeypatch):
     seeds = np.arange(5)
     whole = sail(PILOT, MARINER, SHORT, seeds)

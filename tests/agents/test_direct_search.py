@@ -7,9 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from agents import PID
-from agents.benchmarking.direct_search import (
+from direct_search import (
     FIRST_SEED,
     LAWS,
     REFUSED,
@@ -20,6 +18,8 @@ from agents.benchmarking.direct_search import (
     tunable,
     tune,
 )
+
+from agents import PID
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.rollouts.rollout import episode_costs
 from agents.suites.reference import load_tuned

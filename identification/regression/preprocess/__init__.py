@@ -31,24 +31,10 @@ PREPROCESSING = (*FILTERS, "rts", "none")
 def smoothed_channels(trial: Trial, names: Sequence[str], preprocessing: str) -> dict[str, Floats]:
     """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
 
-    Parameters
-    ----------
-    trial : Trial
-        The record.
-    names : sequence of str
-        Channels wanted.
-    preprocessing : {"spline", "savgol", "median", "rts", "none"}
-        Smoothing spline, Savitzky-Golay filter, running median, Kalman smoother of the kinematics (the shaft
-        speed by a spline), or nothing.
-
-    Returns
-    -------
-    dict of str to array of shape (n_samples,)
-
-    Raises
-    ------
-    InputError
-        For another name.
+    `trial`: the record; `names`: channels wanted; `preprocessing`: smoothing spline, Savitzky-Golay filter,
+    running median, Kalman smoother of the kinematics (the shaft speed by a spline), or nothing, one of
+    `spline`, `savgol`, `median`, `rts`, `none`. Returns an array of shape (n_samples,). Raises InputError for
+    another name.
     """
     check_choice(preprocessing, PREPROCESSING, "preprocessing")
     if preprocessing == "none":

@@ -12,19 +12,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """A smoothed course.
+    """A smoothed course."""
 
-    Attributes
-    ----------
-    states : array of shape (n_samples, n_states)
-    variances : array of shape (n_samples, n_states)
-    log_likelihood : float
-        Of the measurements, but for a constant.
-    """
-
-    states: Floats
-    variances: Floats
-    log_likelihood: float
+    states: Floats  # shape (n_samples, n_states)
+    variances: Floats  # shape (n_samples, n_states)
+    log_likelihood: float  # of the measurements, but for a constant
 
 
 def smooth_linear(
@@ -39,22 +31,12 @@ def smooth_linear(
 ) -> Smoothed:
     """Smooth x_k+1 = F_k x_k + w_k, y_k = H x_k + e_k (Rauch, Tung & Striebel 1965, AIAA Journal 3(8)).
 
-    Measurements are taken in one at a time, in Joseph's form, so that nothing is inverted.
-
-    Parameters
-    ----------
-    transitions, process : array of shape (n_samples - 1, n_states, n_states)
-        F and the covariance of w from each sample to the next.
-    observation : array of shape (n_channels, n_states)
-        H.
-    variances : array of shape (n_channels,)
-        Of e, above 0.
-    measured : array of shape (n_samples, n_channels)
-        y; a value that is not finite is a missing one.
-    start, start_variances : array of shape (n_states,)
-        Of the state at the first sample.
-    only_likelihood : bool
-        Whether to filter only; the states are then the filtered ones.
+    Measurements are taken in one at a time, in Joseph's form, so that nothing is inverted. `transitions`,
+    `process`: F and the covariance of w from each sample to the next, shape (n_samples - 1, n_states,
+    n_states); `observation`: H, shape (n_channels, n_states); `variances`: of e, above 0, shape
+    (n_channels,); `measured`: y; a value that is not finite is a missing one, shape (n_samples, n_channels);
+    `start`, `start_variances`: of the state at the first sample, shape (n_states,); `only_likelihood`:
+    whether to filter only; the states are then the filtered ones.
     """
     n, size = len(measured), len(start)
     ahead, filtered = np.empty((2, n, size)), np.empty((2, n, size, size))
@@ -76,10 +58,10 @@ def smooth_linear(
             p = left @ p @ left.T + variance * np.outer(gain, gain)
             likelihood -= 0.5 * (np.log(innovation_variance) + error * error / innovation_variance)
         ahead[1, k], filtered[1, k] = x, p
-    states, spreads = ahead[1], filtered[1]
+    states, covariances = ahead[1], filtered[1]
     if not only_likelihood:
         for k in range(n - 2, -1, -1):
-            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ spreads[k]).T
+            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ covariances[k]).T
             states[k] += gain @ (states[k + 1] - ahead[0, k + 1])
-            spreads[k] += gain @ (spreads[k + 1] - filtered[0, k + 1]) @ gain.T
-    return Smoothed(states, np.diagonal(spreads, axis1=1, axis2=2).copy(), likelihood)
+            covariances[k] += gain @ (covariances[k + 1] - filtered[0, k + 1]) @ gain.T
+    return Smoothed(states, np.diagonal(covariances, axis1=1, axis2=2).copy(), likelihood)

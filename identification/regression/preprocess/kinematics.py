@@ -26,26 +26,12 @@ CURRENT = 2.0  # m/s, standard deviation of an unknown current
 def smooth_kinematics(trial: Trial, current: bool = False) -> Trial:
     """Smooth heading and yaw rate, then positions and velocities at that heading.
 
-    Accelerations are random walks whose roughness is that of greatest likelihood; with the heading
-    known, positions and velocities are linear in each other, so that two linear smoothers do.
-
-    Parameters
-    ----------
-    trial : Trial
-        With at least r or psi; u and v, or x, y and psi, are smoothed together as far as recorded.
-    current : bool
-        Whether u and v are through water that moves over the ground with an unknown steady current;
-        then positions are needed.
-
-    Returns
-    -------
-    Trial
-        With the smoothed channels; those that are not recorded are not added. `raw` is the trial as it was.
-
-    Raises
-    ------
-    InputError
-        For a trial with neither psi nor r, or a current without positions.
+    Accelerations are random walks whose roughness is that of greatest likelihood; with the heading known,
+    positions and velocities are linear in each other, so that two linear smoothers do. `trial`: with at least
+    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded; `current`: whether u and v
+    are through water that moves over the ground with an unknown steady current; then positions are needed.
+    Channels that are not recorded are not added. `raw` is the trial as it was. Raises InputError for a trial
+    with neither psi nor r, or a current without positions.
     """
     if not {"psi", "r"} & trial.channels.keys():
         raise InputError(
@@ -67,10 +53,7 @@ def smooth_kinematics(trial: Trial, current: bool = False) -> Trial:
 def current_of(trial: Trial) -> tuple[float, float]:
     """Steady current that makes positions and velocities through water agree, north and east, m/s.
 
-    Raises
-    ------
-    InputError
-        For a trial without positions, heading and velocities.
+    Raises InputError for a trial without positions, heading and velocities.
     """
     smooth_kinematics(trial, current=True)
     found = _smooth_plane(trial, _smooth_heading(trial)["psi"], True)

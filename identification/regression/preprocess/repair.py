@@ -44,24 +44,10 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
 
     A dropout is a step in time of more than 1.5 usual ones; those of up to 10 are filled, at the usual step;
     longer ones stay, and no method smooths or integrates across them. Shape-preserving cubics (PCHIP) fill.
-
-    Parameters
-    ----------
-    trial : Trial
-        The record.
-    threshold : float
-        Beyond so many standard deviations of the noise from the running median a sample is an outlier.
-
-    Returns
-    -------
-    Trial
-        The trial itself where nothing is wrong; else with `repaired`, the number of values that were filled
-        by channel, and `raw`, the trial as it was.
-
-    Raises
-    ------
-    InputError
-        Where more than a tenth of a channel would be outliers: that is no record with outliers.
+    `trial`: the record; `threshold`: beyond so many standard deviations of the noise from the running median
+    a sample is an outlier. Returns the trial itself where nothing is wrong; else with `repaired`, the number
+    of values that were filled by channel, and `raw`, the trial as it was. Raises InputError where more than a
+    tenth of a channel would be outliers: that is no record with outliers.
     """
     check_number(threshold, "threshold", above=0.0, hint="in standard deviations of the noise")
     times = _filled_times(trial.t)

@@ -32,8 +32,8 @@ K, T = 0.1921, 1.0524  # 1/s, s: of LS-SVR in Table 7.2.1, the truth of the stan
 WITHIN = {"K": 2.0, "T": 5.0}  # aims, %
 SEEDS = range(20)
 DEGREE = np.pi / 180.0
-#: Angle, deg, duration, s, and speed, m/s, of the zigzag to learn from and of that to judge by.
-LEARNED, JUDGED = (20.0, 82.0, 1.5), (30.0, 89.0, 1.7)
+#: Angle, deg, duration, s, and speed, m/s, of the zigzag to learn from and of that to assess it by.
+LEARNED, ASSESSED = (20.0, 82.0, 1.5), (30.0, 89.0, 1.7)
 STEP = 0.02  # of the simulation, s
 NOISE = {"noise": 0.05 * DEGREE, "drift": 0.15 * DEGREE, "drift_time_s": 2.0}  # of the yaw rate, rad/s
 OUTLIERS = {"outlier_probability": 0.05, "outlier_size": 4.0 * DEGREE}  # in what is learned from
@@ -52,7 +52,7 @@ MEASURES = (
     "lags of its autocorrelation beyond the 95 % bounds, %",
     "lags of its correlation with the rudder beyond them, %",
 )
-ONE_AMPLITUDE = "one zigzag holds one steady yaw rate, which shows K and a together, not each"
+ONE_AMPLITUDE = "one zigzag has one steady yaw rate, which shows K and a together, not each"
 STAND_IN = "the log is not published: a stand-in, means over 20 logs"
 
 
@@ -88,7 +88,7 @@ def ship(speed: float) -> ShipModel:
 
 @cache
 def log(zigzag_of: tuple[float, float, float], seed: int) -> Trial:
-    """A zigzag of the stand-in as logged; that to judge by without outliers."""
+    """A zigzag of the stand-in as logged; that to assess by without outliers."""
     angle, duration, speed = zigzag_of
     gyro = Sensor(**NOISE, **(OUTLIERS if zigzag_of == LEARNED else {}))
     sensors = Sensors({"r": gyro, "delta": Sensor(resolution=0.1 * DEGREE)}, sampling_s=1.0)
@@ -171,7 +171,7 @@ def correlation(a: Floats, b: Floats) -> Floats:
 
 def beyond(series: Floats) -> float:
     """Lags at which a correlation leaves the 95 % bounds of white noise, %."""
-    return float(100.0 * np.mean(np.abs(series) > 1.96 / np.sqrt(JUDGED[1] + 1.0)))
+    return float(100.0 * np.mean(np.abs(series) > 1.96 / np.sqrt(ASSESSED[1] + 1.0)))
 
 
 def table_rows() -> Iterator[Row]:
@@ -227,7 +227,7 @@ def residual_measures(method: str, form: str) -> dict[str, float]:
     """Means over the logs of what Figures 7.2.3 and 7.2.5 show of the residuals of the 30/30 zigzag."""
     found = []
     for seed, fit in zip(SEEDS, fitted(method, form), strict=True):
-        trial = log(JUDGED, len(SEEDS) + seed)
+        trial = log(ASSESSED, len(SEEDS) + seed)
         error = residuals(fit, trial)
         own, rudder = correlation(error, error), correlation(error, trial["delta"])
         found.append((float(np.std(error)) / DEGREE, beyond(own), beyond(rudder)))

@@ -173,7 +173,7 @@ def count_rows() -> Iterator[Row]:
             best,
             f"at most {printed}",
             best is not None and best <= printed,
-            "the thesis judges its curves by eye; here those from which on the error of prediction keeps "
+            "the thesis assesses its curves by eye; here those from which on the error of prediction keeps "
             f"below its own with all samples, {WITH_ALL[q]:g} {UNITS[q]}",
         )
     for q in SUFFICE:

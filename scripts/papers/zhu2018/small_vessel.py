@@ -32,7 +32,7 @@ COEFFICIENTS = {
     "c_v": -0.1386, "c_r": -0.5113, "c_|v|r": -1.4883, "c_d": 0.2839,
 }  # fmt: skip
 LENGTH, SPEED = 4.15, 3.0
-LEARNED, JUDGED = 10.0, (20.0, 25.0)  # angles of the zigzags, deg
+LEARNED, ASSESSED = 10.0, (20.0, 25.0)  # angles of the zigzags, deg
 SAMPLES = 142
 STEP, INTERVAL = 0.05, 1.0  # of the simulation and of the record, s
 SEEDS = range(5)
@@ -108,7 +108,7 @@ def errors() -> tuple[dict[tuple[str, float], float], dict[tuple[str, float], fl
     best: dict[tuple[str, float], list[float]] = {key: [] for key in PRINTED}
     for seed in SEEDS:
         fits, model = as_printed(record(seed)), at_best(record(seed))
-        for angle in JUDGED:
+        for angle in ASSESSED:
             truth = every(sailed(angle), round(INTERVAL / STEP), f"zigzag {angle:g}/{angle:g}")
             stepped, simulated = steer(fits["v"], fits["r"], truth), predict(model, sailed(angle))
             for q in EQUATIONS:

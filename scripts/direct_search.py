@@ -38,42 +38,24 @@ REFUSED = 1e12  # cost of settings with which no controller can be designed
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting that is searched.
+    """A setting that is searched."""
 
-    Attributes
-    ----------
-    name : str
-        Keyword of `from_model`.
-    start : float
-        The design's own value.
-    low, high : float
-        Bounds, as factors of it.
-    """
-
-    name: str
-    start: float
+    name: str  # keyword of `from_model`
+    start: float  # the design's own value
+    #: bounds, as factors of it
     low: float = 0.1
     high: float = 10.0
 
 
 @dataclass(frozen=True)
 class Tuned:
-    """What a search found.
+    """What a search found."""
 
-    Attributes
-    ----------
-    settings : dict of str to float
-        Keywords of `from_model`.
-    cost, start_cost : float
-        Mean over the tuning episodes, of these and of the design's own settings.
-    evaluations : int
-        Settings that were tried, refused ones among them.
-    """
-
-    settings: dict[str, float]
+    settings: dict[str, float]  # keywords of `from_model`
+    #: mean over the tuning episodes, of these and of the design's own settings
     cost: float
     start_cost: float
-    evaluations: int
+    evaluations: int  # settings that were tried, refused ones among them
 
 
 #: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from an eighth to twice the
@@ -91,25 +73,10 @@ def search(
 ) -> Tuned:
     """Least cost over settings, within a budget.
 
-    Parameters
-    ----------
-    cost : callable
-        Of settings by name; `REFUSED` where there is no such controller.
-    spaces : sequence of sequence of Setting
-        Alternatives, such as without and with a filter: each is tried at its start, the best is searched. The
-        first is the design's own.
-    evaluations : int
-        Budget.
-
-    Returns
-    -------
-    Tuned
-        The same for the same arguments.
-
-    Raises
-    ------
-    InputError
-        If every start is refused.
+    `cost`: of settings by name; `REFUSED` where there is no such controller. `spaces`: alternatives, such as
+    without and with a filter: each is tried at its start, the best is searched. The first is the design's
+    own. `evaluations`: budget. The same arguments give the same result. Raises InputError if every start is
+    refused.
     """
     check_whole(evaluations, "evaluations", at_least=len(spaces))
     starts = [cost({one.name: one.start for one in space}) for space in spaces]
@@ -162,15 +129,8 @@ def tune(
 ) -> Tuned:
     """Search the settings of a classical controller on a task.
 
-    Parameters
-    ----------
-    kind : str
-        Of those `tunable`.
-    task : BenchmarkTask
-    settings : mapping of str to mapping of str to float, optional
-        Those found for LQ, which guidance laws lead; by default its design's own.
-    evaluations, episodes : int
-        Budget.
+    `kind`: of those `tunable`; `settings`: those found for LQ, which guidance laws lead; by default its
+    design's own; `evaluations`, `episodes`: budget.
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
