@@ -21,7 +21,7 @@ from shipgym.errors import InputError
 
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 #: Keywords of a vector environment that say how it runs, not what is asked.
-RUNNING = ("model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
+RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 N_COMPARED = 16
