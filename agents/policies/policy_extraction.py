@@ -174,6 +174,6 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
         agrees = bool(np.abs(np.clip(output, -1.0, 1.0) - theirs).max() < AGREEMENT)
     if not agrees:
         raise InputError(
-            f"agent: {type(agent.policy).__name__} commands otherwise than its layers say, expected "
+            f"agent: {type(agent.policy).__name__} gives other commands than its layers do, expected "
             f"'MlpPolicy' with actions in [-1, 1]"
         )
