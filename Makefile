@@ -1,12 +1,15 @@
-# make demo   the main job on the trials that ship with the project; needs no torch
-# make test   everything that is checked: format, lint, types, tests
+# make demo      identify a ship from the trials in the box, design and verify autopilots; needs no torch
+# make test      everything that is checked: format, lint, types, tests
+# make bench     how fast it is
+# make soak      a long run with random and extreme actions
+# make evidence  what the pages of docs/ claim, run again
+# make docs      the site
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt
-PACKAGES := shipgym identification agents
-# the measured runs of real ships, which are not part of the project.
+# measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
 .PHONY: demo test lint format type bench soak evidence docs clean
@@ -34,7 +37,6 @@ bench: $(VENV)/dev-installed
 soak: $(VENV)/dev-installed
 	$(BIN)/python scripts/soak.py
 
-# what the pages of docs/ claim, run again
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
@@ -42,6 +44,8 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 
 docs: $(VENV)/docs-installed
+	$(BIN)/python scripts/document_options.py
+	$(BIN)/python scripts/draw_architecture.py
 	$(BIN)/mkdocs build --strict
 
 $(VENV)/bin/python:

@@ -1,6 +1,6 @@
 """Identify the models in the box again, from trials in the repository or simulated with sensor noise.
 
-python scripts/build_models.py [folder]       by default shipgym/models/library
+python scripts/build_models.py [folder]       by default shipgym/ships/library
 """
 
 from __future__ import annotations

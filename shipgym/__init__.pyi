@@ -3,7 +3,10 @@ from . import plots as plots
 from . import weather as weather
 from .envs.checker import check_vector_env as check_vector_env
 from .envs.episode import Episode as Episode
+from .envs.registration import register_task as register_task
 from .envs.recording import RecordEpisode as RecordEpisode
+from .envs.task_checker import TaskCheck as TaskCheck
+from .envs.task_checker import check_task as check_task
 from .envs.sb3 import ShipVecEnv as ShipVecEnv
 from .errors import InputError as InputError
 from .errors import ManoeuvreError as ManoeuvreError

@@ -1,11 +1,10 @@
 """Checks of what a user wrote, each answering with one message that names the place and the remedy."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
+from operator import ge, gt, le, lt
 from typing import Any
 
 import numpy as np
@@ -69,26 +68,14 @@ def check_number(
     at_most: float | None = None,
     hint: str = "",
 ) -> float:
-    """Return `value` as float; it must be a finite number within the bounds.
+    """Return `value` as float; it must be a finite number within the open and closed bounds.
 
-    Parameters
-    ----------
-    value : Any
-        What the user wrote. Truth values and numbers in quotes are refused.
-    where : str
-        The place for the message, such as ``"ship.toml: [ship] length"``.
-    above, at_least, below, at_most : float, optional
-        The open and closed bounds.
-    hint : str, optional
-        What to do about it, appended to the message.
-
-    Raises
-    ------
-    InputError
-        Naming the place, the value and what is expected.
+    Truth values and numbers in quotes are refused. The InputError begins with `where`, the place, such as
+    ``"ship.toml: [ship] length"``, names the value and what is expected, and ends with `hint`, what to do.
     """
-    bounds = ((">", above), (">=", at_least), ("<", below), ("<=", at_most))
-    stated = " and ".join(f"{sign} {bound:g}" for sign, bound in bounds if bound is not None)
+    bounds = ((">", gt, above), (">=", ge, at_least), ("<", lt, below), ("<=", le, at_most))
+    given = [(sign, holds, bound) for sign, holds, bound in bounds if bound is not None]
+    stated = " and ".join(f"{sign} {bound:g}" for sign, _, bound in given)
     expected = f"expected a number {stated}".rstrip() + (f"; {hint}" if hint else "")
     if isinstance(value, bool) or not isinstance(value, Real):
         quotes = " (a text; write the number without quotes)" if isinstance(value, str) else ""
@@ -97,14 +84,7 @@ def check_number(
         number = float(value)
     except OverflowError:
         number = math.inf
-    within = (
-        math.isfinite(number)
-        and (above is None or number > above)
-        and (at_least is None or number >= at_least)
-        and (below is None or number < below)
-        and (at_most is None or number <= at_most)
-    )
-    if not within:
+    if not (math.isfinite(number) and all(holds(number, bound) for _, holds, bound in given)):
         raise InputError(f"{where}: {number:g} found, {expected}")
     return number
 

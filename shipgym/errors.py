@@ -1,7 +1,5 @@
 """The errors a user of shipgym meets, each with one message that says what to do."""
 
-from __future__ import annotations
-
 from typing import Any
 
 

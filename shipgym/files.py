@@ -1,7 +1,5 @@
 """Files that are read with one clear error, and written whole or not at all."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -17,10 +15,7 @@ from shipgym.errors import InputError
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary name beside a file, renamed to it when the block ends without an error.
 
-    Raises
-    ------
-    InputError
-        If the folder does not exist or cannot be written.
+    Raises InputError if the folder does not exist or cannot be written.
     """
     draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
     try:
@@ -50,20 +45,7 @@ def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) ->
 
 
 def check_readable(path: Path, what: str) -> None:
-    """Refuse a file that cannot be opened.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-    what : str
-        What is expected there, such as ``"CSV file"``.
-
-    Raises
-    ------
-    InputError
-        For a missing file, a folder, or one that cannot be opened.
-    """
+    """InputError for a file that is missing, a folder, or cannot be opened; `what` it is, as "CSV file"."""
     try:
         with path.open("rb"):
             return
@@ -83,21 +65,9 @@ def read_bytes(path: Path, what: str) -> bytes:
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
-    """The object in a JSON file.
+    """The object in a JSON file; `what` is expected there, and `remedy` says what to do about a broken one.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-    what : str
-        What is expected there, such as ``"model file"``.
-    remedy : str
-        What to do about a broken one.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, cannot be read, is binary or cut short, or holds no object.
+    Raises InputError if the file is missing, cannot be read, is binary or cut short, or holds no object.
     """
     data = read_bytes(path, what)
     try:

@@ -1,6 +1,6 @@
 """The papers' cases, run again: what they print, what comes out their way, and what is best.
 
-One file or folder per paper. Each holds a `PAPER`: a citation and a function that yields the rows of its
+One file or folder per paper. Each has a `PAPER`: a citation and a function that yields the rows of its
 tables. Beside them stand Zhu's requirements R1 to R8, in the same form.
 """
 

@@ -84,9 +84,9 @@ REQUIREMENTS = (
     Requirement(
         "R3",
         "The model is identifiable",
-        "The regressors of one trial have full rank and no coefficient's interval holds 0, where the thesis' "
-        "four terms of surge and seven of steering drift; collinear terms are named, and the next manoeuvre "
-        "is advised.",
+        "The regressors of one trial have full rank and no coefficient's interval contains 0, where the "
+        "thesis' four terms of surge and seven of steering drift; collinear terms are named, and the next "
+        "manoeuvre is advised.",
         (f"{_STRUCTURES}::test_a_ship_of_each_structure_is_recovered",
          f"{_LSSVM}::test_collinear_terms_are_named",
          "tests/identification/test_experiment.py::test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit"),
@@ -221,7 +221,7 @@ def simplicity_rows() -> Iterator[Row]:
 
 
 def uncertain(result: IdentificationResult) -> int:
-    """Coefficients whose 95 % interval holds 0."""
+    """Coefficients whose 95 % interval contains 0."""
     return sum(
         Z95 * error >= abs(result.coefficients[name]) for name, error in result.standard_errors.items()
     )
@@ -239,8 +239,8 @@ def identifiability_rows() -> Iterator[Row]:
     for what, many, theirs, ours in cases:
         count = uncertain(ours)
         yield Row(
-            "R3", f"coefficients of {what} whose 95 % interval holds 0", None, uncertain(theirs), count, "0",
-            count == 0, f"as the paper: {many} terms an equation",
+            "R3", f"coefficients of {what} whose 95 % interval contains 0", None, uncertain(theirs), count,
+            "0", count == 0, f"as the paper: {many} terms an equation",
         )  # fmt: skip
 
 

@@ -321,8 +321,8 @@ def uncertainty_rows() -> Iterator[Row]:
     """Coverage of the intervals, and what noise as large as Table 12's misfit would do."""
     covered = coverage()
     yield Row(
-        "Table 11", f"95 % intervals that hold the truth, {DRAWS} draws of the noise, %", None, None, covered,
-        f"{COVER[0]:g} to {COVER[1]:g}", COVER[0] <= covered <= COVER[1],
+        "Table 11", f"95 % intervals that contain the truth, {DRAWS} draws of the noise, %", None, None,
+        covered, f"{COVER[0]:g} to {COVER[1]:g}", COVER[0] <= covered <= COVER[1],
     )  # fmt: skip
     worst = 100.0 * max(found / abs(value) for found, value in zip(*_noisy_errors(), strict=True))
     yield Row(

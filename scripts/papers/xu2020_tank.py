@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from identification.design.reduction import Reduction, backward_elimination
 from identification.regression.forces import FORCES, ForceRegression, force_regression
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
+from shipgym.ships.catalogue import xu_ship
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.pmm import PMM38, TABLE_11
-from shipgym.ships.xu import xu_ship
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]

@@ -61,7 +61,7 @@ def study(ship: MeasuredShip, settings: dict[str, Any]) -> dict[str, Any]:
     for held in names:
         runs = [ship.runs[name] for name in names if name != held]
         result = identify(runs, particulars=ship.particulars, steering=ship.steering, **settings)
-        _judge(found, result.model, ship.runs[held])
+        _compare(found, result.model, ship.runs[held])
         found["unstable"] += not result.stable
         found["models"][held] = result.model
     return found
@@ -74,7 +74,7 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
     model = fastest(ship, shaft)
     found: dict[str, Any] = {"rest": [], "way": [], "unstable": 0, "models": dict.fromkeys(names, model)}
     for name in names:
-        _judge(found, model, ship.runs[name])
+        _compare(found, model, ship.runs[name])
     return found
 
 
@@ -86,7 +86,7 @@ def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
     return converted_model(REFERENCE, ship.particulars, ship.steering or SteeringGear(), shaft)
 
 
-def _judge(found: dict[str, Any], model: ShipModel, trial: Trial) -> None:
+def _compare(found: dict[str, Any], model: ShipModel, trial: Trial) -> None:
     found["rest"].append(errors(model, trial))
     found["way"].append(errors(model, under_way(trial)))
 

@@ -183,7 +183,7 @@ predict all the same, without the runs in which they run away.
 
 `abkowitz12` is the Abkowitz table of the Mariner without the cube of the rudder, its products with drift,
 and three terms of surge. Its coefficients are pulled toward the KVLCC2 of the literature by virtual trials
-of that ship, which is what holds the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
+of that ship, which is what fixes the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
 whose error of r, each run predicted from the two others, is within a quarter of the least. The last row has
 the pull of 0.1 that all six runs choose by that rule, see (b): one recipe for zigzags and turns.
 **The table itself was found while looking at all six runs** (some fifty were tried), so that its figures

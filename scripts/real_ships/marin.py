@@ -189,7 +189,7 @@ depends on it, which the zigzags hardly tell:
 
 **Limits.** MARIN's neutral helm is about -0.8 to -1.2 degrees, HSVA's is not: the heading of an unstable
 ship drifts by it, whatever the model. The steady turn (drift of 20 degrees, speed down to 0.37) lies
-outside all zigzags. What holds it is the reference ship: the weaker the pull, the better the zigzags and the
+outside all zigzags. What fixes it is the reference ship: the weaker the pull, the better the zigzags and the
 wider the circle. The rule that chooses the pull gives up a quarter of the zigzags' accuracy for it; that
 quarter is a judgement, no measurement.
 

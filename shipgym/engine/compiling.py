@@ -13,7 +13,7 @@ import re
 import sys
 import warnings
 from contextlib import AbstractContextManager, nullcontext
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -50,15 +50,18 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     InputError
         If a part does not compile, naming its function, the line and Numba's reason.
     """
+    tag = fingerprint(loop, parts)
+    if plain_python():
+        return Specialisation(parts, tag, None).copy(loop)
     import numba
 
-    tag = fingerprint(loop, parts)
-    if numba.config.DISABLE_JIT:
-        return Specialisation(parts, tag, None).copy(loop)
     from shipgym.engine.disk_cache import DiskCache
+    from shipgym.engine.lean_numba import LeanCompiler, without_scipy
 
-    copy = Specialisation(parts, tag, numba.njit).copy(loop)
-    dispatcher = numba.njit(nogil=True, **SEMANTICS)(copy)
+    without_scipy()
+    jit = partial(numba.njit, pipeline_class=LeanCompiler, **SEMANTICS)
+    copy = Specialisation(parts, tag, jit).copy(loop)
+    dispatcher = jit(nogil=True)(copy)
     folder = _folder()
     if folder is None:
         _compile(dispatcher, signature, what)
@@ -71,6 +74,13 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
         kept = dispatcher._cache.holds(signature)  # another process may have been first
         _compile(dispatcher, signature, what, quiet=kept)
     return dispatcher
+
+
+def plain_python() -> bool:
+    """Whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
+    import numba
+
+    return bool(numba.config.DISABLE_JIT)
 
 
 def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) -> None:

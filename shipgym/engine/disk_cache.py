@@ -1,4 +1,4 @@
-"""Numba's on-disk cache, told by us where a loop's machine code lies and that it is never stale."""
+"""Numba's on-disk cache under names that hash their contents, so that nothing in it is ever stale."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ class _Place:
         return self._folder
 
     def get_source_stamp(self) -> str:
-        """The same for ever: other sources have other names."""
+        """A constant: other sources have other names."""
         return "content"
 
     def get_disambiguator(self) -> str:
-        """Nothing: names differ already."""
+        """Empty: names differ already."""
         return ""
 
 

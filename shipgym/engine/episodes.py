@@ -76,6 +76,7 @@ from shipgym.engine.records import LANES
 from shipgym.tasks.contract import Interval, Random
 
 REFUSED = -1  # what `step` answers to commands that are not finite
+OF_STATE = 1 << 40  # added to the offset of a row that stands in the state, not in the result
 N_STEP, N_STEP_FLAGS = 3, 2  # of outcomes and flags, what `step` answers: reward, terminated, truncated
 SHIP_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
 # NumPy's numbers, since a function is compiled anew for each literal that it is called with
@@ -110,6 +111,40 @@ class Outcome(NamedTuple):
     end: float  # part of the reward: the rest of an episode that failed
 
 
+class Tile(NamedTuple):
+    """64 ships and what they need, as arrays."""
+
+    state: Any  # float64 (n_rows * 64,)
+    result: Any  # float64 (n_result_rows * 64,), what comes of the interval; room that all tiles share
+    keys: Any  # uint64 (3, 64): seed and number of each episode, and the state of its sea's random numbers
+    ships: Any  # float64 (n_ship_rows * 64,), or (n_ship_rows,) where all lanes share one
+    pool: Any  # float64 (n_pool, n_ship_rows): of which each episode draws one, or none for those of `ships`
+    settings: Any  # float64: `Rules`, settings of the sensor set, settings of the task
+    first: int  # number of its first lane
+    lanes: int  # how many there are
+
+
+class Shown(NamedTuple):
+    """What users are given of all ships."""
+
+    rows: Any  # int64: how many observations, outcomes and flags there are, then the offsets of their rows
+    observations: Any  # float32 (n, n_observations)
+    outcomes: Any  # float64 (n_outcomes, n): reward, terminated, truncated, then info
+    flags: Any  # bool (n_flags, n): terminated, truncated, then those of info
+
+
+class Fleet(NamedTuple):
+    """All ships, tile by tile."""
+
+    states: Any  # float64 (n_tiles, n_rows * 64)
+    result: Any
+    keys: Any  # uint64 (n_tiles, 3, 64)
+    ships: Any  # float64 (n_tiles or 1, ...)
+    pool: Any
+    settings: Any
+    n_ships: int
+
+
 class Rules(NamedTuple):
     """Settings of the engine."""
 
@@ -120,10 +155,19 @@ class Rules(NamedTuple):
     least_shaft: float  # least command of the shaft, part of service speed
 
 
-def take_commands(state: Any, actions: Any, rules: Rules, first: int, lanes: int) -> None:
+def tile_of(fleet: Fleet, number: int) -> Tile:
+    """One tile of a fleet."""
+    first = number * LANES
+    return Tile(
+        fleet.states[number], fleet.result, fleet.keys[number], fleet.ships[number % fleet.ships.shape[0]],
+        fleet.pool, fleet.settings, first, min(fleet.n_ships - first, LANES),
+    )  # fmt: skip
+
+
+def take_commands(tile: Tile, actions: Any) -> None:
     """Take the commands of ships whose episode is not over."""
-    two = actions.shape[0] > 1
-    for lane in range(lanes):
+    state, first, rules = tile.state, tile.first, read_rules(tile.settings, 0)
+    for lane in range(tile.lanes):
         motion, course = load_motion(state, lane), load_course(state, lane)
         over = course.ended != 0.0
         rudder = clip(float(actions[0, np.uintp(first + lane)]), -1.0, 1.0)
@@ -132,8 +176,8 @@ def take_commands(state: Any, actions: Any, rules: Rules, first: int, lanes: int
             course.steps + (1.0 - course.ended), course.ended, 0.0,
         )  # fmt: skip
         store_course(state, lane, course)
-    if two:
-        for lane in range(lanes):
+    if actions.shape[0] > 1:
+        for lane in range(tile.lanes):
             course = load_course(state, lane)
             shaft = clip(float(actions[1, np.uintp(first + lane)]), rules.least_shaft, 1.0)
             course = Course(
@@ -143,12 +187,13 @@ def take_commands(state: Any, actions: Any, rules: Rules, first: int, lanes: int
             store_course(state, lane, course)
 
 
-def sail_lanes(state: Any, words: Any, h: float, ships: Any, lanes: int) -> None:
+def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
     """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
-    common, sea_common = common_ship(ships), common_sea(ships)
+    state, words = tile.state, tile.keys[2]
+    common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
     for lane in range(lanes):
-        ship, coefficients = ship_at(common, ships, lane)
-        p = sea_at(sea_common, ships, lane)
+        ship, coefficients = ship_at(common, tile.ships, lane)
+        p = sea_at(sea_common, tile.ships, lane)
         before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
         rudder, shaft = course.rudder_command * ship.rudder_limit, course.shaft_command * ship.shaft
         after = sail(before, rudder, shaft, h, push(before, sea, p), coefficients, ship)
@@ -163,27 +208,31 @@ def sail_lanes(state: Any, words: Any, h: float, ships: Any, lanes: int) -> None
             store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
 
 
-def conclude_lanes(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
-    """Reward, readings and observations of an interval that is over."""
+def conclude_lanes(tile: Tile, lanes: int) -> tuple[int, int]:
+    """Reward, readings and observations of an interval that is over.
+
+    Returns in how many lanes of the tile something is due, and how many episodes have just ended; lanes
+    beyond them, up to `lanes`, fill vectors.
+    """
+    state, result, keys, settings = tile.state, tile.result, tile.keys, tile.settings
     rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
-    common, view = common_ship(ships), common_view(ships)
-    sea_common = common_sea(ships)
+    common, view, sea_common = common_ship(tile.ships), common_view(tile.ships), common_sea(tile.ships)
     worst = worst_cost(asked)
+    n_due, n_ended = 0, 0
     for lane in range(lanes):
-        ship, _ = ship_at(common, ships, lane)
-        data, scale = view_at(view, ships, lane)
+        ship, _ = ship_at(common, tile.ships, lane)
+        data, scale = view_at(view, tile.ships, lane)
         motion, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
         before, memory = load_state(state, lane), load_memory(state, lane)
         distance = envelope_distance(motion, data)
-        beyond = outside_range(motion, data) | (distance > 1.0)
+        beyond = pick(outside_range(motion, data) | (distance > 1.0), 1.0, 0.0)
         interval = Interval(
-            rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command, distance,
-            pick(beyond, 1.0, 0.0),
+            rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command,
+            distance, beyond,
         )  # fmt: skip
         after, parts, failed, arrived = task_step(motion, before, interval, ship, asked)
 
-        going = 1.0 - course.ended
-        over = course.ended != 0.0
+        going, over = 1.0 - course.ended, course.ended != 0.0
         wrecked = going * pick(failed | (distance > rules.largest_distance), 1.0, course.ran_away)
         terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
         late = pick(course.steps >= rules.time_limit, going, 0.0)
@@ -192,127 +241,113 @@ def conclude_lanes(state: Any, keys: Any, settings: Any, ships: Any, lanes: int)
         earned = choose_reward(over, no_reward(), parts)
         reward = total_reward(earned) + end
         after = choose_state(over, before, after)
-        p = sea_at(sea_common, ships, lane)
         random = Random(keys[0, lane], keys[1, lane])
-        frequency = encounter_frequency(motion, sea, p)
-        memory = choose_memory(
-            over, memory, measure(motion, sea, memory, frequency, interval, sensor, random)
-        )
+        frequency = encounter_frequency(motion, sea, sea_at(sea_common, tile.ships, lane))
+        measured = measure(motion, sea, memory, frequency, interval, sensor, random)
+        memory = choose_memory(over, memory, measured)
 
         store_ended(state, lane, ended)
-        store_outcome(
-            state, lane,
-            Outcome(reward, terminated, late * (1.0 - terminated), distance, interval.extrapolating, end),
-        )  # fmt: skip
-        store_reward(state, lane, earned)
+        truncated = late * (1.0 - terminated)
+        store_outcome(result, lane, Outcome(reward, terminated, truncated, distance, beyond, end))
+        store_reward(result, lane, earned)
         store_state(state, lane, after)
         store_memory(state, lane, memory)
         seen = readings(motion, sea, memory)
-        store_observation(state, lane, observe(seen, after, interval, ship, asked), scale)
-
-
-def interval_of(state: Any, rules: Rules, lane: int) -> Interval:
-    """The interval of a lane, as it was concluded."""
-    course, outcome = load_course(state, lane), load_outcome(state, lane)
-    return Interval(
-        rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command,
-        outcome.envelope_distance, outcome.extrapolating,
-    )  # fmt: skip
-
-
-def observe_lane(state: Any, settings: Any, ships: Any, lane: int) -> None:
-    """What an autopilot sees now."""
-    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
-    ship, _ = ship_at(common_ship(ships), ships, lane)
-    _, scale = view_at(common_view(ships), ships, lane)
-    seen = readings(load_motion(state, lane), load_sea(state, lane), load_memory(state, lane))
-    interval = interval_of(state, rules, lane)
-    store_observation(state, lane, observe(seen, load_state(state, lane), interval, ship, asked), scale)
-
-
-def let_events_come(state: Any, keys: Any, settings: Any, ships: Any, lanes: int) -> None:
-    """What comes seldom, for the lanes for which it is time."""
-    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
-    common = common_ship(ships)
-    for lane in range(lanes):
-        course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
-        ship, _ = ship_at(common, ships, lane)
-        interval = interval_of(state, rules, lane)
-        if course.ended == 0.0 and due(motion, before, interval, ship, asked):
-            random, plan = Random(keys[0, lane], keys[1, lane]), plan_of(state, lane)
-            store_state(state, lane, on_event(motion, before, interval, ship, asked, random, plan))
-            observe_lane(state, settings, ships, lane)
-
-
-def count_events(state: Any, settings: Any, ships: Any, lanes: int) -> tuple[int, int]:
-    """In how many lanes something is due, and how many episodes have just ended."""
-    rules, asked = read_rules(settings, 0), read_settings(settings, 0)
-    common = common_ship(ships)
-    n_due, n_ended = 0, 0
-    for lane in range(lanes):
-        ship, _ = ship_at(common, ships, lane)
-        course, outcome = load_course(state, lane), load_outcome(state, lane)
-        interval = interval_of(state, rules, lane)
-        is_due = due(load_motion(state, lane), load_state(state, lane), interval, ship, asked)
-        n_due += 1 if is_due & (course.ended == 0.0) else 0
-        n_ended += 1 if outcome.terminated + outcome.truncated > 0.0 else 0
+        store_observation(result, lane, observe(seen, after, interval, ship, asked), scale)
+        real = lane < tile.lanes
+        n_due += 1 if due(motion, after, interval, ship, asked) & (ended == 0.0) & real else 0
+        n_ended += 1 if (max(terminated, late) > 0.0) & real else 0
     return n_due, n_ended
 
 
-def show(
-    state: Any, rows: Any, observations: Any, outcomes: Any, flags: Any, whole: bool, first: int, begin: int,
-    end: int,
-) -> None:  # fmt: skip
-    """Hand observations, outcomes and flags of some lanes over, or all but what `step` answers."""
+def interval_of(tile: Tile, lane: int) -> Interval:
+    """The interval of a lane, as it was concluded."""
+    course, outcome = load_course(tile.state, lane), load_outcome(tile.result, lane)
+    return Interval(
+        read_rules(tile.settings, 0).dt, course.steps, course.rudder_before, course.rudder_command,
+        course.shaft_command, outcome.envelope_distance, outcome.extrapolating,
+    )  # fmt: skip
+
+
+def observe_lane(tile: Tile, lane: int) -> None:
+    """What an autopilot sees now."""
+    state, asked = tile.state, read_settings(tile.settings, 0)
+    ship, _ = ship_at(common_ship(tile.ships), tile.ships, lane)
+    _, scale = view_at(common_view(tile.ships), tile.ships, lane)
+    seen = readings(load_motion(state, lane), load_sea(state, lane), load_memory(state, lane))
+    observation = observe(seen, load_state(state, lane), interval_of(tile, lane), ship, asked)
+    store_observation(tile.result, lane, observation, scale)
+
+
+def let_events_come(tile: Tile) -> None:
+    """Rare events, such as a new set-point, in the lanes in which one is due."""
+    state, asked = tile.state, read_settings(tile.settings, 0)
+    for lane in range(tile.lanes):
+        course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
+        ship, _ = ship_at(common_ship(tile.ships), tile.ships, lane)
+        interval = interval_of(tile, lane)
+        if course.ended == 0.0 and due(motion, before, interval, ship, asked):
+            random, plan = Random(tile.keys[0, lane], tile.keys[1, lane]), plan_of(state, lane)
+            store_state(state, lane, on_event(motion, before, interval, ship, asked, random, plan))
+            observe_lane(tile, lane)
+
+
+def show(tile: Tile, shown: Shown, whole: bool, begin: int, end: int) -> None:
+    """Copy what is seen of some lanes into the users' arrays; reward and ends only if `whole`."""
+    state, result, rows, first = tile.state, tile.result, shown.rows, tile.first
+    at = 3
     for k in range(rows[0]):
-        row = rows[3 + k]
+        row = rows[at + k]
         for lane in range(begin, end):
-            observations[np.uintp(first + lane), k] = state[np.uintp(row + lane)]
+            shown.observations[np.uintp(first + lane), k] = result[np.uintp(row + lane)]
+    at += rows[0]
     for k in range(0 if whole else N_STEP, rows[1]):
-        row = rows[3 + rows[0] + k]
+        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
         for lane in range(begin, end):
-            outcomes[k, np.uintp(first + lane)] = state[np.uintp(row + lane)]
+            shown.outcomes[k, np.uintp(first + lane)] = source[np.uintp(row + lane)]
+    at += rows[1]
     for k in range(0 if whole else N_STEP_FLAGS, rows[2]):
-        row = rows[3 + rows[0] + rows[1] + k]
+        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
         for lane in range(begin, end):
-            flags[k, np.uintp(first + lane)] = state[np.uintp(row + lane)] > 0.0
+            shown.flags[k, np.uintp(first + lane)] = source[np.uintp(row + lane)] > 0.0
 
 
-def begin_lane(state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any) -> None:
+def begin_lane(tile: Tile, lane: int) -> None:
     """Begin an episode in a lane, with a ship of the pool, if there is one."""
+    state, result, keys, pool = tile.state, tile.result, tile.keys, tile.pool
+    random = Random(keys[0, lane], keys[1, lane])
     if pool.shape[0] > 0:
-        number = int(uniform(keys[0, lane], keys[1, lane], SHIP_DRAW, 0.0, float(pool.shape[0])))
+        number = int(uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(pool.shape[0])))
         for row in range(pool.shape[1]):
-            ships[row * LANES + lane] = pool[number, row]
+            tile.ships[row * LANES + lane] = pool[number, row]
     for row in range(0, len(state) // LANES):
         state[row * LANES + lane] = 0.0
-    rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
-    ship, _ = ship_at(common_ship(ships), ships, lane)
-    p = sea_at(common_sea(ships), ships, lane)
-    random = Random(keys[0, lane], keys[1, lane])
+    for row in range(0, len(result) // LANES):
+        result[row * LANES + lane] = 0.0
+    asked = read_settings(tile.settings, 0)
+    ship, _ = ship_at(common_ship(tile.ships), tile.ships, lane)
+    p = sea_at(common_sea(tile.ships), tile.ships, lane)
     motion, begun = task_begin(ship, asked, random, plan_of(state, lane))
     store_motion(state, lane, motion)
     store_state(state, lane, begun)
     store_course(state, lane, Course(0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
     if HAS_SEA:
-        word = stream(keys[0, lane], keys[1, lane])
+        word = stream(random.key, random.episode)
         keys[2, lane] = word + BEGIN_WORDS
         store_sea(state, lane, begin_sea(motion, word, p))
-    sea, interval = load_sea(state, lane), interval_of(state, rules, lane)
+    sea, sensor = load_sea(state, lane), read_sensor(tile.settings, 0)
     frequency = encounter_frequency(motion, sea, p)
-    memory = measure(motion, sea, load_memory(state, lane), frequency, interval, sensor, random)
+    memory = load_memory(state, lane)
+    memory = measure(motion, sea, memory, frequency, interval_of(tile, lane), sensor, random)
     store_memory(state, lane, memory)
-    observe_lane(state, settings, ships, lane)
+    observe_lane(tile, lane)
 
 
-def begin_next(
-    state: Any, lane: int, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, observations: Any,
-    outcomes: Any, flags: Any, first: int,
-) -> None:  # fmt: skip
+def begin_next(tile: Tile, shown: Shown, lane: int) -> None:
     """Begin the next episode of a lane and show it; reward and flags stay those of the last step."""
-    keys[1, lane] += np.uint64(1)
-    begin_lane(state, lane, keys, settings, pool, ships)
-    show(state, rows, observations, outcomes, flags, ANSWERED, first, lane, lane + 1)
+    tile.keys[1, lane] += np.uint64(1)
+    begin_lane(tile, lane)
+    show(tile, shown, ANSWERED, lane, lane + 1)
 
 
 def are_finite(actions: Any) -> bool:
@@ -324,89 +359,52 @@ def are_finite(actions: Any) -> bool:
     return wrong == 0
 
 
-def reset(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, which: Any, observations: Any,
-    outcomes: Any, flags: Any, next_one: bool,
-) -> None:  # fmt: skip
-    """Begin an episode in the lanes of `which`.
+def reset(fleet: Fleet, shown: Shown, which: Any, next_one: bool) -> None:
+    """Begin an episode in the lanes of `which`, bool of shape (n,), and show it.
 
-    Parameters
-    ----------
-    states : float64 array of shape (n_tiles, n_rows * 64)
-        Of the ships, tile by tile.
-    keys : uint64 array of shape (n_tiles, 3, 64)
-        Seed and number of each episode, and the state of its sea's random numbers.
-    settings : float64 array
-        `Rules`, settings of the sensor set, settings of the task.
-    pool : float64 array of shape (n_pool, n_ship_rows)
-        Ships of which each episode draws one; none for those of `ships`.
-    ships : float64 array of shape (n_tiles or 1, n_ship_rows * 64), or (1, n_ship_rows) where all share one
-        Numbers of the ships.
-    rows : int64 array
-        How many observations, outcomes and flags there are, then the offsets of their rows.
-    which : bool array of shape (n,)
-        Lanes to begin anew.
-    observations : float32 array of shape (n, n_observations)
-        Taken by what autopilots see.
-    outcomes : float64 array of shape (n_outcomes, n)
-        Taken by reward, flags and info.
-    flags : bool array of shape (n_flags, n)
-        Taken by those of the outcomes that are flags: terminated, truncated, then those of info.
-    next_one : bool
-        Whether the next episode begins under the key, and is shown in its lane alone, where rewards and
-        flags stay those of the last step; or the one of `keys`, and everything is shown.
+    It is the one of the keys, or, with `next_one`, the next one under the key, whose lane keeps reward and
+    flags of the last step.
     """
-    n = which.shape[0]
-    for tile in range(states.shape[0]):
-        state, key, ship, first = states[tile], keys[tile], ships[tile % ships.shape[0]], tile * LANES
-        lanes = min(n - first, LANES)
-        for lane in range(lanes):
-            if which[first + lane]:
+    for number in range(fleet.states.shape[0]):
+        tile = tile_of(fleet, number)
+        for lane in range(tile.lanes):
+            if which[tile.first + lane]:
                 if next_one:
-                    begin_next(
-                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
-                    )
+                    begin_next(tile, shown, lane)
                 else:
-                    begin_lane(state, lane, key, settings, pool, ship)
-        if not next_one:
-            show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+                    begin_lane(tile, lane)
+                    show(tile, shown, WHOLE, lane, lane + 1)
 
 
-def step(
-    states: Any, keys: Any, settings: Any, pool: Any, ships: Any, rows: Any, actions: Any, observations: Any,
-    outcomes: Any, flags: Any, first_tile: int, end_tile: int, next_ones: bool,
-) -> int:  # fmt: skip
+def step(fleet: Fleet, shown: Shown, actions: Any, first_tile: int, end_tile: int, next_ones: bool) -> int:
     """One control interval of the tiles from `first_tile` up to `end_tile`.
 
-    `actions` holds rows of commands, of the rudder and, if there is a second, of the shaft; for the others
-    see `reset`. A lane whose episode was over stays as it is and earns nothing, or, with `next_ones`, begins
-    its next episode. Returns the number of episodes that ended, or `REFUSED`, nothing changed, if a command
-    is not finite.
+    `actions` holds rows of commands, float32 of shape (n_commands, n): of the rudder and, if there is a
+    second, of the shaft. A lane whose episode was over stays as it is and earns nothing, or, with
+    `next_ones`, begins its next episode. Returns the number of episodes that ended, or `REFUSED`, nothing
+    changed, if a command is not finite.
     """
     if not are_finite(actions):
         return REFUSED
-    n, ended, rules = observations.shape[0], 0, read_rules(settings, 0)
+    ended, rules = 0, read_rules(fleet.settings, 0)
     h = rules.dt / rules.substeps
-    for tile in range(first_tile, end_tile):
-        state, key, ship, first = states[tile], keys[tile], ships[tile % ships.shape[0]], tile * LANES
-        lanes = min(n - first, LANES)
-        whole = (lanes + GROUP - 1) // GROUP * GROUP
-        take_commands(state, actions, rules, first, lanes)
+    for number in range(first_tile, end_tile):
+        tile = tile_of(fleet, number)
+        lanes = (tile.lanes + GROUP - 1) // GROUP * GROUP
+        take_commands(tile, actions)
         for _ in range(int(rules.substeps)):
-            sail_lanes(state, key[2], h, ship, whole)
-        conclude_lanes(state, key, settings, ship, whole)
-        n_due, n_ended = count_events(state, settings, ship, lanes)
+            sail_lanes(tile, h, lanes)
+        n_due, n_ended = conclude_lanes(tile, lanes)
         ended += n_ended
         if n_due > 0:
-            let_events_come(state, key, settings, ship, lanes)
-        show(state, rows, observations, outcomes, flags, WHOLE, first, FIRST_LANE, lanes)
+            let_events_come(tile)
+        show(tile, shown, WHOLE, FIRST_LANE, tile.lanes)
         if next_ones:
-            for lane in range(lanes):
-                outcome = load_outcome(state, lane)
-                if load_course(state, lane).ended != 0.0 and outcome.terminated + outcome.truncated == 0.0:
-                    begin_next(
-                        state, lane, key, settings, pool, ship, rows, observations, outcomes, flags, first
-                    )
+            for lane in range(tile.lanes):
+                outcome = load_outcome(tile.result, lane)
+                just_now = outcome.terminated + outcome.truncated > 0.0
+                if load_course(tile.state, lane).ended != 0.0 and not just_now:
+                    begin_next(tile, shown, lane)
     return ended
 
 
@@ -417,37 +415,23 @@ STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked fo
 def run(world: Any, asked: int) -> int:
     """`step` or `reset` of arrays that are given by their addresses and shapes, by turns.
 
-    To look at eleven arrays takes the interpreter longer than to sail a ship.
+    To look at a dozen arrays takes the interpreter longer than to sail a ship.
 
     Parameters
     ----------
     world : int64 array
-        States, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags, then
-        the first tile of a step and the one behind its last.
+        States, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags,
+        then the first tile of a step, the one behind its last, and room for the result of a tile.
     asked : int
         `STEP`; `STEP_AND_BEGIN`: episodes that were over begin anew; `BEGIN` or `BEGIN_NEXT` in some lanes.
     """
-    states, keys = table_at(world, 0), words_at(world, 3)
-    settings, pool, ships = numbers_at(world, 7), table_at(world, 9), table_at(world, 12)
-    rows, which = rows_at(world, 15), flags_at(world, 17)
     actions, observations = single_table_at(world, 19), single_table_at(world, 22)
-    outcomes, flags = table_at(world, 25), flag_table_at(world, 28)
-    if asked >= BEGIN:
-        reset(
-            states,
-            keys,
-            settings,
-            pool,
-            ships,
-            rows,
-            which,
-            observations,
-            outcomes,
-            flags,
-            asked == BEGIN_NEXT,
-        )
-        return 0
-    return step(
-        states, keys, settings, pool, ships, rows, actions, observations, outcomes, flags, world[31], world[32],
-        asked == STEP_AND_BEGIN,
+    shown = Shown(rows_at(world, 15), observations, table_at(world, 25), flag_table_at(world, 28))
+    fleet = Fleet(
+        table_at(world, 0), numbers_at(world, 33), words_at(world, 3), table_at(world, 12),
+        table_at(world, 9), numbers_at(world, 7), observations.shape[0],
     )  # fmt: skip
+    if asked >= BEGIN:
+        reset(fleet, shown, flags_at(world, 17), asked == BEGIN_NEXT)
+        return 0
+    return step(fleet, shown, actions, world[31], world[32], asked == STEP_AND_BEGIN)

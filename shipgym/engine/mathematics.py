@@ -1,4 +1,4 @@
-"""Sine, cosine, exponential, arc tangent and kin, which a vectorised loop can hold.
+"""Sine, cosine, exponential, arc tangent and the like, in forms that are vectorised in loops.
 
 Calls into the C library would stop the loop over lanes from being vectorised. Sine and cosine:
 Cody-Waite reduction to [-pi/4, pi/4] and the minimax polynomials of fdlibm (`k_sin.c`, `k_cos.c`,

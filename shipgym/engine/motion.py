@@ -112,13 +112,12 @@ def upright(motion: Motion) -> float:
 
 
 def ground_velocity(motion: Motion, north: float, east: float) -> tuple[float, float]:
-    """Velocity over ground, north and east, m/s, in a current."""
-    sine, cosine = sin_cos(motion.psi)
-    aside = motion.v * upright(motion)
-    ahead_north, ahead_east = motion.u * cosine - aside * sine, motion.u * sine + aside * cosine
+    """Velocity over ground, ahead and to starboard in the level plane, m/s, in a current."""
+    ahead, aside = motion.u, motion.v * upright(motion)
     if HAS_SEA:
-        return ahead_north + north, ahead_east + east
-    return ahead_north, ahead_east
+        sine, cosine = sin_cos(motion.psi)
+        return ahead + north * cosine + east * sine, aside + east * cosine - north * sine
+    return ahead, aside
 
 
 def rates(motion: Motion, order: float, shaft: float, push: Push, coefficients: Any, ship: Ship) -> Rates:

@@ -1,7 +1,7 @@
 """Places that loops name and parts take: what a ship, a sea, a sensor set and a task put there.
 
-Each function stands for one that is given when a loop is compiled (`shipgym.engine.specialise`); called from
-here it says so.
+Each function stands for one that is given when a loop is compiled (`shipgym.engine.specialise`); the one here
+raises an error that names who gives it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,8 @@ PLACES = {
         "load_scale",
     ),
     "arrays": (
-        "words_at", "numbers_at", "table_at", "rows_at", "flags_at", "flag_table_at", "single_table_at", "plan_of",
+        "words_at", "numbers_at", "table_at", "rows_at", "flags_at", "flag_table_at", "single_table_at",
+        "plan_of",
     ),
     "numbers of the ships": ("common_ship", "ship_at", "common_sea", "sea_at", "common_view", "view_at"),
     "the sea": ("push", "evolve", "begin_sea", "encounter_frequency"),
@@ -29,7 +30,7 @@ PLACES = {
 
 
 def __getattr__(name: str) -> Any:
-    """A function that says who takes its place."""
+    """A function that raises an error naming who gives it."""
     for giver, names in PLACES.items():
         if name in names:
             return _place(name, giver)

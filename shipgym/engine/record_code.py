@@ -1,59 +1,47 @@
 """Records in loops: `load`, `store` and kin, as plain Python and as LLVM instructions.
 
-Written out as source, a record's load would take Numba as long to translate as a ship's equations; so each function
-comes as a `Part` with instructions of its own.
+Written out as source, a record's load would take Numba as long to translate as a ship's equations; so each
+function comes as a `Part` with instructions of its own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import reduce
+from functools import partial, reduce
 from typing import Any
 
 from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is_record, leaves
 
 Path = tuple[int, ...]
+#: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
+Generate = Callable[[Any, Any, Any, Any], Any]
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Part:
     """`load(array, lane)`: a record from a tile; from a vector, one lane, `lane` is not used."""
+    places = rows.places
 
     def load(array: Any, lane: int) -> Any:
         def number(path: str, kind: Any) -> Any:
-            if path not in rows.present:
+            if path not in places:
                 return 0.0
-            if is_list(kind):
-                return array[rows.row(path) :]
-            return array[rows.row(path) * lanes + (lane if lanes > 1 else 0)]
+            at = places[path]
+            return array[at:] if is_list(kind) else array[at * lanes + (lane if lanes > 1 else 0)]
 
         return _made(rows.record, number)
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        def number(path: str, kind: Any) -> Any:
+            if path not in places:
+                return _constant(context, 0.0)
+            if is_list(kind):
+                return _rest(context, builder, kinds[0], values[0], places[path])
+            return builder.load(_entry(context, builder, kinds[0], values[0], places[path], lanes, values[1]))
 
-        @intrinsic  # type: ignore[untyped-decorator]
-        def load(typing: Any, array: Any, lane: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                tile, lane = arguments
-                kind = signature.args[0]
+        return _coded(context, builder, rows.record, number)
 
-                def number(path: str, field: Any) -> Any:
-                    if path not in places:
-                        return context.get_constant(types.float64, 0.0)
-                    if is_list(field):
-                        return _rest(context, builder, kind, tile, places[path])
-                    return builder.load(_entry(context, builder, kind, tile, places[path], lanes, lane))
-
-                return _coded(context, builder, rows.record, number)
-
-            return _type(rows.record)(array, types.intp), generate
-
-        places = rows.places
-        return load
-
-    return _part("load", rows, lanes, load, code)
+    return _part("load", rows, lanes, load, generate, lambda: _type(rows.record))
 
 
 def storer(rows: Rows, lanes: int = LANES) -> Part:
@@ -63,25 +51,14 @@ def storer(rows: Rows, lanes: int = LANES) -> Part:
         for path, row in rows.places.items():
             array[row * lanes + (lane if lanes > 1 else 0)] = _number(record, path)
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
-
-        @intrinsic  # type: ignore[untyped-decorator]
-        def store(typing: Any, array: Any, lane: Any, record: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                tile, lane, value = arguments
-                for path, row in rows.places.items():
-                    number = _taken(context, builder, signature.args[2], value, places[path])
-                    builder.store(number, _entry(context, builder, signature.args[0], tile, row, lanes, lane))
-                return context.get_dummy_value()
-
-            return types.void(array, types.intp, record), generate
-
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         places = dict(_places(rows.record))
-        return store
+        for path, row in rows.places.items():
+            number = _taken(context, builder, kinds[2], values[2], places[path])
+            builder.store(number, _entry(context, builder, kinds[0], values[0], row, lanes, values[1]))
+        return context.get_dummy_value()
 
-    return _part("store", rows, lanes, store, code)
+    return _part("store", rows, lanes, store, generate)
 
 
 def bounded_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Part:
@@ -92,31 +69,18 @@ def bounded_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Par
             number, (low, high) = _number(record, path) * _number(scale, path), bounds[path]
             array[row * LANES + lane] = min(max(number, low), high)
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
-
-        @intrinsic  # type: ignore[untyped-decorator]
-        def store(typing: Any, array: Any, lane: Any, record: Any, scale: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                tile, lane, value, per = arguments
-                for path, row in rows.places.items():
-                    number = builder.fmul(
-                        _taken(context, builder, signature.args[2], value, places[path]),
-                        _taken(context, builder, signature.args[3], per, places[path]),
-                    )
-                    low, high = (context.get_constant(types.float64, bound) for bound in bounds[path])
-                    number = builder.select(builder.fcmp_ordered("<", number, low), low, number)
-                    number = builder.select(builder.fcmp_ordered(">", number, high), high, number)
-                    builder.store(number, _entry(context, builder, signature.args[0], tile, row, LANES, lane))
-                return context.get_dummy_value()
-
-            return types.void(array, types.intp, record, scale), generate
-
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         places = dict(_places(rows.record))
-        return store
+        for path, row in rows.places.items():
+            given, per = (_taken(context, builder, kinds[k], values[k], places[path]) for k in (2, 3))
+            number = builder.fmul(given, per)
+            low, high = (_constant(context, bound) for bound in bounds[path])
+            number = builder.select(builder.fcmp_ordered("<", number, low), low, number)
+            number = builder.select(builder.fcmp_ordered(">", number, high), high, number)
+            builder.store(number, _entry(context, builder, kinds[0], values[0], row, LANES, values[1]))
+        return context.get_dummy_value()
 
-    return _part("bounded", rows, tuple(sorted(bounds.items())), store, code)
+    return _part("bounded", rows, tuple(sorted(bounds.items())), store, generate)
 
 
 def number_storer(row: int) -> Part:
@@ -125,22 +89,11 @@ def number_storer(row: int) -> Part:
     def store(array: Any, lane: int, number: float) -> None:
         array[row * LANES + lane] = number
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        builder.store(values[2], _entry(context, builder, kinds[0], values[0], row, LANES, values[1]))
+        return context.get_dummy_value()
 
-        @intrinsic  # type: ignore[untyped-decorator]
-        def store(typing: Any, array: Any, lane: Any, number: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                tile, lane, value = arguments
-                builder.store(value, _entry(context, builder, signature.args[0], tile, row, LANES, lane))
-                return context.get_dummy_value()
-
-            return types.void(array, types.intp, types.float64), generate
-
-        return store
-
-    return Part(store, code=code, key=("number", row))
+    return Part(store, code=partial(_intrinsic, generate, 3), key=("number", row))
 
 
 def chooser(record: Record) -> Part:
@@ -149,30 +102,20 @@ def chooser(record: Record) -> Part:
     def choose(condition: bool, yes: Any, no: Any) -> Any:
         return yes if condition else no
 
-    def code() -> Any:
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         from numba.core import types
-        from numba.extending import intrinsic
 
-        @intrinsic  # type: ignore[untyped-decorator]
-        def choose(typing: Any, condition: Any, yes: Any, no: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                places = dict(_places(record))
-                flag = context.cast(builder, arguments[0], signature.args[0], types.boolean)
+        places = dict(_places(record))
+        flag = context.cast(builder, values[0], kinds[0], types.boolean)
 
-                def number(path: str, kind: Any) -> Any:
-                    one, other = (
-                        _taken(context, builder, signature.args[k], arguments[k], places[path])
-                        for k in (1, 2)
-                    )
-                    return builder.select(flag, one, other)
+        def number(path: str, kind: Any) -> Any:
+            return builder.select(
+                flag, *(_taken(context, builder, kinds[k], values[k], places[path]) for k in (1, 2))
+            )
 
-                return _coded(context, builder, record, number)
+        return _coded(context, builder, record, number)
 
-            return _type(record)(condition, yes, no), generate
-
-        return choose
-
-    return _part("choose", record, None, choose, code)
+    return _part("choose", record, None, choose, generate, lambda: _type(record))
 
 
 def zero(record: Record) -> Part:
@@ -181,22 +124,10 @@ def zero(record: Record) -> Part:
     def none() -> Any:
         return _made(record, lambda path, kind: 0.0)
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        return _coded(context, builder, record, lambda path, kind: _constant(context, 0.0))
 
-        @intrinsic  # type: ignore[untyped-decorator]
-        def none(typing: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                return _coded(
-                    context, builder, record, lambda path, kind: context.get_constant(types.float64, 0.0)
-                )
-
-            return _type(record)(), generate
-
-        return none
-
-    return _part("zero", record, None, none, code)
+    return _part("zero", record, None, none, generate, lambda: _type(record))
 
 
 def summer(record: Record) -> Part:
@@ -205,31 +136,60 @@ def summer(record: Record) -> Part:
     def total(given: Any) -> float:
         return float(sum(_number(given, path) for path in leaves(record)))
 
-    def code() -> Any:
-        from numba.core import types
-        from numba.extending import intrinsic
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        return reduce(
+            builder.fadd, (_taken(context, builder, kinds[0], values[0], at) for _, at in _places(record))
+        )
 
-        @intrinsic  # type: ignore[untyped-decorator]
-        def total(typing: Any, given: Any) -> Any:
-            def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-                kind, value = signature.args[0], arguments[0]
-                numbers = [_taken(context, builder, kind, value, at) for _, at in _places(record)]
-                return reduce(builder.fadd, numbers)
-
-            return types.float64(given), generate
-
-        return total
-
-    return _part("sum", record, None, total, code)
+    return _part("sum", record, None, total, generate, _double)
 
 
 def _part(
-    name: str, of: Rows | Record, more: object, function: Callable[..., Any], code: Callable[[], Any]
+    name: str,
+    of: Rows | Record,
+    more: object,
+    function: Any,
+    generate: Generate,
+    answer: Callable[[], Any] | None = None,
 ) -> Part:
     """A part whose code depends on a record, on its rows, and on what more there is."""
     record = of.record if isinstance(of, Rows) else of
     rows = (of.first, of.present) if isinstance(of, Rows) else ()
-    return Part(function, code=code, key=(name, _shape(record), rows, more))
+    key = (name, _shape(record), rows, more)
+    arity = function.__code__.co_argcount
+    return Part(function, code=partial(_intrinsic, generate, arity, answer), key=key)
+
+
+def _intrinsic(generate: Generate, arity: int, answer: Callable[[], Any] | None = None) -> Any:
+    """A function of its LLVM instructions; without an answer it returns nothing."""
+    from numba.core import types
+    from numba.extending import intrinsic
+
+    def typed(*kinds: Any) -> Any:
+        def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
+            return generate(context, builder, signature.args, values)
+
+        given = [types.intp if isinstance(kind, types.Integer) else kind for kind in kinds]
+        return (types.void if answer is None else answer())(*given), emit
+
+    forms = (
+        lambda typing: typed(),
+        lambda typing, a: typed(a),
+        lambda typing, a, b: typed(a, b),
+        lambda typing, a, b, c: typed(a, b, c),
+        lambda typing, a, b, c, d: typed(a, b, c, d),
+    )
+    return intrinsic(forms[arity])
+
+
+def _double() -> Any:
+    from numba.core import types
+
+    return types.float64
+
+
+def _constant(context: Any, number: float) -> Any:
+    return context.get_constant(_double(), number)
 
 
 def _shape(record: Record) -> tuple[Any, ...]:

@@ -2,7 +2,7 @@
 
 Numbers of many ships lie in tiles of 64 lanes, one lane a ship, row after row: a tile is a contiguous
 one-dimensional array, and lane `i` of row `k` is entry `64 k + i`. A single ship is a vector with one entry a
-row. Field order is row order, so that nobody writes a row number.
+row. Field order is row order, so no row number is written by hand.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import ceil, fabs
 from typing import Any
 
-from shipgym.engine.mathematics import clip
+from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import (
     HAS_SHAFT,
     Motion,
@@ -42,7 +42,9 @@ def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any)
         motion = replaced(stored, stored.psi, stored.delta, n)
         order = clip(commands[i, 0], -ship.rudder_limit, ship.rudder_limit)
         k = rates(motion, order, commands[i, 1], Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), coefficients, at)
-        north, east = ground_velocity(motion, 0.0, 0.0)
+        ahead, aside = ground_velocity(motion, 0.0, 0.0)
+        sine, cosine = sin_cos(motion.psi)
+        north, east = ahead * cosine - aside * sine, ahead * sine + aside * cosine
         gear = rudder_velocity(motion.delta, order, ship)
         store_motion(out[i], 0, Motion(north, east, k.psi, k.u, k.v, k.r, k.p, k.phi, k.q, gear, k.n))
 

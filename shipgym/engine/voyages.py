@@ -10,7 +10,7 @@ import numpy as np
 
 from shipgym.engine import episodes
 from shipgym.engine.addresses import array_at, plan_at
-from shipgym.engine.compiling import compiled
+from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Motion
 from shipgym.engine.parts import Part
@@ -48,6 +48,10 @@ class Sensors:
     filter: bool = False
 
 
+#: Functions of `episodes` that loops call; others become part of them.
+SELDOM = (
+    "begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands", "sail_lanes",
+)  # fmt: skip
 PERFECT = Sensors(perfect)
 
 
@@ -89,10 +93,12 @@ class Voyages:
             course=episodes.Course,
             memory=self.sensors.module.Memory,
             state=self.task.State,
-            outcome=episodes.Outcome,
-            reward=self.task.Reward,
-            observation=self.task.Observation,
         )
+
+    @cached_property
+    def result(self) -> Layout:
+        """Rows of what comes of an interval in one tile."""
+        return Layout(outcome=episodes.Outcome, reward=self.task.Reward, observation=self.task.Observation)
 
     @cached_property
     def ship(self) -> Layout:
@@ -111,22 +117,21 @@ class Voyages:
         return Layout(rules=episodes.Rules, sensor=self.sensors.module.Settings, task=self.task.Settings)
 
     def row(self, name: str) -> int:
-        """Row of a number of the state by its name: `u`, `course`, `steps`, `reward`."""
-        for record in ("motion", "course", "state", "sea", "outcome"):
+        """Row of a number of the state by its name: `u`, `course`, `steps`."""
+        for record in ("motion", "course", "state", "sea"):
             if name in self.state[record].present:
                 return self.state[record].row(name)
         raise KeyError(name)
 
-    def info_row(self, name: str) -> int:
-        """Row of an entry of `info`."""
-        if name.startswith("reward_"):
-            part = name.removeprefix("reward_")
-            if part == "end":
-                return self.state["outcome"].row("end")
-            paths = {path.rpartition(".")[2]: path for path in leaves(self.task.Reward)}
-            return self.state["reward"].row(paths[part])
-        kept = "outcome" if name in episodes.Outcome._fields else "state"
-        return self.state[kept].row(name)
+    def info_offset(self, name: str) -> int:
+        """Where an entry of `info` stands: the offset of its row in the result, or in the state."""
+        if name in self.task.reported:
+            return episodes.OF_STATE + LANES * self.state["state"].row(name)
+        part = name.removeprefix("reward_")
+        if name in episodes.Outcome._fields or part == "end":
+            return LANES * self.result["outcome"].row(part)
+        paths = {path.rpartition(".")[2]: path for path in leaves(self.task.Reward)}
+        return LANES * self.result["reward"].row(paths[part])
 
     @cached_property
     def parts(self) -> dict[str, Any]:
@@ -134,18 +139,19 @@ class Voyages:
         return {**self._records(), **self._ships(), **self._functions()}
 
     def _records(self) -> dict[str, Any]:
-        rows = self.state
+        rows, result = self.state, self.result
         made: dict[str, Any] = {}
-        for name, place in rows.rows.items():
+        for name, place in (rows.rows | result.rows).items():
             made[f"load_{name}"], made[f"store_{name}"] = loader(place), storer(place)
-        for name in ("motion", "sea", "state", "memory", "reward"):
+        for name in ("motion", "sea", "state", "memory"):
             made[f"choose_{name}"] = chooser(rows[name].record)
+        made["choose_reward"] = chooser(self.task.Reward)
         bounds = {path: (seen.low, seen.high) for path, seen in self.task.seen.items()}
         settings = self.settings
         return made | {
             "store_ended": number_storer(rows["course"].row("ended")),
             "store_ran_away": number_storer(rows["course"].row("ran_away")),
-            "store_observation": bounded_storer(rows["observation"], bounds),
+            "store_observation": bounded_storer(result["observation"], bounds),
             "no_reward": zero(self.task.Reward),
             "total_reward": summer(self.task.Reward),
             "read_rules": loader(settings["rules"], 1),
@@ -172,11 +178,7 @@ class Voyages:
 
     def _functions(self) -> dict[str, Any]:
         task, sensors = self.task, self.sensors.module
-        seldom = {
-            name: Part(getattr(episodes, name), inline=False)
-            for name in ("begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands",
-                         "sail_lanes", "count_events")
-        }  # fmt: skip
+        seldom = {name: Part(getattr(episodes, name), inline=False) for name in SELDOM}
         return seldom | {
             "conclude_lanes": Part(episodes.conclude_lanes, inline=False),
             "step": Part(episodes.step),
@@ -189,6 +191,7 @@ class Voyages:
             "flag_table_at": array_at(np.bool_, 2),
             "single_table_at": array_at(np.float32, 2),
             **open_sea.sea_functions(self.windy),
+            "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,
             "HAS_FILTER": self.sensors.filter,
             "measure": Part(sensors.measure),

@@ -1,31 +1,21 @@
 """What an environment's picture shows: the scene of one lane of an engine, and the wake behind its ship."""
 
-from __future__ import annotations
-
 from math import atan2, degrees, hypot, pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
 from shipgym.envs.rendering import Renderer, Scene
 
-Floats = NDArray[np.float64]
 KNOT = 1852.0 / 3600.0  # m/s
 WAKE_POINTS = 400  # kept of the wake
 USUAL_BEAM = 0.15  # of the length, where the beam is not known
 
 
 class Artist:
-    """Draws one lane of an engine.
-
-    Parameters
-    ----------
-    mode : {"human", "rgb_array"}
-        See `Renderer`.
-    lane : int
-        Which lane.
-    """
+    """Draws one lane of an engine; modes as in `Renderer`."""
 
     def __init__(self, mode: str, lane: int = 0) -> None:
         self._renderer = Renderer(mode)
@@ -59,21 +49,12 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
     length = particulars["length"]
     corridor = getattr(engine.task, "corridor", None)
     return Scene(
-        x=state["x"],
-        y=state["y"],
-        heading=state["psi"],
-        rudder=state["delta"],
-        length=length,
-        beam=particulars.get("beam") or USUAL_BEAM * length,
-        rudder_limit=engine.model.steering.limit,
-        wake=wake,
-        course_order=state["set_point"],
-        waypoints=engine.waypoints(lane),
-        corridor=None if corridor is None else corridor * length,
-        wind=_wind(state),
-        current=_current(state),
+        x=state["x"], y=state["y"], heading=state["psi"], rudder=state["delta"], length=length,
+        beam=particulars.get("beam") or USUAL_BEAM * length, rudder_limit=engine.model.steering.limit,
+        wake=wake, course_order=state.get("set_point", state["psi"]), waypoints=engine.waypoints(lane),
+        corridor=None if corridor is None else corridor * length, wind=_wind(state), current=_current(state),
         readouts=_readouts(engine, lane, state),
-    )
+    )  # fmt: skip
 
 
 def _wind(state: dict[str, float]) -> tuple[float, float] | None:
@@ -89,14 +70,11 @@ def _current(state: dict[str, float]) -> tuple[float, float] | None:
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
     """Speed, errors and the last reward."""
     speed = hypot(state["u"], state["v"])
-    error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
-    lines = {
-        "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
-        "heading": _bearing(state["psi"]),
-        "to steer": _bearing(state["set_point"]),
-        "heading error": f"{degrees(error):+.1f} deg",
-        "rudder": f"{degrees(state['delta']):+.1f} deg",
-    }
+    lines = {"speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn", "heading": _bearing(state["psi"])}
+    if "set_point" in state:
+        error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
+        lines |= {"to steer": _bearing(state["set_point"]), "heading error": f"{degrees(error):+.1f} deg"}
+    lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"
     return {**lines, "reward": f"{engine.shown.outcomes[0, lane]:+.3f}"}

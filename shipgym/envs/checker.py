@@ -1,7 +1,5 @@
 """A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -151,8 +149,7 @@ def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     )
     _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
     _expect(
-        _same(first, list_of_seeds),
-        "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])",
+        _same(first, list_of_seeds), "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])"
     )
     _expect(not _same(first[:1], other[:1]), "reset with another seed gave the same first observations")
 

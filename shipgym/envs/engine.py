@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES, flat
-from shipgym.engine.voyages import sensors_for, voyages
-from shipgym.envs.outputs import STEP_OUTCOME, Outputs
+from shipgym.engine.voyages import Sensors, sensors_for, voyages
+from shipgym.envs.outputs import STEP_OUTCOME, OutputPool, Outputs
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.stability import refuse_unstable
 from shipgym.envs.tiles import Threads, lanes_of, ship_columns, ship_tiles
@@ -25,6 +25,7 @@ from shipgym.trials.sensors import SEA_TRIAL
 
 Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
+N_FIXED = 22  # words of a loop's world before those of its outputs
 #: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
 SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 
@@ -83,6 +84,8 @@ class Engine:
             raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
         self.windy = any(not sea.calm for _, sea in self.pool)
         sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
+        if task.sensors is not None:
+            sensors = Sensors(task.sensors)
         own = self.pool if drawn else [(model, task.seas[0]) for model in fleet]
         self._voyages = voyages(self.model.vessel, task.definition, sensors, self.windy, len(own) == 1)
         self._run = self._voyages.run
@@ -109,7 +112,9 @@ class Engine:
         names = self.task.info_names
         self.flag_names = [name for name in names if name in self.task.flags]
         self._rows = self._shown_rows(observed)
-        self._sizes = (self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names))
+        self._outputs = OutputPool(
+            self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names)
+        )
         words = addresses(
             [
                 self._states,
@@ -122,8 +127,10 @@ class Engine:
                 self._actions,
             ]
         )
+        self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in self._threads.shares]
         self._worlds = [
-            np.array([*words, *[0] * 9, first, end], dtype=np.int64) for first, end in self._threads.shares
+            np.array([*words, *[0] * 9, *share, *addresses([result])], dtype=np.int64)
+            for share, result in zip(self._threads.shares, self._results, strict=True)
         ]
         self.show_anew()
 
@@ -135,29 +142,32 @@ class Engine:
         )  # fmt: skip
         sensor = self._voyages.sensors.module.Settings
         noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
-        own = sensor(**{name: noise[name] for name in sensor._fields if name in noise})
+        own = task.sensor_settings or sensor(
+            **{name: noise[name] for name in sensor._fields if name in noise}
+        )
         return np.array([*rules, *flat(own), *flat(task.settings)], dtype=float)
 
     def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
         """How many observations, outcomes and flags there are, and the offsets of their rows."""
         made = self._voyages
-        outcomes = ["reward", "terminated", "truncated"]
-        first = [made.state["outcome"].row(name) for name in outcomes]
-        rows = [
-            [made.state["observation"].row(path) for path in observed],
-            [*first, *(made.info_row(name) for name in self.task.info_names)],
-            [*first[1:], *(made.info_row(name) for name in self.flag_names)],
+        outcomes = [
+            LANES * made.result["outcome"].row(name) for name in ("reward", "terminated", "truncated")
         ]
-        return np.array([*map(len, rows), *(LANES * row for kind in rows for row in kind)], dtype=np.int64)
+        rows = [
+            [LANES * made.result["observation"].row(path) for path in observed],
+            [*outcomes, *(made.info_offset(name) for name in self.task.info_names)],
+            [*outcomes[1:], *(made.info_offset(name) for name in self.flag_names)],
+        ]
+        return np.array([*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64)
 
     def show_anew(self) -> None:
         """Let what comes next be written into new arrays, so that those that were given may be kept."""
-        self._write_into(Outputs(*self._sizes))
+        self._write_into(self._outputs.take())
 
     def _write_into(self, outputs: Outputs) -> None:
         self.shown = outputs
         for world in self._worlds:
-            world[-11:-2] = outputs.words
+            world[N_FIXED : N_FIXED + len(outputs.words)] = outputs.words
 
     def advance(self, next_ones: bool = False, anew: bool = False) -> int:
         """One control interval with the commands as they stand.
@@ -360,6 +370,25 @@ class Engine:
         self.advance()
         shown = self.shown
         return self.observations, shown.outcomes[0].copy(), shown.terminated.copy(), shown.truncated.copy()
+
+    def refuse_rewards(self) -> None:
+        """Say which part of the last step's rewards is not finite, in which lane.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
+        bad = ~np.isfinite(self.reward_parts)
+        lane, part = (
+            np.argwhere(bad)[0] if bad.any() else (int(np.argmax(~np.isfinite(self.shown.outcomes[0]))), 0)
+        )
+        name = self.task.reward_parts[part]
+        raise InputError(
+            f"{self.task.definition.source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
+            f"{self.steps[lane]:g}, expected a finite number; look for a division by zero or a root of a "
+            "negative number (shipgym.check_task helps)"
+        )
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import (
     check_finite,
     check_flag,
@@ -25,8 +26,6 @@ from shipgym.files import read_json, write_json
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
-Floats = NDArray[np.float64]
-
 #: What has to be recorded of any ship.
 REQUIRED_STATES = ("x", "y", "psi", "delta")
 
@@ -40,16 +39,12 @@ class Episode:
 
     Parameters
     ----------
-    environment : str
-        Id of the environment.
-    model : str
-        Name of the ship model.
+    environment, model : str
+        Id of the environment and name of the ship model.
     dt : float
         Control interval, s.
-    length : float
-        Of the ship, between perpendiculars, m.
-    rudder_limit : float
-        rad.
+    length, rudder_limit : float
+        Of the ship: length between perpendiculars, m, and largest rudder angle, rad.
     states : mapping of str to array-like of shape (n_steps + 1,)
         All that the environment's `physical_state` names; at least x, y, psi and delta.
     actions : array-like of shape (n_steps, n_actions)
@@ -64,10 +59,8 @@ class Episode:
         What else `info` reported in numbers, at the beginning and after each step; true is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
-    corridor : float, optional
-        Half the width of the corridor along the path, m.
-    beam : float, optional
-        Of the ship, m.
+    corridor, beam : float, optional
+        Half the width of the corridor along the path, and the ship's beam, m.
     arguments : mapping of str to Any, optional
         Of the environment, ready for JSON.
     seed : int, optional
@@ -216,10 +209,7 @@ class Episode:
     def load(cls, path: str | Path) -> Episode:
         """Read an episode that was saved; its numbers are the very same.
 
-        Raises
-        ------
-        InputError
-            Naming the file and the field at fault.
+        Raises InputError, naming the file and the field at fault.
         """
         content = read_json(Path(path), "episode file", "record the episode again or take another copy")
         try:

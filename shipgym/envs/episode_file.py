@@ -20,8 +20,6 @@ Format 1:
     outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -59,10 +57,7 @@ def to_file(episode: Mapping[str, Any]) -> dict[str, Any]:
 def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     """An episode's fields by name, from the content of an episode file.
 
-    Raises
-    ------
-    InputError
-        For another kind of file or format, a field that is missing or unknown, or one that holds no numbers.
+    Raises InputError for another kind of file or format, a field that is missing, unknown or not of numbers.
     """
     if content.get("kind") != KIND:
         raise InputError(

@@ -15,11 +15,6 @@ STEP_FLAGS = 2  # terminated, truncated come before the flags in `info`
 class Outputs:
     """One step's arrays, in one block of memory.
 
-    Parameters
-    ----------
-    num_envs, n_observed, n_outcomes, n_flags : int
-        Number of lanes, of quantities that are observed, of outcomes and of flags.
-
     Attributes
     ----------
     observations : float32 array of shape (num_envs, n_observed)
@@ -27,30 +22,16 @@ class Outputs:
         Reward, terminated, truncated, then what is in `info`.
     flags : bool array of shape (n_flags, num_envs)
         Terminated, truncated, then the flags in `info`.
-    words : tuple of int
+    words : int64 array of shape (9,)
         Addresses and shapes of the three, by turns.
     """
 
     __slots__ = ("flags", "observations", "outcomes", "words")
 
-    def __init__(self, num_envs: int, n_observed: int, n_outcomes: int, n_flags: int) -> None:
-        seen, shown = 8 * n_outcomes * num_envs, 4 * n_observed * num_envs
-        block = np.empty(seen + shown + n_flags * num_envs, dtype=np.uint8)
-        self.outcomes: NDArray[np.float64] = np.ndarray((n_outcomes, num_envs), np.float64, block)
-        self.observations: NDArray[np.float32] = np.ndarray((num_envs, n_observed), np.float32, block, seen)
-        self.flags: NDArray[np.bool_] = np.ndarray((n_flags, num_envs), np.bool_, block, seen + shown)
-        start = block.__array_interface__["data"][0]
-        self.words = (
-            start + seen, num_envs, n_observed, start, n_outcomes, num_envs, start + seen + shown, n_flags, num_envs,
-        )  # fmt: skip
-
-    def take(self, other: Outputs) -> None:
-        """Copy what others hold."""
-        self.outcomes[:], self.observations[:], self.flags[:] = (
-            other.outcomes,
-            other.observations,
-            other.flags,
-        )
+    observations: NDArray[np.float32]
+    outcomes: NDArray[np.float64]
+    flags: NDArray[np.bool_]
+    words: NDArray[np.int64]
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
@@ -63,6 +44,65 @@ class Outputs:
         """Whether episodes have run out of time."""
         row: NDArray[np.bool_] = self.flags[1]
         return row
+
+    def take(self, other: Outputs) -> None:
+        """Copy what others hold."""
+        self.outcomes[:], self.observations[:], self.flags[:] = (
+            other.outcomes,
+            other.observations,
+            other.flags,
+        )
+
+
+class OutputPool:
+    """Output buffers of one engine; the memory of those that nobody holds any more is used again.
+
+    To ask the system for memory in each step would take longer than to sail hundreds of ships. What a user
+    keeps, an array or a view of one, stays as it is.
+
+    Parameters
+    ----------
+    num_envs, n_observed, n_outcomes, n_flags : int
+        Number of lanes, of quantities that are observed, of outcomes and of flags.
+    """
+
+    def __init__(self, num_envs: int, n_observed: int, n_outcomes: int, n_flags: int) -> None:
+        self._seen, self._flags = 8 * n_outcomes * num_envs, (8 * n_outcomes + 4 * n_observed) * num_envs
+        self._size = self._flags + n_flags * num_envs
+        self._shapes = (num_envs, n_observed), (n_outcomes, num_envs), (n_flags, num_envs)
+        self._free: list[tuple[NDArray[np.uint8], NDArray[np.int64]]] = []
+
+    def take(self) -> Outputs:
+        """Buffers that nobody else holds."""
+        memory, words = self._free.pop() if self._free else self._new()
+        block = np.asarray(_Lease(memory, words, self._free))
+        seen, outcomes, flags = self._shapes
+        outputs = Outputs()
+        outputs.outcomes = np.ndarray(outcomes, np.float64, block)
+        outputs.observations = np.ndarray(seen, np.float32, block, self._seen)
+        outputs.flags = np.ndarray(flags, np.bool_, block, self._flags)
+        outputs.words = words
+        return outputs
+
+    def _new(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
+        memory = np.empty(self._size, dtype=np.uint8)
+        start = memory.ctypes.data
+        seen, outcomes, flags = self._shapes
+        words = [start + self._seen, *seen, start, *outcomes, start + self._flags, *flags]
+        return memory, np.array(words, dtype=np.int64)
+
+
+class _Lease:
+    """Memory that is lent to arrays, and goes back when the last of them, and of their views, is gone."""
+
+    __slots__ = ("__array_interface__", "_free", "_given")
+
+    def __init__(self, memory: NDArray[np.uint8], words: NDArray[np.int64], free: list[Any]) -> None:
+        self.__array_interface__ = memory.__array_interface__
+        self._given, self._free = (memory, words), free
+
+    def __del__(self) -> None:
+        self._free.append(self._given)
 
 
 def named_rows(outcomes: Any, flags: Any, names: Sequence[str], flag_names: Sequence[str]) -> dict[str, Any]:

@@ -1,7 +1,5 @@
 """Domain randomisation: the ships of which an environment gives each episode one."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from itertools import product
@@ -26,23 +24,16 @@ Pool = list[tuple[ShipModel, Weather]]
 
 @dataclass(frozen=True)
 class Randomisation:
-    """What differs from episode to episode beside task and sea.
+    """What differs from episode to episode beside task and sea."""
 
-    Attributes
-    ----------
-    model_uncertainty : {None, "covariance"}
-        Whether each episode's ship is drawn from the identified covariance ("posterior" is taken too).
-    ensemble : sequence of str, Path or ShipModel
-        Further models of the same structure, of which each episode has one.
-    speed_range : tuple of float or None
-        Least and largest approach speed, parts of the service speed; the shaft turns in proportion.
-    loading_range : tuple of float or None
-        Least and largest displacement, parts of that of the model: accelerations are divided by it.
-    """
-
+    # {None, "covariance"}; whether each episode's ship is drawn from the identified covariance ("posterior"
+    # is taken too)
     model_uncertainty: str | None = None
+    # further models of the same structure, of which each episode has one
     ensemble: Sequence[str | Path | ShipModel] = ()
+    # least and largest approach speed, parts of the service speed; the shaft turns in proportion
     speed_range: Range | None = None
+    # least and largest displacement, parts of that of the model: accelerations are divided by it
     loading_range: Range | None = None
 
     def __post_init__(self) -> None:
@@ -66,23 +57,10 @@ class Randomisation:
         return cls(**own), {key: value for key, value in options.items() if key not in own}
 
     def ships(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
-        """Ship and sea of the pool that episodes are drawn from; a single one where nothing differs.
+        """The pool of ships and seas that episodes are drawn from; a single one where nothing differs.
 
-        Parameters
-        ----------
-        model : ShipModel
-            The environment's model.
-        seas : sequence of Weather
-
-        Returns
-        -------
-        list of tuple of ShipModel and Weather
-            The same for the same arguments.
-
-        Raises
-        ------
-        InputError
-            If a model cannot be drawn from, has another structure, or is not loaded by its coefficients.
+        The same for the same arguments. Raises InputError if a model cannot be drawn from, has another
+        structure, or is not loaded by its coefficients.
         """
         models = [model, *(one if isinstance(one, ShipModel) else load_model(one) for one in self.ensemble)]
         for other in models[1:]:

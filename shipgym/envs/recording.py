@@ -10,14 +10,13 @@ from typing import Any, SupportsFloat, TypeVar
 
 import gymnasium
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_text
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 
-Floats = NDArray[np.float64]
 Observation = TypeVar("Observation")
 Action = TypeVar("Action")
 
@@ -65,13 +64,9 @@ class RecordEpisode(
         overwrite: bool = False,
     ) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(
-            self,
-            folder=str(folder),
-            episode_trigger=episode_trigger,
-            trials=trials,
-            name_prefix=name_prefix,
+            self, folder=str(folder), episode_trigger=episode_trigger, trials=trials, name_prefix=name_prefix,
             overwrite=overwrite,
-        )
+        )  # fmt: skip
         _check_environment(env)
         super().__init__(env)
         self.episode_number = -1

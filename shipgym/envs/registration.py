@@ -8,6 +8,7 @@ from typing import Any
 import gymnasium
 
 from shipgym.errors import InputError
+from shipgym.tasks.source import kept_source
 
 #: Keywords of the variants by id, without the version.
 VARIANTS: dict[str, dict[str, Any]] = {
@@ -45,10 +46,11 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     InputError
         If the task is not what the contract asks, or the id belongs to another task; nothing is registered then.
     """
-    from shipgym.tasks.definition import read_definition
+    from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
 
-    definition = read_definition(task, options.get("reward"))
-    given = {"task": str(task) if isinstance(task, Path) else task, **options}
+    given = {"task": kept_source(task), **options}
+    given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}
+    _, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), options)
     if env_id in gymnasium.registry:
         if gymnasium.registry[env_id].kwargs == given:
             return
@@ -60,7 +62,7 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         gymnasium.envs.registration.parse_env_id(env_id)
     except gymnasium.error.Error as error:
         raise InputError(
-            f"{env_id!r} found, expected an id such as 'harbour/{definition.name}-v0': {error}"
+            f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0': {error}"
         ) from None
     _register(env_id, given)
 

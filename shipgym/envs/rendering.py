@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 Point = tuple[float, float]
 Colour = tuple[int, int, int]
@@ -60,17 +60,9 @@ class Scene:
 
 
 class Renderer:
-    """Draws scenes, into arrays or a window.
+    """Draws scenes into arrays ("rgb_array") or in a window too ("human").
 
-    Parameters
-    ----------
-    mode : {"rgb_array", "human"}
-        Whether `draw` shows the picture in a window too.
-
-    Raises
-    ------
-    InputError
-        For another mode, or where pygame-ce is not installed.
+    Raises InputError for another mode, or where pygame-ce is not installed.
     """
 
     def __init__(self, mode: str) -> None:
@@ -95,7 +87,8 @@ class Renderer:
         self._brush.fill(WATER)
         self._draw_grid(chart)
         self._draw_path(chart, scene)
-        self._draw_wake(chart, scene)
+        if len(scene.wake) > 1:
+            self._brush.lines(WAKE, chart.pixels(scene.wake), 2)
         self._draw_ship(chart, scene)
         self._draw_scale(chart)
         self._draw_compass(scene, (SIZE - 70.0, 70.0), 52.0)
@@ -145,10 +138,6 @@ class Renderer:
         for point in points:
             brush.circle(WATER, point, 5)
             brush.circle(PATH, point, 5, 2)
-
-    def _draw_wake(self, chart: _Chart, scene: Scene) -> None:
-        if len(scene.wake) > 1:
-            self._brush.lines(WAKE, chart.pixels(scene.wake), 2)
 
     def _draw_ship(self, chart: _Chart, scene: Scene) -> None:
         brush = self._brush
@@ -334,9 +323,4 @@ def _on_circle(centre: Point, radius: float, bearing: float) -> Point:
 def _strip(start: Floats, end: Floats, half: float) -> list[list[float]]:
     along = (end - start) / max(hypot(*(end - start)), 1e-9)
     across = half * np.array([-along[1], along[0]])
-    return [
-        (start + across).tolist(),
-        (end + across).tolist(),
-        (end - across).tolist(),
-        (start - across).tolist(),
-    ]
+    return [corner.tolist() for corner in (start + across, end + across, end - across, start - across)]

@@ -131,14 +131,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each row: with the seeds of `seed`, once, or else the next.
 
-        Returns
-        -------
-        float32 array of shape (num_envs, n_observations)
-
-        Raises
-        ------
-        InputError
-            If there are options: as the single environments, these know none.
+        Raises InputError if there are options: as the single environments, these know none.
         """
         options = [given for given in self._options if given]
         self._reset_options()
@@ -158,21 +151,10 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     def step_wait(
         self,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
-        """One control interval; where an episode ends the next begins.
+        """One control interval; where an episode ends the next begins and the observation is its first.
 
-        Returns
-        -------
-        observations : float32 array of shape (num_envs, n_observations)
-            Of the new episode where the last one ended.
-        rewards : float32 array of shape (num_envs,)
-        dones : bool array of shape (num_envs,)
-        infos : list of dict
-            The same list in each step.
-
-        Raises
-        ------
-        InputError
-            If an action is not a number or their shape is another.
+        Observations and rewards are float32, infos the same list in each step. Raises InputError if an action
+        is not a number or their shape is another.
         """
         observations, rewards, terminated, truncated, infos = self.vector_env.step(self._actions)
         self._returns += rewards
@@ -234,10 +216,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
         """Keep a value for some rows by a name of the user's own.
 
-        Raises
-        ------
-        InputError
-            For what is fixed when the environments are made.
+        Raises InputError for what is fixed when the environments are made.
         """
         if attr_name in FIXED:
             raise InputError(

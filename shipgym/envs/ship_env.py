@@ -17,6 +17,7 @@ from shipgym.envs.engine import Engine, episode_key
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
+from shipgym.instruments.sensor_set import read_sensors
 from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import RUDDER_ORDERS, Task
@@ -40,7 +41,9 @@ def read_options(
         For an unknown model or keyword, or a value out of its range.
     """
     definition = read_definition(task, options.get("reward"))
-    known = [*ENV_OPTIONS, *Task.option_names(definition), *Randomisation.names()]
+    sensors = options.get("sensors")
+    own = Task.option_names(definition, None if sensors is None else read_sensors(sensors))
+    known = [*ENV_OPTIONS, *own, *Randomisation.names()]
     check_keys(options, known, "environment options")
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
@@ -82,8 +85,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     **options
-        Settings of the task, fields of `Task` and of `Randomisation`; `reward`, a file with a `Reward` and a
-        `step` that take the place of the task's.
+        Settings of the task, fields of `Task` and of `Randomisation`; `reward` and `sensors`, files with a
+        reward and a sensor set of your own (`shipgym.tasks.contract`).
 
     Raises
     ------
@@ -200,6 +203,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
             wrong = next(number for number in self._command.tolist() if not isfinite(number))
             raise InputError(f"action: {wrong} found, expected numbers in [-1, 1]: parts of the limit")
         values = self._outcomes.tolist()
+        if not isfinite(values[0]):
+            self._engine.refuse_rewards()
         info = self._info(values[STEP_OUTCOME:])
         if self._artist is not None:
             self._artist.note(self._engine)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -80,6 +81,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         self._names, self._flags = self.task.info_names, self._engine.flag_names
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._mode = mode
+        self._own_reward = not self.task.definition.shipped
         self._discrete = self.task.action == "rudder-discrete"
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keys: NDArray[np.uint64] | None = None
@@ -186,12 +188,14 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         Raises
         ------
         InputError
-            If an action is not a number or their shape is another.
+            If an action is not a number or their shape is another, or a reward of your own is not finite.
         """
         engine = self._engine
         engine.order(self._commands(actions) if self._discrete else actions)
         ended = engine.advance(self._some_over, anew=True)
         shown = engine.shown
+        if self._own_reward and not isfinite(shown.outcomes[0].sum()):
+            engine.refuse_rewards()
         infos = self._infos()
         if self._mode is AutoresetMode.NEXT_STEP:
             self._some_over = ended > 0

@@ -1,7 +1,5 @@
 """Identified models that run away are kept in their files, marked, and not sailed unless asked for."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable
 
@@ -10,20 +8,7 @@ from shipgym.ships import ShipModel
 
 
 def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
-    """Refuse models that were found unstable when they were identified.
-
-    Parameters
-    ----------
-    models : iterable of ShipModel
-        Those to sail.
-    allow_unstable : bool
-        Whether to warn only.
-
-    Raises
-    ------
-    InputError
-        Naming the model and what to do.
-    """
+    """InputError for models found unstable when they were identified; a warning if `allow_unstable`."""
     marked = [model.name for model in models if (model.provenance or {}).get("stable") is False]
     if not marked:
         return

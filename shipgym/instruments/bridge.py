@@ -106,9 +106,9 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """The ship's motion, and what the instruments add."""
-    north, east = ground_velocity(motion, sea.current_north, sea.current_east)
+    ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x + memory.x, motion.y + memory.y, motion.psi + memory.psi, motion.u + memory.u,
         motion.v + memory.v, motion.r + memory.r, motion.p + sea.p_wave, motion.phi + sea.phi_wave,
-        motion.delta, motion.n, north, east,
+        motion.delta, motion.n, motion.psi, ahead, aside,
     )  # fmt: skip

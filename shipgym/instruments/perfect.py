@@ -54,8 +54,8 @@ def measure(
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """What is shown."""
-    north, east = ground_velocity(motion, sea.current_north, sea.current_east)
+    ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x, motion.y, motion.psi, motion.u, motion.v, motion.r, motion.p, motion.phi, motion.delta, motion.n,
-        north, east,
+        motion.psi, ahead, aside,
     )  # fmt: skip

@@ -3,11 +3,9 @@
 Signals: Ljung 1999, System Identification, 13.3 (pseudo-random binary and multi-sine signals).
 """
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
@@ -16,8 +14,6 @@ from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 CLOCK = 0.5  # of the binary sequence, L / U0
 PERIODS = 20.0, 2.0  # longest and shortest of the multi-sine, L / U0

@@ -1,17 +1,13 @@
 """When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats, integral
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 ARRIVED = 0.9  # a rudder beyond this part of its usual angle has arrived there
 
@@ -77,9 +73,16 @@ def departure(t: Floats, delta: Floats) -> float:
 
 def distance_sailed(trial: Trial) -> Floats:
     """Distance from the start, m, from the speed by the trapezoid rule, shape (n_samples,)."""
-    speed = np.hypot(trial["u"], trial["v"])
-    steps = 0.5 * (speed[1:] + speed[:-1]) * np.diff(trial.t)
-    return np.concatenate([[0.0], np.cumsum(steps)])
+    return integral(trial.t, np.hypot(trial["u"], trial["v"]))
+
+
+def reached(values: Floats, threshold: float, other: Floats) -> float | None:
+    """Another quantity when values first reach a threshold, by straight lines; None if they never do."""
+    past = np.flatnonzero(values >= threshold)
+    if len(past) == 0:
+        return None
+    k = max(int(past[0]), 1)
+    return float(np.interp(threshold, values[k - 1 : k + 1], other[k - 1 : k + 1]))
 
 
 def number_of_steps(duration: float, dt: float) -> int:

@@ -1,7 +1,5 @@
 """The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,33 +23,16 @@ LARGE_DISPLACEMENT = (
 
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion; the worse of both sides counts.
+    """One criterion; the worse of both sides counts."""
 
-    Attributes
-    ----------
-    value : float or None
-        In `unit`; None where the manoeuvre never got so far.
-    limit : float
-        Largest value allowed.
-    passed : bool or None
-        None where the ship's equations do not allow the test; `note` says why.
-    unit : str
-        "ship lengths" or "deg".
-    source : str
-        Paragraph of the annex of MSC.137(76).
-    drawn : IndexInterval or None
-        The value over models drawn from the covariance of an identified ship.
-    note : str
-        Remarks.
-    """
-
-    value: float | None
-    limit: float
-    passed: bool | None
-    unit: str
-    source: str
+    value: float | None  # in `unit`; None where the manoeuvre never got so far
+    limit: float  # largest value allowed
+    passed: bool | None  # None where the ship's equations do not allow the test; `note` says why
+    unit: str  # "ship lengths" or "deg"
+    source: str  # paragraph of the annex of MSC.137(76)
+    # the value over models drawn from the covariance of an identified ship
     drawn: IndexInterval | None = None
-    note: str = ""
+    note: str = ""  # remarks
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -97,7 +78,6 @@ def imo_assessment(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     n_draws : int, optional
         Models drawn from the covariance of an identified ship, to show how certain each verdict is; by
         default 100, and none for a ship without covariance.
@@ -124,7 +104,7 @@ def imo_assessment(
 def assess_draws(
     model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
 ) -> dict[str, Criterion]:
-    """The criteria of a model and of models drawn from it; `progress` is told the number of draws done."""
+    """The criteria of a model and of models drawn from it; `progress` gets the number of draws done."""
     needed = imo_manoeuvres(model)
     own = {name: attempt(test.evaluate, model)[0] or test.no_indices for name, test in needed.items()}
     evaluated = {name: test.evaluate for name, test in needed.items()}

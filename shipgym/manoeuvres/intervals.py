@@ -1,7 +1,5 @@
 """How certain the indices of an identified ship are: manoeuvres of models drawn from its covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -9,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
 LEVELS = (0.025, 0.975)  # of the 95 % interval
@@ -25,21 +23,11 @@ Evaluation = Callable[[ShipModel], Any]
 
 @dataclass(frozen=True, eq=False)
 class IndexInterval:
-    """One index of a model and of models drawn from its covariance.
+    """One index of a model and of models drawn from its covariance."""
 
-    Attributes
-    ----------
-    value : float or None
-        Of the model itself; None where its manoeuvre never got so far.
-    values : array of shape (n_draws,)
-        Of the draws; NaN where one ran away or its manoeuvre never got so far.
-    ran_away : bool array of shape (n_draws,)
-        Draws that ran away in the manoeuvre.
-    """
-
-    value: float | None
-    values: Floats
-    ran_away: Bools
+    value: float | None  # of the model itself; None where its manoeuvre never got so far
+    values: Floats  # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got so far
+    ran_away: Bools  # shape (n_draws,); draws that ran away in the manoeuvre
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -148,23 +136,10 @@ def intervals_of(
     evaluations: Mapping[str, Evaluation],
     progress: Callable[[int], None] | None = None,
 ) -> dict[str, dict[str, IndexInterval]]:
-    """Indices of several manoeuvres over the same draws.
+    """Indices of several manoeuvres over the same draws, by manoeuvre and index.
 
-    Parameters
-    ----------
-    own : mapping of str to indices
-        Of the model itself, by manoeuvre.
-    draws : sequence of ShipModel
-        Sailed one after the other; with none, the values stand alone.
-    evaluations : mapping of str to callable
-        From a ship to the indices, by manoeuvre.
-    progress : callable, optional
-        Called with the number of draws done.
-
-    Returns
-    -------
-    dict of str to dict of str to IndexInterval
-        By manoeuvre and index.
+    `own` are those of the model itself, `evaluations` give them from a ship; both by manoeuvre. Without draws
+    the values stand alone. `progress` is called with the number of draws done.
     """
     ran_away = {name: np.zeros(len(draws), dtype=np.bool_) for name in own}
     values = {name: {index: np.full(len(draws), np.nan) for index in own[name]} for name in own}

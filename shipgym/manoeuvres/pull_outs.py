@@ -3,8 +3,6 @@
 As described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 
@@ -26,19 +24,12 @@ CAPTION = "Yaw rate, deg/s. Sides that end apart show a ship that is unstable on
 
 @dataclass(frozen=True)
 class PullOutIndices:
-    """Indices of a pull-out.
+    """Indices of a pull-out."""
 
-    Attributes
-    ----------
-    turning_rate_deg_s : float
-        Yaw rate of the turn when the rudder was put amidships, degrees per second.
-    residual_rate_deg_s : float
-        Yaw rate that is left at the end, degrees per second. After turns to either side it is the same for
-        a ship that is stable on a straight course (0 where propeller and hull pull it to no side), and
-        differs for an unstable one, unless its loop leaves out the rudder amidships.
-    """
-
-    turning_rate_deg_s: float
+    turning_rate_deg_s: float  # yaw rate of the turn when the rudder was put amidships, degrees per second
+    # yaw rate that is left at the end, degrees per second. After turns to either side it is the same for a
+    # ship that is stable on a straight course (0 where propeller and hull pull it to no side), and differs
+    # for an unstable one, unless its loop leaves out the rudder amidships
     residual_rate_deg_s: float
 
 

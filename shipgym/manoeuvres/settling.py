@@ -1,21 +1,17 @@
 """Legs of a manoeuvre that last until the motion is steady."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
 STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged

@@ -3,16 +3,14 @@
 Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Circ.1053 and ITTC 7.5-04-02-01.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import require, rudder
@@ -24,7 +22,6 @@ from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Method = Literal["direct", "reverse"]
 
 #: Rudder angles of the direct spiral, degrees, from starboard to port: in small steps where the loop is.
@@ -42,41 +39,26 @@ SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on it
 
 @dataclass(frozen=True, eq=False)
 class Spiral:
-    """Steady turns at one rudder angle after the other.
+    """Steady turns at one rudder angle after the other."""
 
-    Attributes
-    ----------
-    trial : Trial
-        The manoeuvre.
-    rudder_deg, yaw_rate_deg_s : array of shape (n_points,)
-        Of each steady turn, in the order in which they were sailed; degrees and degrees per second.
-    method : {"direct", "reverse"}
-        Whether the rudder was set and the yaw rate observed, or the other way round.
-    """
-
-    trial: Trial
+    trial: Trial  # the manoeuvre
+    # shape (n_points,); of each steady turn, in the order in which they were sailed; degrees and degrees per
+    # second
     rudder_deg: Floats
     yaw_rate_deg_s: Floats
+    # {"direct", "reverse"}; whether the rudder was set and the yaw rate observed, or the other way round
     method: Method
 
 
 @dataclass(frozen=True)
 class SpiralIndices:
-    """Indices of a spiral.
+    """Indices of a spiral."""
 
-    Attributes
-    ----------
-    loop_width_deg : float
-        Range of rudder angles at which the ship turns to either side, degrees; 0 for a ship that is stable
-        on a straight course. A direct spiral knows it to within its rudder steps.
-    loop_height_deg_s : float
-        Difference of both yaw rates in the middle of the loop, degrees per second.
-    loop_middle_deg : float
-        Rudder in the middle of the loop, degrees; of a stable ship that with which she sails straight.
-    """
-
+    # range of rudder angles at which the ship turns to either side, degrees; 0 for a ship that is stable on a
+    # straight course. A direct spiral knows it to within its rudder steps
     loop_width_deg: float
-    loop_height_deg_s: float
+    loop_height_deg_s: float  # difference of both yaw rates in the middle of the loop, degrees per second
+    # rudder in the middle of the loop, degrees; of a stable ship that with which she sails straight
     loop_middle_deg: float
 
 
@@ -97,10 +79,8 @@ def direct_spiral(
     rudder_deg : sequence of float
         From one side to the other, degrees; sailed in this order and then back to the first. The loop is
         known to within their steps.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Raises
     ------
@@ -139,10 +119,8 @@ def reverse_spiral(
         The ship, at service speed and the matching shaft speed.
     yaw_rate_deg_s : sequence of float, optional
         From one side to the other, degrees per second; by default from 0.2 to -0.2 times U0 / L.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Returns
     -------
@@ -183,9 +161,7 @@ def _one_way(values: Sequence[float], argument: str, unit: str, limit: float, wh
 
 
 def spiral_from_trial(
-    trial: Trial,
-    rudder_deg: Sequence[float] | None = None,
-    tolerance_deg: float = 0.5,
+    trial: Trial, rudder_deg: Sequence[float] | None = None, tolerance_deg: float = 0.5
 ) -> Spiral:
     """The steady turns of a measured direct spiral.
 

@@ -1,7 +1,5 @@
 """Straight-line acceleration and stopping, and their indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,7 +8,7 @@ import numpy as np
 from shipgym.checks import check_number
 from shipgym.errors import InputError, ManoeuvreError
 from shipgym.manoeuvres.excitation import shaft_of
-from shipgym.manoeuvres.execution import distance_sailed, require, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship_length
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -31,44 +29,24 @@ ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to se
 
 @dataclass(frozen=True)
 class StoppingIndices:
-    """Indices of a stopping trial.
+    """Indices of a stopping trial."""
 
-    Attributes
-    ----------
-    track_reach_lengths : float
-        Distance sailed along the track until the speed is reached, ship lengths: the stopping distance.
-    head_reach_lengths, side_reach_lengths : float
-        The same along and across the heading at the order, ship lengths; to starboard positive.
-    heading_change_deg : float
-        Degrees, positive to starboard.
-    time_s : float
-        s.
-    """
-
+    # distance sailed along the track until the speed is reached, ship lengths: the stopping distance
     track_reach_lengths: float
+    # the same along and across the heading at the order, ship lengths; to starboard positive
     head_reach_lengths: float
     side_reach_lengths: float
-    heading_change_deg: float
-    time_s: float
+    heading_change_deg: float  # degrees, positive to starboard
+    time_s: float  # s
 
 
 @dataclass(frozen=True)
 class AccelerationIndices:
-    """Indices of an acceleration.
+    """Indices of an acceleration."""
 
-    Attributes
-    ----------
-    time_s : float
-        Until the given part of the change of speed is done, s.
-    distance_lengths : float
-        Sailed by then, ship lengths.
-    final_speed : float
-        Surge speed at the end, m/s.
-    """
-
-    time_s: float
-    distance_lengths: float
-    final_speed: float
+    time_s: float  # until the given part of the change of speed is done, s
+    distance_lengths: float  # sailed by then, ship lengths
+    final_speed: float  # surge speed at the end, m/s
 
 
 def stopping(
@@ -96,10 +74,8 @@ def stopping(
     speed_ratio : float
         Surge speed at which the trial ends, by that at service; 0 for dead in the water, which only a
         shaft astern brings about.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Raises
     ------
@@ -224,10 +200,8 @@ def acceleration(
         Speed and shaft speed at the start, by those at service.
     duration : float, optional
         s; by default 40 times the time to travel one ship length.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
+    dt, water_depth, weather, seed
+        As in `pull_out`.
 
     Raises
     ------
@@ -280,15 +254,14 @@ def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None =
 
 def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
     """Time at which values first reach a threshold, between samples by straight lines, s."""
-    reached = np.flatnonzero(values >= threshold)
-    if len(reached) == 0:
+    time = reached(values, threshold, trial.t)
+    if time is None:
         raise ManoeuvreError(
             f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end, expected it to reach "
             f"{abs(threshold):.3g} m/s; give a larger speed_ratio",
             trial,
         )
-    k = max(int(reached[0]), 1)
-    return float(np.interp(threshold, values[k - 1 : k + 1], trial.t[k - 1 : k + 1]))
+    return time
 
 
 def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:

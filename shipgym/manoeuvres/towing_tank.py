@@ -5,78 +5,43 @@ InputError. The tests are those of the planar motion mechanism (Gertler 1967, Th
 planar-motion-mechanism system; ITTC 7.5-02-06-02).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats, integral
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 __all__ = [
-    "Tank",
-    "inertia",
-    "pure_surge",
-    "pure_sway",
-    "pure_yaw",
-    "rigid_inertia",
-    "static_drift",
+    "Tank", "inertia", "pure_surge", "pure_sway", "pure_yaw", "rigid_inertia", "static_drift",
     "yaw_with_drift",
-]
+]  # fmt: skip
 
 FORCES = ("X", "Y", "N")
 
 
 @dataclass(frozen=True)
 class Tank:
-    """How a captive test is run and measured.
+    """How a captive test is run and measured; InputError for a number out of range."""
 
-    Attributes
-    ----------
-    speed : float or None
-        Of the carriage, m/s; None: the ship's service speed.
-    rudder_deg : float
-        Held, degrees.
-    shaft_speed : float or None
-        Held, 1/s; None: that at service speed. For ships with a shaft.
-    cycles : int
-        Periods of an oscillation that are recorded.
-    samples : int
-        In each period, and at each angle of a static test.
-    noise : float
-        Standard deviation of white noise on each force, in parts of its root mean square over the test.
-    seed : int
-        Of the noise.
-    model_inertia : bool
-        Whether the inertia of the ship herself (mass times acceleration, centripetal terms included) stays in
-        the forces, as the balance of a planar motion mechanism feels it; otherwise they are those of the
-        water alone.
-    water_depth : float
-        m, for ships that know shallow water.
-
-    Raises
-    ------
-    InputError
-        For a number out of range.
-    """
-
-    speed: float | None = None
-    rudder_deg: float = 0.0
-    shaft_speed: float | None = None
-    cycles: int = 3
-    samples: int = 200
+    speed: float | None = None  # of the carriage, m/s; None: the ship's service speed
+    rudder_deg: float = 0.0  # held, degrees
+    shaft_speed: float | None = None  # held, 1/s; None: that at service speed. For ships with a shaft
+    cycles: int = 3  # periods of an oscillation that are recorded
+    samples: int = 200  # in each period, and at each angle of a static test
+    # standard deviation of white noise on each force, in parts of its root mean square over the test
     noise: float = 0.0
-    seed: int = 0
+    seed: int = 0  # of the noise
+    # whether the inertia of the ship herself (mass times acceleration, centripetal terms included) stays in
+    # the forces, as the balance of a planar motion mechanism feels it; otherwise they are those of the water
+    # alone
     model_inertia: bool = True
-    water_depth: float = np.inf
+    water_depth: float = np.inf  # m, for ships that know shallow water
 
     def __post_init__(self) -> None:
         if self.speed is not None:
@@ -106,23 +71,17 @@ class _Motion:
 def static_drift(
     model: ShipModel, drift_deg: Sequence[float], hold_s: float = 1.0, tank: Tank | None = None
 ) -> Trial:
-    """Tow a ship steadily at one drift angle after the other.
+    """Tow a ship steadily at one drift angle after the other: forces X, Y (N) and N (N m).
 
     Parameters
     ----------
     model : ShipModel
-        The ship.
     drift_deg : sequence of float
         Drift angles at midship, degrees, positive with the bow to starboard of the course: v = -U sin(drift).
     hold_s : float
-        Time for which each is recorded, s.
+        Time for which each is recorded, s; `tank.samples` rows an angle.
     tank : Tank, optional
         Speed, rudder, shaft, noise, ...
-
-    Returns
-    -------
-    Trial
-        With the forces X, Y (N) and N (N m); `tank.samples` rows an angle.
 
     Raises
     ------
@@ -152,7 +111,6 @@ def pure_surge(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     amplitude : float
         Of the surge speed, m/s, less than the speed of the carriage.
     period_s : float, optional
@@ -169,17 +127,7 @@ def pure_surge(
 def pure_sway(
     model: ShipModel, amplitude: float, period_s: float | None = None, tank: Tank | None = None
 ) -> Trial:
-    """Oscillate a ship in sway, her heading along the tank.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    amplitude : float
-        Of the sway speed, m/s.
-    period_s, tank
-        As in `pure_surge`.
-    """
+    """Oscillate a ship in sway, her heading along the tank; amplitude in m/s, otherwise as `pure_surge`."""
     tank = tank or Tank()
     check_number(amplitude, "amplitude", above=0.0)
     speed = tank.carriage_speed(model)
@@ -189,17 +137,7 @@ def pure_sway(
 def pure_yaw(
     model: ShipModel, amplitude_deg_s: float, period_s: float | None = None, tank: Tank | None = None
 ) -> Trial:
-    """Oscillate a ship in yaw, always along her path, without sway.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    amplitude_deg_s : float
-        Of the yaw rate, degrees per second.
-    period_s, tank
-        As in `pure_surge`.
-    """
+    """Oscillate a ship in yaw, always along her path, without sway; otherwise as `pure_surge`."""
     return yaw_with_drift(model, amplitude_deg_s, 0.0, period_s, tank)
 
 
@@ -210,19 +148,7 @@ def yaw_with_drift(
     period_s: float | None = None,
     tank: Tank | None = None,
 ) -> Trial:
-    """Oscillate a ship in yaw at a constant drift angle.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The ship.
-    amplitude_deg_s : float
-        Of the yaw rate, degrees per second.
-    drift_deg : float
-        Drift angle at midship, degrees: v = -U sin(drift).
-    period_s, tank
-        As in `pure_surge`.
-    """
+    """Oscillate a ship in yaw at a drift angle at midship, v = -U sin(drift); otherwise as `pure_surge`."""
     tank = tank or Tank()
     rate = float(np.radians(check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0)))
     drift = float(np.radians(check_number(drift_deg, "drift_deg", at_least=-90.0, at_most=90.0)))
@@ -261,7 +187,7 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
             f"tank shaft_speed: {tank.shaft_speed:g} found, but {model.name!r} has no shaft; leave it"
         )
     shaft = model.service_shaft_speed if tank.shaft_speed is None else tank.shaft_speed
-    psi = _integral(motion.t, motion.velocity[:, 2])
+    psi = integral(motion.t, motion.velocity[:, 2])
     columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
     columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
     none = np.zeros(len(psi))
@@ -277,8 +203,8 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     if not tank.model_inertia:
         forces += _ship_s_own(model, motion)
     channels = {
-        "x": _integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
-        "y": _integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
+        "x": integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
+        "y": integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
         **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
         **({"n": columns["n"]} if "n" in model.command_names else {}),
         **dict(zip(FORCES, _noisy(forces, tank).T, strict=True)),
@@ -303,8 +229,3 @@ def _noisy(forces: Floats, tank: Tank) -> Floats:
     size = tank.noise * np.sqrt((forces**2).mean(axis=0))
     noisy: Floats = forces + size * np.random.default_rng(tank.seed).standard_normal(forces.shape)
     return noisy
-
-
-def _integral(t: Floats, rate: Floats) -> Floats:
-    """Integral over time from zero by the trapezoid rule, shape (n_samples,)."""
-    return np.concatenate([[0.0], np.cumsum(0.5 * (rate[1:] + rate[:-1]) * np.diff(t))])

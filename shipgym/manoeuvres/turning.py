@@ -1,7 +1,5 @@
 """The turning circle and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 
@@ -10,15 +8,13 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, number_of_steps, require, ship_length
+from shipgym.manoeuvres.execution import execute_time, number_of_steps, reached, require, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
 CAPTION = "Path from above, from the position and along the heading at which the rudder was ordered."
@@ -29,26 +25,17 @@ class TurningIndices:
     """Indices of a turning circle; None where the ship did not turn so far.
 
     Lengths are measured from the position and along the heading at which the rudder was ordered.
-
-    Attributes
-    ----------
-    advance_lengths, transfer_lengths : float or None
-        Distance ahead and to the side when the heading has changed by 90 degrees, ship lengths.
-    tactical_diameter_lengths : float or None
-        Distance to the side when the heading has changed by 180 degrees, ship lengths.
-    steady_diameter_lengths : float or None
-        Diameter of the steady turn, 2 U / r over the last quarter turn before the end, ship lengths.
-    steady_speed_ratio : float or None
-        Speed in the steady turn over that at the order.
-    steady_drift_deg : float or None
-        Drift angle at midship in the steady turn, degrees, positive when the bow points into the turn.
     """
 
+    # distance ahead and to the side when the heading has changed by 90 degrees, ship lengths
     advance_lengths: float | None
     transfer_lengths: float | None
+    # distance to the side when the heading has changed by 180 degrees, ship lengths
     tactical_diameter_lengths: float | None
+    # diameter of the steady turn, 2 U / r over the last quarter turn before the end, ship lengths
     steady_diameter_lengths: float | None
-    steady_speed_ratio: float | None
+    steady_speed_ratio: float | None  # speed in the steady turn over that at the order
+    # drift angle at midship in the steady turn, degrees, positive when the bow points into the turn
     steady_drift_deg: float | None
 
 
@@ -66,7 +53,6 @@ def turning_circle(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     rudder_deg : float
         Rudder ordered at the start, degrees; negative turns to port.
     duration, dt : float
@@ -121,22 +107,13 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
         _steady(trial, after, steady, side, lpp) if turned[-1] > 1.5 * np.pi else (None,) * 3
     )
     return TurningIndices(
-        advance_lengths=_when_turned(turned, np.pi / 2, ahead),
-        transfer_lengths=_when_turned(turned, np.pi / 2, aside),
-        tactical_diameter_lengths=_when_turned(turned, np.pi, aside),
+        advance_lengths=reached(turned, np.pi / 2, ahead),
+        transfer_lengths=reached(turned, np.pi / 2, aside),
+        tactical_diameter_lengths=reached(turned, np.pi, aside),
         steady_diameter_lengths=diameter,
         steady_speed_ratio=ratio,
         steady_drift_deg=drift,
     )
-
-
-def _when_turned(turned: Floats, angle: float, distance: Floats) -> float | None:
-    """Distance at which the heading has changed by an angle, between samples by straight lines."""
-    past = np.flatnonzero(turned >= angle)
-    if len(past) == 0:
-        return None
-    k = max(int(past[0]), 1)
-    return float(np.interp(angle, turned[k - 1 : k + 1], distance[k - 1 : k + 1]))
 
 
 def _steady(

@@ -1,18 +1,16 @@
 """The zigzag manoeuvre (Kempf 1932) and its indices (IMO MSC/Circ.1053, ITTC 7.5-04-02-01)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reversals, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage, Seed
@@ -20,30 +18,20 @@ from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import as_trial, unstable
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 STANDARD_DEG = (10.0, 20.0)
 CAPTION = "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed."
 
 
 @dataclass(frozen=True)
 class ZigzagIndices:
-    """Indices of a zigzag; None where the manoeuvre ended before.
+    """Indices of a zigzag; None where the manoeuvre ended before."""
 
-    Attributes
-    ----------
-    overshoot_1_deg, overshoot_2_deg : float or None
-        Heading beyond that at which the rudder was reversed for the first and the second time, degrees.
-    initial_turning_lengths : float or None
-        Distance sailed from the first order to the first reversal, ship lengths.
-    period_s : float or None
-        Time from the first to the third reversal, s.
-    """
-
+    # heading beyond that at which the rudder was reversed for the first and the second time, degrees
     overshoot_1_deg: float | None
     overshoot_2_deg: float | None
+    # distance sailed from the first order to the first reversal, ship lengths
     initial_turning_lengths: float | None
-    period_s: float | None
+    period_s: float | None  # time from the first to the third reversal, s
 
 
 def zigzag(
@@ -66,7 +54,6 @@ def zigzag(
     Parameters
     ----------
     model : ShipModel
-        The ship.
     rudder_deg, heading_deg : float
         Rudder angle ordered and heading change at which it is reversed, degrees.
     port_first : bool
@@ -183,11 +170,9 @@ def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, le
     """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
     after = trial.t >= start
     times, change = trial.t[after], np.abs(_heading_change(trial, start, trial.t[after]))
-    past = np.flatnonzero(change >= np.radians(threshold_deg or np.inf))
-    if len(past) == 0:
+    when = reached(change, float(np.radians(threshold_deg or np.inf)), times)
+    if when is None:
         return None
-    step = slice(max(int(past[0]), 1) - 1, max(int(past[0]), 1) + 1)
-    when = np.interp(np.radians(threshold_deg or np.inf), change[step], times[step])
     sailed = np.interp([start, when], trial.t, distance_sailed(trial))
     return float(sailed[1] - sailed[0]) / length
 

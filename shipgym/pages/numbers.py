@@ -1,7 +1,5 @@
 """Numbers as a page shows them: a true minus, no needless digits, a dash where there is none."""
 
-from __future__ import annotations
-
 import numpy as np
 
 NONE = "\N{EN DASH}"

@@ -21,17 +21,8 @@ if TYPE_CHECKING:
 def render(template: str, **data: Any) -> str:
     """A page, as text; the same data gives the same text.
 
-    Parameters
-    ----------
-    template : str
-        The package it lies in and its file, such as "identification.report/report.html".
-    **data : Any
-        Its variables. One that is missing is an error.
-
-    Raises
-    ------
-    InputError
-        If the page has figures and plotly is not installed.
+    The template is the package it lies in and its file, such as "identification.report/report.html". A
+    variable of it that `data` lacks is an error; InputError if it has figures and plotly is not installed.
     """
     return environment().get_template(template).render(contents=[], **data)
 
@@ -64,13 +55,7 @@ def _source(name: str) -> tuple[str, str, None]:
 
 
 def plotly_script() -> Markup:
-    """The source of plotly.js, to stand once in a page.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
+    """The source of plotly.js, to stand once in a page; InputError if plotly is not installed."""
     try:
         from plotly.offline import get_plotlyjs
     except ModuleNotFoundError as error:

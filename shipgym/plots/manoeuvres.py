@@ -38,21 +38,7 @@ EXCITATION = ("delta_command", "delta", "n_command", "n", "psi", "r", "speed", "
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     """A zigzag as the field draws it: heading change and rudder over time, with the switch headings.
 
-    Parameters
-    ----------
-    trial : Trial
-        With psi and delta.
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
+    Of a trial with psi and delta; height in pixels.
     """
     figure = graph_objects().Figure()
     heading = np.degrees(trial["psi"] - trial["psi"][0])
@@ -77,24 +63,9 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
 def turning_figure(trial: Trial, length: float | None = None, height: int = 480) -> Figure:
     """A turning circle seen from above, with advance, transfer and tactical diameter marked.
 
-    Parameters
-    ----------
-    trial : Trial
-        With x, y, psi, u, v, r and delta (or delta_command).
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-        In ship lengths, from the position and along the heading at which the rudder was ordered.
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing, or plotly is not installed.
+    In ship lengths, from the position and along the heading at which the rudder was ordered. The trial has x,
+    y, psi, u, v, r and delta (or delta_command); `length` is that between perpendiculars, m, by default the
+    trial's own. Raises InputError if a channel or the length is missing.
     """
     indices, lpp = turning_indices(trial, length), ship_length(trial, length)
     start = execute_time(trial)
@@ -132,24 +103,7 @@ def _dimension(figure: Figure, x: list[float], y: list[float], name: str, colour
 
 
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
-    """Yaw rate over rudder angle of a spiral, with the width of its loop.
-
-    Parameters
-    ----------
-    spiral : Spiral
-        Direct (Dieudonne), there and back in two lines, or reverse (Bech).
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
+    """Yaw rate over rudder angle of a spiral, with the width of its loop; a direct one in two lines."""
     figure = graph_objects().Figure()
     angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
     points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
@@ -179,21 +133,7 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
 
-    Parameters
-    ----------
-    trials : dict of str to Trial
-        By the label of their line; usually one from each side.
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If there is no pull-out in a trial, or plotly is not installed.
+    The trials, usually one from each side, by the label of their line. InputError if one has no pull-out.
     """
     figure = graph_objects().Figure()
     for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
@@ -212,23 +152,7 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
 def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -> Figure:
     """A stop or an acceleration: surge speed and shaft over time, and speed over the distance sailed.
 
-    Parameters
-    ----------
-    trial : Trial
-        With u and v; n where the ship has a shaft.
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing, or plotly is not installed.
+    The trial has u and v, and n where the ship has a shaft; `length` as in `turning_figure`.
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
@@ -250,22 +174,7 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
 
 
 def excitation_figure(trial: Trial) -> Figure:
-    """A manoeuvre for identification: rudder and shaft orders above what the ship made of them.
-
-    Parameters
-    ----------
-    trial : Trial
-        Such as of `prbs_rudder`, `multi_sine_rudder` or `shaft_speed_steps`.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
+    """A manoeuvre for identification, such as of `prbs_rudder`: orders above what the ship made of them."""
     figure = history_figure({"simulated": trial}, _excited(trial))
     figure.update_layout(showlegend=False)
     return figure
@@ -283,22 +192,9 @@ def _excited(trial: Trial) -> list[str]:
 
 
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
-    """The figure that suits a manoeuvre, by its kind.
+    """The figure that suits a measured or simulated manoeuvre by its kind; else time histories.
 
-    Parameters
-    ----------
-    sailed : Trial or Spiral
-        Measured or simulated.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-        Time histories where the kind has no figure of its own.
-
-    Raises
-    ------
-    InputError
-        If a channel or the ship's length is missing, or plotly is not installed.
+    Raises InputError if a channel or the ship's length is missing.
     """
     if isinstance(sailed, Spiral):
         return spiral_figure(sailed)

@@ -21,13 +21,7 @@ FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-seri
 
 
 def graph_objects() -> Any:
-    """The module `plotly.graph_objects`.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
+    """The module `plotly.graph_objects`; InputError if plotly is not installed."""
     return _plotly("graph_objects")
 
 
@@ -41,13 +35,7 @@ def _plotly(module: str) -> Any:
 
 
 def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: Any) -> Figure:
-    """A figure of panels, rows by columns, with a title above each where given.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed.
-    """
+    """A figure of panels, rows by columns, with a title above each where given."""
     figure = _plotly("subplots").make_subplots(
         rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
     )
@@ -58,16 +46,8 @@ def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: An
 def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:
     """The layout that all figures share: white, a light grid, the legend above.
 
-    Parameters
-    ----------
-    height : int
-        In pixels; the width is that of the page.
-    titled : bool
-        Whether panels have titles, which need room below the legend.
-    left : int
-        Margin for the labels of the vertical axis, pixels.
-    **changes : Any
-        Entries of a plotly layout that replace these.
+    Height and left margin in pixels (the width is that of the page); `titled` makes room for titles of panels
+    below the legend; `changes` are entries of a plotly layout that replace these.
     """
     shared = {
         "height": height,
@@ -90,16 +70,9 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
-        "gridcolor": GRID,
-        "zeroline": zero,
-        "zerolinecolor": GRID,
-        "linecolor": "#c5ccd6",
-        "showline": True,
-        "ticks": "outside",
-        "ticklen": 4,
-        "tickcolor": "#c5ccd6",
-        "tickfont": {"size": 11, "color": MUTED},
-    }
+        "gridcolor": GRID, "zeroline": zero, "zerolinecolor": GRID, "linecolor": "#c5ccd6", "showline": True,
+        "ticks": "outside", "ticklen": 4, "tickcolor": "#c5ccd6", "tickfont": {"size": 11, "color": MUTED},
+    }  # fmt: skip
     return shared | changes
 
 

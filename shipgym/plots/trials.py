@@ -17,21 +17,13 @@ if TYPE_CHECKING:
 
 #: Axis title and factor from SI of each channel and of what u and v give; m/s and degrees.
 AXES: dict[str, tuple[str, float]] = {
-    "x": ("north, m", 1.0),
-    "y": ("east, m", 1.0),
-    "psi": ("heading, deg", 180.0 / np.pi),
-    "u": ("surge, m/s", 1.0),
-    "v": ("sway, m/s", 1.0),
-    "r": ("yaw rate, deg/s", 180.0 / np.pi),
-    "p": ("roll rate, deg/s", 180.0 / np.pi),
-    "phi": ("heel, deg", 180.0 / np.pi),
-    "delta": ("rudder, deg", 180.0 / np.pi),
-    "delta_command": ("rudder order, deg", 180.0 / np.pi),
-    "n": ("shaft, rev/s", 1.0),
-    "n_command": ("shaft order, rev/s", 1.0),
-    "speed": ("speed, m/s", 1.0),
+    "x": ("north, m", 1.0), "y": ("east, m", 1.0), "psi": ("heading, deg", 180.0 / np.pi),
+    "u": ("surge, m/s", 1.0), "v": ("sway, m/s", 1.0), "r": ("yaw rate, deg/s", 180.0 / np.pi),
+    "p": ("roll rate, deg/s", 180.0 / np.pi), "phi": ("heel, deg", 180.0 / np.pi),
+    "delta": ("rudder, deg", 180.0 / np.pi), "delta_command": ("rudder order, deg", 180.0 / np.pi),
+    "n": ("shaft, rev/s", 1.0), "n_command": ("shaft order, rev/s", 1.0), "speed": ("speed, m/s", 1.0),
     "drift": ("drift angle, deg", 180.0 / np.pi),
-}
+}  # fmt: skip
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels
 MOST_SAMPLES = 3000  # drawn of one line; spirals have many more
@@ -58,23 +50,10 @@ def thinned(trial: Trial) -> slice:
 def history_figure(
     trials: Mapping[str, Trial], channels: Sequence[str] = ("psi", "r", "u", "v", "delta")
 ) -> Figure:
-    """Time histories, one panel for each channel, one line for each trial.
+    """Time histories: a panel for each channel, "speed" or "drift", a line for each trial by its label.
 
-    Parameters
-    ----------
-    trials : mapping of str to Trial
-        By the label of their line; one that is called "measured" is drawn dark.
-    channels : sequence of str
-        Channels from the top, or "speed" and "drift"; those that no trial has are left out.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If there is no trial, none has any of the channels, or plotly is not installed.
+    The trial called "measured" is drawn dark; channels that no trial has are left out. Raises InputError if
+    none is left.
     """
     shown = [name for name in channels if any(quantity(trial, name) is not None for trial in trials.values())]
     if not shown:
@@ -99,23 +78,9 @@ def history_figure(
 
 
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
-    """Paths seen from above, north up, both axes to one scale.
+    """Paths seen from above, north up, both axes to one scale, by the label of their line.
 
-    Parameters
-    ----------
-    trials : mapping of str to Trial
-        By the label of their line, each with x and y; others are left out.
-    height : int
-        In pixels.
-
-    Returns
-    -------
-    plotly.graph_objects.Figure
-
-    Raises
-    ------
-    InputError
-        If no trial has a position, or plotly is not installed.
+    Trials without x and y are left out; InputError if no trial has a position. Height in pixels.
     """
     located = {name: trial for name, trial in trials.items() if {"x", "y"} <= set(trial.channels)}
     if not located:

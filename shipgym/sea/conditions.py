@@ -168,29 +168,17 @@ class Waves:
 
 @dataclass(frozen=True)
 class SeaState:
-    """One row of the table of sea states.
+    """One row of the table of sea states."""
 
-    Attributes
-    ----------
-    name : str
-        In the words of WMO code table 3700.
-    code : int
-        Its number there.
-    lowest, highest : float
-        Range of the significant height in that code, m.
-    significant_height, peak_period : float
-        Hs, m, and Tp, s, taken.
-    wind_speed : float
-        10 m above the sea, m/s.
-    """
-
-    name: str
-    code: int
+    name: str  # in the words of WMO code table 3700
+    code: int  # its number there
+    # range of the significant height in that code, m
     lowest: float
     highest: float
+    # Hs, m, and Tp, s, taken
     significant_height: float
     peak_period: float
-    wind_speed: float
+    wind_speed: float  # 10 m above the sea, m/s
 
 
 def _wind_at_10_m(knots: float) -> float:
@@ -308,19 +296,10 @@ class Weather:
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "weather") -> Weather:
-        """Read what :meth:`to_dict` wrote.
+        """Read what :meth:`to_dict` wrote; absent parts are off.
 
-        Parameters
-        ----------
-        mapping : mapping of str to Any
-            Parts by name; those that are absent are off.
-        where : str
-            Start of messages.
-
-        Raises
-        ------
-        InputError
-            For an unknown key, a missing value or one that no weather has.
+        Raises InputError, beginning with `where`, for an unknown key, a missing value or one that no weather
+        has.
         """
         table = check_table(mapping, where)
         check_keys(table, ("name", *_PARTS), where)

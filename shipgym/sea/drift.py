@@ -1,20 +1,17 @@
 """Mean second-order wave forces on a ship, over the direction of the waves."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, waterplane_coefficient, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, mirrored, sine_series
-from shipgym.sea.waves import draught_attenuation, frequencies, slow_drift, spread, wave_spectrum
+from shipgym.sea.waves import draught_attenuation, frequencies, over_directions, slow_drift, wave_spectrum
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 _PITCH_GYRADIUS = 0.25  # by length
 _WATERLINE_POINTS = 401
@@ -28,28 +25,19 @@ class WaveDrift:
 
     The force at any time is the mean one times (1 + s), s a Gauss-Markov process with the time constant and
     standard deviation given here.
-
-    Attributes
-    ----------
-    chi : array of shape (points,)
-        Where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to below 2 pi, rad.
-    X, Y : array of shape (points,)
-        Mean surge and sway force, N. Waves from starboard push to port: Y < 0.
-    N : array of shape (points,)
-        Mean yaw moment about midship, positive to starboard, N m.
-    time_constant, standard_deviation : float
-        Of the slow variation, s and without unit.
-    estimated : tuple of str
-        Names of the particulars that were estimated for it.
     """
 
+    # shape (points,); where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to
+    # below 2 pi, rad
     chi: Floats
+    # shape (points,); mean surge and sway force, N. Waves from starboard push to port: Y < 0
     X: Floats
     Y: Floats
-    N: Floats
+    N: Floats  # shape (points,); mean yaw moment about midship, positive to starboard, N m
+    # of the slow variation, s and without unit
     time_constant: float
     standard_deviation: float
-    estimated: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()  # names of the particulars that were estimated for it
 
     def harmonics(self, n: int = 8) -> Harmonics:
         """Fourier series up to the n-th harmonic, for kernels; there is no heeling moment (K is 0)."""
@@ -61,25 +49,10 @@ class WaveDrift:
 def wave_drift(waves: Waves, particulars: Particulars, speed: float | None = None) -> WaveDrift:
     """Mean second-order forces in an irregular sea from all directions: 2 integral S(w) F(w) / a^2 dw.
 
-    Surge by :func:`added_resistance`, sway and yaw by :func:`reflection_coefficients`.
-
-    Parameters
-    ----------
-    waves : Waves
-        Its direction does not matter here.
-    particulars : Particulars
-        Estimated where absent (:func:`shipgym.sea.estimates.weather_particulars`).
-    speed : float, optional
-        Of the ship, m/s; by default the service speed, or 0 where that is not known.
-
-    Returns
-    -------
-    WaveDrift
-
-    Raises
-    ------
-    InputError
-        For particulars too few.
+    Surge by :func:`added_resistance`, sway and yaw by :func:`reflection_coefficients`; the direction of the
+    waves does not matter here. Particulars are estimated where absent
+    (:func:`shipgym.sea.estimates.weather_particulars`), InputError if they are too few; speed in m/s, by
+    default that of service, or 0 where that is not known.
     """
     ship = weather_particulars(particulars)
     U = (ship.speed or 0.0) if speed is None else speed
@@ -98,23 +71,18 @@ def wave_drift(waves: Waves, particulars: Particulars, speed: float | None = Non
     used = {"block_coefficient", "water_density"}
     return WaveDrift(
         chi,
-        spread(mirrored(X), waves),
-        spread(mirrored(Y, -1.0), waves),
-        spread(mirrored(N, -1.0), waves),
+        over_directions(mirrored(X), waves),
+        over_directions(mirrored(Y, -1.0), waves),
+        over_directions(mirrored(N, -1.0), waves),
         *slow,
         tuple(sorted(ship.estimated & used)),
     )
 
 
 class Waterline(NamedTuple):
-    """Half of a waterline of the form y = (B / 2) (1 - |2 x / L|^p), from bow to stern.
+    """Half of a waterline of the form y = (B / 2) (1 - |2 x / L|^p), from bow to stern."""
 
-    Attributes
-    ----------
-    x, y : array of shape (points,)
-        m, forward of midship and outward.
-    """
-
+    # shape (points,); m, forward of midship and outward
     x: Floats
     y: Floats
 
@@ -145,19 +113,8 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
 
     Faltinsen 1990, Sea Loads, equation 5.27 (Faltinsen et al. 1980): each part of the waterline that the
     waves can see takes up rho g a^2 / 2 times the square of the sine of the angle at which they meet it,
-    along its inward normal.
-
-    Parameters
-    ----------
-    chi : array_like
-        Where the waves come from, seen from the bow, rad.
-    ship : Particulars
-        Length, beam and block coefficient.
-
-    Returns
-    -------
-    tuple of two arrays
-        Y by rho g a^2 L / 2 and N about midship by rho g a^2 L^2 / 2.
+    along its inward normal. `chi`, rad, is where they come from, seen from the bow. Returns Y by rho g a^2 L
+    / 2 and N about midship by rho g a^2 L^2 / 2.
     """
     line = waterline(ship)
     middle = (0.5 * (line.x[1:] + line.x[:-1]), 0.5 * (line.y[1:] + line.y[:-1]))
@@ -176,29 +133,14 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
 
 
 def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed: float) -> Floats:
-    """Mean resistance in regular waves by squared amplitude, from all directions.
+    """Mean resistance in regular waves by squared amplitude, from all directions, N/m2; negative: a push.
 
-    The sum of what the ship's motions radiate and what its ends reflect: the SNNM formula of ITTC
-    Recommended Procedure 7.5-04-01-01.1 (2021), appendix G; Liu & Papanikolaou 2020, Regression analysis of
-    experimental data for added resistance in waves of arbitrary heading, Ocean Engineering 206. On even
-    keel, with the angle of :func:`end_angle`. It stands for ships of 75 to 400 m with L/B 4 to 9, B/T 2 to 9,
-    CB 0.5 to 0.9 and Froude numbers up to 0.3; B/T counts as at least 2, the Froude number as at most 0.4.
-
-    Parameters
-    ----------
-    omega : array_like
-        Of the waves, rad/s.
-    chi : array_like
-        Where they come from, seen from the bow, 0 to pi, rad.
-    ship : Particulars
-        Length, beam, draught, block coefficient and water density.
-    speed : float
-        Of the ship, m/s.
-
-    Returns
-    -------
-    array
-        N/m2; negative where waves from astern push.
+    The sum of what the ship's motions radiate and what its ends reflect: the SNNM formula of ITTC Recommended
+    Procedure 7.5-04-01-01.1 (2021), appendix G; Liu & Papanikolaou 2020, Regression analysis of experimental
+    data for added resistance in waves of arbitrary heading, Ocean Engineering 206. On even keel, with the
+    angle of :func:`end_angle`. It stands for ships of 75 to 400 m with L/B 4 to 9, B/T 2 to 9, CB 0.5 to 0.9
+    and Froude numbers up to 0.3; B/T counts as at least 2, the Froude number as at most 0.4. `omega`, rad/s,
+    is of the waves; `chi`, 0 to pi, where they come from, seen from the bow; `speed`, m/s, the ship's.
     """
     speed = min(speed, _FASTEST * float(np.sqrt(GRAVITY * ship.length)))
     omega, chi = np.broadcast_arrays(np.asarray(omega, dtype=float), np.asarray(chi, dtype=float))

@@ -1,7 +1,5 @@
 """What wind and waves need of a ship's particulars, estimated where it is not given."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,15 +29,8 @@ def weather_particulars(particulars: Particulars) -> Particulars:
     * roll period by the formula of the Code on Intact Stability 2008, part A, 2.3.4:
       2 C B / sqrt(GM) with C = 0.373 + 0.023 B/T - 0.043 L/100, at least 0.3.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        With at least length, beam, draught and mass or block coefficient.
-
-    Raises
-    ------
-    InputError
-        "weather without the particulars it needs", naming them.
+    Raises InputError, "weather without the particulars it needs", without length, beam, draught and mass or
+    block coefficient.
     """
     missing = [name for name in ("beam", "draught") if particulars[name] is None]
     if particulars.mass is None and particulars.block_coefficient is None:

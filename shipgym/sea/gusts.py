@@ -1,16 +1,13 @@
 """Gust spectra of the wind over the sea, and the first-order filter that stands for them."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Wind
-
-Floats = NDArray[np.float64]
 
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
@@ -24,17 +21,10 @@ class GaussMarkov(NamedTuple):
 
     Its autocorrelation is standard_deviation^2 exp(-|lag| / time_constant), its one-sided spectrum
     4 s^2 T / (1 + (2 pi f T)^2) per Hz.
-
-    Attributes
-    ----------
-    time_constant : float
-        s.
-    standard_deviation : float
-        In the units of the process.
     """
 
-    time_constant: float
-    standard_deviation: float
+    time_constant: float  # s
+    standard_deviation: float  # in the units of the process
 
     def spectrum(self, frequency: ArrayLike) -> Floats:
         """One-sided spectral density at frequencies in Hz."""
@@ -45,27 +35,12 @@ class GaussMarkov(NamedTuple):
 
 
 def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") -> Floats:
-    """One-sided spectral density of the wind speed about its mean, 10 m above the sea.
+    """One-sided spectral density of the wind speed about its mean, 10 m above the sea, (m/s)^2 / Hz.
 
-    Parameters
-    ----------
-    frequency : array_like
-        Hz, above 0.
-    speed : float
-        Mean, m/s.
-    spectrum : {"harris", "davenport", "norsok"}
-        Which.
-
-    Returns
-    -------
-    array
-        (m/s)^2 / Hz.
-
-    Notes
-    -----
-    With x = f L / V and the surface drag coefficient k: Harris 1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6),
-    L = 1800 m; Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L = 1200 m; NORSOK N-003 (2007), Froya
-    spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f (V/10)^(-3/4), n = 0.468.
+    Frequency in Hz, above 0, mean speed in m/s. With x = f L / V and the surface drag coefficient k: Harris
+    1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6), L = 1800 m; Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L =
+    1200 m; NORSOK N-003 (2007), Froya spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f
+    (V/10)^(-3/4), n = 0.468.
     """
     f = np.asarray(frequency, dtype=float)
     if spectrum == "norsok":
@@ -98,20 +73,12 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:
-    """First-order process with the variance of the gusts and the same most energetic frequency.
+    """First-order process with the variance of the gusts (m/s)^2 and the same most energetic frequency.
 
     f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3) V / 1800 m,
     Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V; NORSOK's is found by search. How
-    far the filter's spectrum is from the full one is stated in `docs/weather.md`.
-
-    Parameters
-    ----------
-    wind : Wind
-
-    Returns
-    -------
-    GaussMarkov
-        Of the speed along the mean wind, m/s; without gusts of standard deviation 0.
+    far the filter's spectrum is from the full one is stated in `docs/weather.md`. Without gusts the standard
+    deviation is 0.
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)

@@ -1,30 +1,21 @@
 """Curves over an angle as short Fourier series, which kernels evaluate without the angle itself."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 #: Points of the grid over the full circle on which curves are tabulated.
 POINTS = 360
 
 
 class Harmonics(NamedTuple):
-    """Fourier coefficients of the forces on a ship with port-starboard symmetry.
+    """Fourier coefficients of the forces on a ship with port-starboard symmetry."""
 
-    Attributes
-    ----------
-    X : array of shape (n + 1,)
-        Cosine series, the mean first: X = sum over k of X[k] cos(k angle).
-    Y, N, K : array of shape (n,)
-        Sine series: Y = sum over k of Y[k - 1] sin(k angle), k from 1.
-    """
-
-    X: Floats
+    X: Floats  # shape (n + 1,); cosine series, the mean first: X = sum over k of X[k] cos(k angle)
+    # shape (n,); sine series: Y = sum over k of Y[k - 1] sin(k angle), k from 1
     Y: Floats
     N: Floats
     K: Floats
@@ -42,20 +33,7 @@ def mirrored(half: ArrayLike, sign: float = 1.0) -> Floats:
 
 
 def cosine_series(curve: Floats, n: int) -> Floats:
-    """Coefficients of the cosine series of an even curve.
-
-    Parameters
-    ----------
-    curve : array of shape (points,)
-        Over :func:`circle`.
-    n : int
-        Highest harmonic.
-
-    Returns
-    -------
-    array of shape (n + 1,)
-        The mean, then those of cos(angle), cos(2 angle), ...
-    """
+    """Coefficients of the cosine series of an even curve over :func:`circle`: the mean, then n harmonics."""
     series: Floats = np.fft.rfft(curve).real[: n + 1] * 2.0 / len(curve)
     series[0] *= 0.5
     return series
@@ -65,17 +43,3 @@ def sine_series(curve: Floats, n: int) -> Floats:
     """Coefficients of sin(angle), sin(2 angle), ... of an odd curve, shape (n,)."""
     series: Floats = -np.fft.rfft(curve).imag[1 : n + 1] * 2.0 / len(curve)
     return series
-
-
-def evaluate_cosines(series: Floats, angle: ArrayLike) -> Floats:
-    """Sum of a cosine series, the mean first, at the angles."""
-    orders = np.arange(len(series))
-    values: Floats = np.cos(np.multiply.outer(np.asarray(angle, dtype=float), orders)) @ series
-    return values
-
-
-def evaluate_sines(series: Floats, angle: ArrayLike) -> Floats:
-    """Sum of a sine series, that of sin(angle) first, at the angles."""
-    orders = np.arange(1, len(series) + 1)
-    values: Floats = np.sin(np.multiply.outer(np.asarray(angle, dtype=float), orders)) @ series
-    return values

@@ -1,73 +1,26 @@
 """Inverse inertia: how the forces of wind and waves become accelerations of a model."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.ships.inertia import inertia
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.term_table import Structure
 
-Floats = NDArray[np.float64]
-
-#: Rows of :func:`mobility`: acceleration by force, surge u, sway v, yaw r and roll p.
-MOBILITY_ROWS = ("uX", "vY", "vN", "rY", "rN", "pK", "vK", "pY", "pN", "rK")
-
 _AXES = "uvrp"
-_FORCES = "XYNK"
-
-
-def mobility(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Accelerations by unit force and moment, those that are not always 0.
-
-    Parameters
-    ----------
-    model : ManoeuvringModel
-    water_depth : float
-        m; the tanker's added mass grows in shallow water.
-
-    Returns
-    -------
-    array of shape (10,)
-        In the order of :data:`MOBILITY_ROWS`: first surge, the sway-yaw block and roll, then what couples
-        roll to sway and yaw, which only the container ship has. SI units.
-
-    Raises
-    ------
-    InputError
-        "weather without the particulars it needs", naming what mass and added mass lack.
-    """
-    matrix = mobility_matrix(model, water_depth)
-    return np.array([matrix[_AXES.index(row[0]), _FORCES.index(row[1])] for row in MOBILITY_ROWS])
 
 
 def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Inverse of mass and added mass of surge, sway, yaw and roll.
+    """Inverse of mass and added mass, from X, Y, N, K to accelerations, SI units, shape (4, 4).
 
-    An identified model divides by the inertia of its particulars, given or estimated, a reference ship by
-    that of its own equations. A structure without an equation of surge keeps its speed, one without sway or
-    yaw does not drift or turn: their rows and columns are 0. So is roll where the model has none; a
-    structure with an equation of roll, or a ship of the user's that rolls, has that inertia which the roll
-    period and the metacentric height tell.
-
-    Parameters
-    ----------
-    model : ManoeuvringModel
-    water_depth : float
-        m.
-
-    Returns
-    -------
-    array of shape (4, 4)
-        From (X, Y, N, K) in N and N m to the accelerations in surge, sway, m/s2, yaw and roll, rad/s2.
-
-    Raises
-    ------
-    InputError
-        As in :func:`mobility`.
+    The accelerations are those in surge, sway, yaw and roll. An identified model divides by the inertia of
+    its particulars, given or estimated, a reference ship by that of its own equations (the tanker's depends
+    on the depth, m). A structure without an equation of surge keeps its speed, one without sway or yaw does
+    not drift or turn: their rows and columns are 0. So is roll where the model has none; a structure with an
+    equation of roll, or a ship of the user's that rolls, has that inertia which the roll period and the
+    metacentric height tell. Raises InputError that names what mass and added mass lack.
     """
     mass = np.zeros((4, 4))
     mass[:3] = _inertia(model, water_depth)

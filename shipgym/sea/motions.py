@@ -1,45 +1,29 @@
 """First-order heading and roll in waves: closed-form transfer functions, integrated over the spectrum."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_series, mirrored
-from shipgym.sea.waves import encounter_frequency, frequencies, spread, wave_spectrum
+from shipgym.sea.waves import encounter_frequency, frequencies, over_directions, wave_spectrum
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 #: Relative damping of roll of a ship under way, with bilge keels (0.05 to 0.15 in the literature).
 ROLL_DAMPING = 0.1
 
 
 def heading_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars) -> Floats:
-    """Amplitude of wave-induced heading by wave amplitude.
+    """Amplitude of wave-induced heading by wave amplitude, rad/m.
 
-    The hull follows the sideways motion of the water at half its draught, averaged over its length with
-    the lever as weight: |sin chi| exp(-k T / 2) (6 / L) |j1(q)| with q = k L cos(chi) / 2 and the spherical
-    Bessel function j1. In long waves this is k |sin chi cos chi|. It is the motion at wave frequency, for
-    which the ship's speed does not matter; the slow yaw of a ship that runs before the sea is not in it.
-
-    Parameters
-    ----------
-    omega : array_like
-        Of the waves, rad/s.
-    chi : array_like
-        Where the waves come from, seen from the bow, rad.
-    particulars : Particulars
-        Length and draught.
-
-    Returns
-    -------
-    array
-        rad/m, of the shape to which omega and chi broadcast.
+    The hull follows the sideways motion of the water at half its draught, averaged over its length with the
+    lever as weight: |sin chi| exp(-k T / 2) (6 / L) |j1(q)| with q = k L cos(chi) / 2 and the spherical
+    Bessel function j1. In long waves this is k |sin chi cos chi|. It is the motion at wave frequency
+    (`omega`, rad/s), for which the ship's speed does not matter; the slow yaw of a ship that runs before the
+    sea is not in it. `chi` is where the waves come from, seen from the bow, rad.
     """
     L, T = particulars.length, particulars.require("draught")
     k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
@@ -49,26 +33,12 @@ def heading_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars)
 
 
 def roll_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars, speed: float) -> Floats:
-    """Amplitude of roll by wave amplitude.
+    """Amplitude of roll by wave amplitude, rad/m; arguments as in :func:`heading_response`, speed in m/s.
 
     A linear oscillator driven by the effective wave slope: k |sin chi| exp(-k T / 2), averaged over length
     and beam, times the amplification 1 / sqrt((1 - a^2)^2 + (2 z a)^2), a = encounter by natural
     frequency (Conolly 1969, Rolling and its stabilisation by active fins, Transactions of RINA 111;
     Lloyd 1989, Seakeeping). In long waves it is the wave slope across the ship.
-
-    Parameters
-    ----------
-    omega, chi : array_like
-        As in :func:`heading_response`.
-    particulars : Particulars
-        Length, beam, draught and roll period.
-    speed : float
-        At which the waves are met, m/s.
-
-    Returns
-    -------
-    array
-        rad/m.
     """
     L, B, T = particulars.length, particulars.require("beam"), particulars.require("draught")
     k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
@@ -90,22 +60,15 @@ def _j1(q: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class WaveMotion:
-    """Variance of wave-induced heading and roll over the direction of the waves.
+    """Variance of wave-induced heading and roll over the direction of the waves."""
 
-    Attributes
-    ----------
-    chi : array of shape (points,)
-        Where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to below 2 pi, rad.
-    heading_variance, roll_variance : array of shape (points,)
-        rad2.
-    estimated : tuple of str
-        Names of the particulars that were estimated for it.
-    """
-
+    # shape (points,); where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to
+    # below 2 pi, rad
     chi: Floats
+    # shape (points,); rad2
     heading_variance: Floats
     roll_variance: Floats
-    estimated: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()  # names of the particulars that were estimated for it
 
     def heading_variance_harmonics(self, n: int = 8) -> Floats:
         """Cosine series of the heading's variance, mean first, shape (n + 1,).
@@ -120,25 +83,9 @@ class WaveMotion:
 
 
 def wave_motion(waves: Waves, particulars: Particulars, speed: float | None = None) -> WaveMotion:
-    """Variance of wave-induced heading and roll for waves from all directions.
+    """Variance of wave-induced heading and roll for waves from all directions; see `wave_drift`.
 
-    Parameters
-    ----------
-    waves : Waves
-        Its direction does not matter here.
-    particulars : Particulars
-        Estimated where absent (:func:`shipgym.sea.estimates.weather_particulars`).
-    speed : float, optional
-        At which roll meets the waves, m/s; by default the service speed, or 0 where that is not known.
-
-    Returns
-    -------
-    WaveMotion
-
-    Raises
-    ------
-    InputError
-        For particulars too few.
+    Roll meets the waves at `speed`, m/s, by default that of service, or 0 where that is not known.
     """
     ship = weather_particulars(particulars)
     chi = circle()
@@ -149,7 +96,7 @@ def wave_motion(waves: Waves, particulars: Particulars, speed: float | None = No
     heading = heading_response(omega, quarter[:, None], ship)
     roll = roll_response(omega, quarter[:, None], ship, U)
     heading_variance, roll_variance = (
-        spread(mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves)
+        over_directions(mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves)
         for response in (heading, roll)
     )
     used = {"metacentric_height", "roll_period", "block_coefficient"}

@@ -11,8 +11,6 @@ integrals involving the matrix exponential): their variances do not depend on th
 Forces are Fourier series over an angle, already divided by the ship's inertia.
 """
 
-from __future__ import annotations
-
 from math import fabs, pi, sqrt
 from typing import Any, NamedTuple
 
@@ -230,25 +228,12 @@ def with_waves(bow: float, beam: float, frequency: float, sea: Sea, p: SeaParame
     heading = sqrt(max(cosine_series(bow, p.heading_variance), 0.0))
     heel = sqrt(max(cosine_series(bow, p.roll_variance), 0.0)) if HAS_ROLL else 0.0
     return Sea(
-        sea.mean_north,
-        sea.mean_east,
-        sea.wind_north,
-        sea.wind_east,
-        sea.waves_north,
-        sea.waves_east,
-        sea.current_north,
-        sea.current_east,
-        sea.gust,
-        sea.drift,
-        sea.heading_1,
-        sea.heading_2,
-        sea.roll_1,
-        sea.roll_2,
-        psi_wave=heading * sea.heading_2,
-        r_wave=-heading * frequency * sea.heading_1,
+        sea.mean_north, sea.mean_east, sea.wind_north, sea.wind_east, sea.waves_north, sea.waves_east,
+        sea.current_north, sea.current_east, sea.gust, sea.drift, sea.heading_1, sea.heading_2, sea.roll_1,
+        sea.roll_2, psi_wave=heading * sea.heading_2, r_wave=-heading * frequency * sea.heading_1,
         phi_wave=heel * sea.roll_2 if HAS_ROLL else 0.0,
         p_wave=-heel * frequency * sea.roll_1 if HAS_ROLL else 0.0,
-    )
+    )  # fmt: skip
 
 
 def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
@@ -257,19 +242,10 @@ def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
-    """Current, gusts, drift force and first-order motion after a step of h seconds.
+    """Current, gusts, drift force and first-order motion after a step of h seconds (as of the filters).
 
-    Parameters
-    ----------
-    motion : Motion
-        The ship at the end of the step.
-    h : float
-        The step for which the filters were made, s.
-    sea : Sea
-        At its beginning.
-    word : uint64
-        State of its random numbers, which then goes on by `EVOLVE_WORDS`.
-    p : SeaParameters
+    `motion` is the ship at the end of the step, `sea` that at its beginning, `word` (uint64) the state of its
+    random numbers, which then goes on by `EVOLVE_WORDS`.
     """
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
@@ -284,25 +260,13 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
             sea.roll_1, sea.roll_2, normal(word, DRAW[6]), normal(word, DRAW[7]), step
         )
     after = Sea(
-        sea.mean_north,
-        sea.mean_east,
-        sea.wind_north,
-        sea.wind_east,
-        sea.waves_north,
-        sea.waves_east,
+        sea.mean_north, sea.mean_east, sea.wind_north, sea.wind_east, sea.waves_north, sea.waves_east,
         wandered(sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])),
         wandered(sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])),
         p.gust.kept * sea.gust + p.gust.shock * normal(word, DRAW[2]),
-        p.drift.kept * sea.drift + p.drift.shock * normal(word, DRAW[3]),
-        heading_1,
-        heading_2,
-        roll_1,
-        roll_2,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+        p.drift.kept * sea.drift + p.drift.shock * normal(word, DRAW[3]), heading_1, heading_2, roll_1,
+        roll_2, 0.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
     return with_waves(bow, beam, frequency, after, p)
 
 
@@ -322,25 +286,12 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     wind_east, wind_north = sin_cos(direction(p.wind_from, word, DRAW[1]))
     waves_east, waves_north = sin_cos(direction(p.waves_from, word, DRAW[1]))
     sea = Sea(
-        mean_north,
-        mean_east,
-        wind_north,
-        wind_east,
-        waves_north,
-        waves_east,
+        mean_north, mean_east, wind_north, wind_east, waves_north, waves_east,
         mean_north + p.current.deviation * normal(word, DRAW[2]),
-        mean_east + p.current.deviation * normal(word, DRAW[3]),
-        p.gust.deviation * normal(word, DRAW[4]),
-        p.drift.deviation * normal(word, DRAW[5]),
-        normal(word, DRAW[6]),
-        normal(word, DRAW[7]),
-        normal(word, DRAW[8]),
-        normal(word, DRAW[9]),
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+        mean_east + p.current.deviation * normal(word, DRAW[3]), p.gust.deviation * normal(word, DRAW[4]),
+        p.drift.deviation * normal(word, DRAW[5]), normal(word, DRAW[6]), normal(word, DRAW[7]),
+        normal(word, DRAW[8]), normal(word, DRAW[9]), 0.0, 0.0, 0.0, 0.0,
+    )  # fmt: skip
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
     return with_waves(bow, beam, encounter(bow, beam, motion.u, motion.v, p), sea, p)
@@ -390,36 +341,21 @@ def sea_records(windy: bool) -> tuple[Any, Any]:
 
 def sea_functions(windy: bool) -> dict[str, Any]:
     """What takes the place of the functions that loops name for the sea."""
-    if not windy:
-        return {
-            "HAS_SEA": False,
-            "push": Part(no_push),
-            "evolve": Part(still),
-            "begin_sea": Part(begin_calm),
-            "encounter_frequency": Part(no_encounter),
-        }
     return {
-        "HAS_SEA": True,
-        "push": Part(push),
-        "evolve": Part(evolve),
-        "begin_sea": Part(begin_sea, inline=False),
-        "encounter_frequency": Part(encounter_frequency),
+        "HAS_SEA": windy,
+        "push": Part(push if windy else no_push),
+        "evolve": Part(evolve if windy else still),
+        "begin_sea": Part(begin_sea, inline=False) if windy else Part(begin_calm),
+        "encounter_frequency": Part(encounter_frequency if windy else no_encounter),
     }
 
 
 def sea_parts(windy: bool, lanes: int = LANES, first: int = 0, shared: bool = True) -> dict[str, Any]:
     """`sea_functions`, and how state and parameters are loaded.
 
-    Parameters
-    ----------
-    windy : bool
-        Whether there is current, wind or waves.
-    lanes : int
-        Of a tile of states, 64, or 1 where they are vectors.
-    first : int
-        Row of the sea's first number in them.
-    shared : bool
-        Whether all lanes meet the same sea, so that its parameters are a vector and not a tile.
+    `lanes` are those of a tile of states, 64, or 1 where they are vectors, and `first` is the row of the
+    sea's first number in them. With `shared` all lanes meet the same sea: its parameters are a vector and not
+    a tile.
     """
     kinds = (Sea, SeaParameters) if windy else (CalmSea, CalmParameters)
     state, parameters = (

@@ -1,20 +1,17 @@
 """Wave spectra, and the linear filters that stand for first-order motion and slow drift."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.harmonics import circle
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 
 class WaveFilter(NamedTuple):
@@ -22,20 +19,11 @@ class WaveFilter(NamedTuple):
 
     Its output has unit variance: gain^2 = 4 damping w0. At sea w0 is the frequency of encounter, and the
     gain follows it.
-
-    Attributes
-    ----------
-    peak_frequency : float
-        w0 for a ship at rest, rad/s.
-    damping : float
-        lambda, relative damping.
-    gain : float
-        rad^(1/2) / s^(1/2).
     """
 
-    peak_frequency: float
-    damping: float
-    gain: float
+    peak_frequency: float  # w0 for a ship at rest, rad/s
+    damping: float  # lambda, relative damping
+    gain: float  # rad^(1/2) / s^(1/2)
 
     def spectrum(self, omega: ArrayLike) -> Floats:
         """One-sided spectral density of the output per rad/s, whose integral is 1."""
@@ -46,21 +34,9 @@ class WaveFilter(NamedTuple):
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
-    """Spectrum of a fully developed sea (Pierson & Moskowitz 1964) by Hs and Tp.
+    """Spectrum of a fully developed sea (Pierson & Moskowitz 1964) by Hs, m, and Tp, s.
 
-    Parameters
-    ----------
-    omega : array_like
-        rad/s; at 0 the spectrum is 0.
-    Hs : float
-        Significant height, m.
-    Tp : float
-        Period of the peak, s.
-
-    Returns
-    -------
-    array
-        One-sided density of the elevation, m2 s/rad; its integral is Hs^2 / 16.
+    One-sided density of the elevation, m2 s/rad, over omega, rad/s; 0 at 0. Its integral is Hs^2 / 16.
     """
     peak = 2.0 * np.pi / Tp
     ratio = np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak  # exp(-1.25 * 50^4) is 0
@@ -69,22 +45,10 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
 
 
 def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Floats:
-    """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs.
+    """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs; as `pierson_moskowitz`.
 
-    Parameters
-    ----------
-    omega : array_like
-        rad/s.
-    Hs, Tp : float
-        Significant height, m, and period of the peak, s.
-    gamma : float
-        Peak enhancement; 1 gives :func:`pierson_moskowitz`.
-
-    Returns
-    -------
-    array
-        One-sided density of the elevation, m2 s/rad; its integral is Hs^2 / 16. The factor
-        1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the exact integral.
+    The factor 1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the exact integral; a peak
+    enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
     ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
     density: Floats = pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
@@ -116,21 +80,11 @@ def frequencies(waves: Waves, points: int = 400) -> Floats:
     return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, points)
 
 
-def spread(curve: Floats, waves: Waves) -> Floats:
-    """Average a curve over the directions from which the waves of a sea come.
+def over_directions(curve: Floats, waves: Waves) -> Floats:
+    """A curve over :func:`shipgym.sea.harmonics.circle` averaged over the directions of a sea's waves.
 
-    Parameters
-    ----------
-    curve : array of shape (points,)
-        What waves from one direction do (a variance or a mean force, which add up), over
-        :func:`shipgym.sea.harmonics.circle`.
-    waves : Waves
-        Gives the spreading.
-
-    Returns
-    -------
-    array of shape (points,)
-        Over the mean direction.
+    The curve is what waves from one direction do (a variance or a mean force, which add up), the average over
+    the mean direction.
     """
     if waves.spreading == "long-crested":
         return curve
@@ -141,21 +95,10 @@ def spread(curve: Floats, waves: Waves) -> Floats:
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
-    """Frequency with which a ship under way meets waves in deep water.
+    """Frequency of encounter of a ship under way in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
 
-    Parameters
-    ----------
-    omega : array_like
-        Of the waves, rad/s.
-    speed : array_like
-        Of the ship, m/s.
-    chi : array_like
-        Where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard, rad.
-
-    Returns
-    -------
-    array
-        |omega + omega^2 U cos(chi) / g|, rad/s.
+    `omega` is of the waves, rad/s, `speed` the ship's, m/s; `chi`, rad, is where the waves come from, seen
+    from the bow: 0 ahead, pi / 2 from starboard.
     """
     w = np.asarray(omega, dtype=float)
     met: Floats = np.abs(w + w * w * np.asarray(speed) * np.cos(chi) / GRAVITY)
@@ -166,20 +109,9 @@ def wave_filter(waves: Waves) -> WaveFilter:
     """Second-order filter whose output has the shape of the wave spectrum and unit variance.
 
     The relative damping is fitted by least squares to the spectrum of unit variance; it depends on the peak
-    enhancement alone.
-
-    Parameters
-    ----------
-    waves : Waves
-
-    Returns
-    -------
-    WaveFilter
-
-    Notes
-    -----
-    Saelid, Jenssen & Balchen 1983 (Design and analysis of a dynamic positioning system based on Kalman
-    filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, section 8.2.
+    enhancement alone. Saelid, Jenssen & Balchen 1983 (Design and analysis of a dynamic positioning system
+    based on Kalman filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, section
+    8.2.
     """
     peak = 2.0 * np.pi / waves.peak_period
     damping = _fitted_damping(waves.gamma)
@@ -201,20 +133,11 @@ def _fitted_damping(gamma: float) -> float:
 
 
 def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
-    """Share of the drift force of an infinitely deep hull that one of this draught takes up.
+    """Share of the drift force of an infinitely deep hull that one of this draught (m) takes up.
 
-    Parameters
-    ----------
-    omega : array_like
-        rad/s.
-    draught : float
-        m.
-
-    Returns
-    -------
-    array
-        pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii & Takahashi 1975,
-        Experimental study on the resistance increase of a ship in regular oblique waves, 14th ITTC).
+    pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii & Takahashi 1975,
+    Experimental study on the resistance increase of a ship in regular oblique waves, 14th ITTC); omega in
+    rad/s.
     """
     from scipy.special import i1e, k1e
 
@@ -225,30 +148,15 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
-    """Process s(t) of the slowly varying drift force, mean force * (1 + s).
+    """Process s(t) of the slowly varying drift force, mean force * (1 + s); s is without unit.
 
-    By Newman's approximation the force is the squared envelope of a narrow-banded process with spectrum
-    S(w) c(w), where c is the mean force by squared amplitude. The squared envelope of a Gaussian process is
-    exponentially distributed: its standard deviation is its mean, so that of s is 1. Its spectrum at zero
-    frequency, 8 integral S^2 c^2 dw, gives the integral time scale pi integral S^2 c^2 dw /
-    (integral S c dw)^2. For c the attenuation with draught is taken.
-
-    Parameters
-    ----------
-    waves : Waves
-    particulars : Particulars
-        Gives the draught.
-
-    Returns
-    -------
-    GaussMarkov
-        Time constant, s, and standard deviation, without unit. The Gaussian s lacks the long tail of the
-        exponential distribution and falls below -1 for 16 % of the time.
-
-    Notes
-    -----
-    Newman 1974, Second order slowly varying forces on vessels in irregular waves; Faltinsen 1990, Sea Loads,
-    section 5, equation 5.45 for the spectrum.
+    By Newman's approximation (Newman 1974, Second order slowly varying forces on vessels in irregular waves)
+    the force is the squared envelope of a narrow-banded process with spectrum S(w) c(w), where c is the mean
+    force by squared amplitude. The squared envelope of a Gaussian process is exponentially distributed: its
+    standard deviation is its mean, so that of s is 1. Its spectrum at zero frequency, 8 integral S^2 c^2 dw
+    (Faltinsen 1990, Sea Loads, equation 5.45), gives the integral time scale pi integral S^2 c^2 dw /
+    (integral S c dw)^2, s. For c the attenuation with draught is taken. The Gaussian s lacks the long tail of
+    the exponential distribution and falls below -1 for 16 % of the time.
     """
     if waves.calm:
         return GaussMarkov(1.0, 0.0)

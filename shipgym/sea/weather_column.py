@@ -1,10 +1,8 @@
 """The sea as loops read it: what current, wind and waves do to a ship, as numbers of `SeaParameters`."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.records import flat
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
@@ -18,7 +16,6 @@ from shipgym.sea.waves import wave_filter
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
-Floats = NDArray[np.float64]
 GRAVITY = 9.80665
 HARMONICS = len(Sines._fields)
 FLAT, NONE, STEADY = Cosines(*[0.0] * (HARMONICS + 1)), Sines(*[0.0] * HARMONICS), Filter(0.0, 0.0, 0.0)
@@ -31,13 +28,7 @@ CALM = SeaParameters(
 
 
 def as_weather(weather: Weather | str | None, where: str, from_deg: float | None = 45.0) -> Weather:
-    """A weather itself, that of a sea state by name, or calm.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
+    """A weather itself, that of a sea state by name, or calm; InputError for anything else."""
     if weather is None:
         return Weather(name="calm")
     if isinstance(weather, Weather):
@@ -56,27 +47,10 @@ def as_weather(weather: Weather | str | None, where: str, from_deg: float | None
 def weather_column(
     model: ManoeuvringModel, weather: Weather, step: float, water_depth: float = np.inf
 ) -> Floats:
-    """What a weather does to a ship, in the order of `SeaParameters`.
+    """What a weather does to a ship, in the order of `SeaParameters`, per her inertia.
 
-    Parameters
-    ----------
-    model : ManoeuvringModel
-        The ship; forces become accelerations by her inertia.
-    weather : Weather
-        Parts that are calm do nothing.
-    step : float
-        Between two states of the sea, s.
-    water_depth : float
-        m; where the added mass depends on it.
-
-    Returns
-    -------
-    array of shape (n_rows,)
-
-    Raises
-    ------
-    InputError
-        If the ship's particulars are not enough.
+    `step`, s, is the time between two states of the sea; the added mass may depend on `water_depth`, m.
+    Raises InputError if the ship's particulars are not enough.
     """
     sea, current, wind, waves = CALM, weather.current, weather.wind, weather.waves
     if current is not None and not current.calm:

@@ -1,12 +1,10 @@
 """Wind forces on a ship over the direction of the relative wind."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.sea.estimates import house_area, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, sine_series
 from shipgym.sea.wind_tables import (
@@ -18,8 +16,6 @@ from shipgym.sea.wind_tables import (
     isherwood_coefficients,
 )
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 #: At 15 degrees Celsius and sea level, kg/m3 (ISO 2533 standard atmosphere).
 AIR_DENSITY = 1.225
@@ -34,27 +30,16 @@ class WindCurves:
     The angle is that of the relative wind seen from the bow, 0 ahead, pi / 2 from starboard: where
     (u_rw, v_rw) is the ship's velocity through the air in body axes and V its length, cos(angle) = u_rw / V
     and sin(angle) = v_rw / V. Wind from starboard pushes to port: Y < 0 there.
-
-    Attributes
-    ----------
-    angle : array of shape (points,)
-        From 0 to below 2 pi, rad.
-    X, Y : array of shape (points,)
-        Surge and sway force by dynamic pressure, m2.
-    N : array of shape (points,)
-        Yaw moment about midship by dynamic pressure, positive to starboard, m3.
-    K : array of shape (points,)
-        Heeling moment about the waterline by dynamic pressure, positive to starboard, m3.
-    estimated : tuple of str
-        Names of the particulars that were estimated for it.
     """
 
-    angle: Floats
+    angle: Floats  # shape (points,); from 0 to below 2 pi, rad
+    # shape (points,); surge and sway force by dynamic pressure, m2
     X: Floats
     Y: Floats
-    N: Floats
+    N: Floats  # shape (points,); yaw moment about midship by dynamic pressure, positive to starboard, m3
+    # shape (points,); heeling moment about the waterline by dynamic pressure, positive to starboard, m3
     K: Floats
-    estimated: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()  # names of the particulars that were estimated for it
 
     def harmonics(self, n: int = 8) -> Harmonics:
         """Fourier series of the curves up to the n-th harmonic, for kernels.
@@ -68,24 +53,10 @@ class WindCurves:
 
 
 def wind_curves(particulars: Particulars, coefficients: str | WindTable = "blendermann") -> WindCurves:
-    """Wind forces of a ship over all directions.
+    """Wind forces of a ship over all directions; coefficients as in :class:`shipgym.sea.conditions.Wind`.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        Areas, centroid and length overall are estimated where they are not given
-        (:func:`shipgym.sea.estimates.weather_particulars`).
-    coefficients : str or WindTable
-        As in :class:`shipgym.sea.conditions.Wind`.
-
-    Returns
-    -------
-    WindCurves
-
-    Raises
-    ------
-    InputError
-        For unknown coefficients, or particulars too few to estimate the areas.
+    Areas, centroid and length overall are estimated where not given (`weather_particulars`). Raises
+    InputError for unknown coefficients, or particulars too few to estimate the areas.
     """
     check_coefficients(coefficients, "wind coefficients")
     ship = weather_particulars(particulars)

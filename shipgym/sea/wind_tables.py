@@ -7,34 +7,21 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_number, check_table, did_you_mean, quoted
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
-
 
 class Blendermann(NamedTuple):
-    """One row of Blendermann's table.
+    """One row of Blendermann's table."""
 
-    Attributes
-    ----------
-    CD_t : float
-        Transverse resistance, by lateral area.
-    CD_l_bow, CD_l_stern : float
-        Longitudinal resistance in head and in following wind, by frontal area.
-    delta : float
-        Cross-force parameter.
-    kappa : float
-        Rolling-moment factor.
-    """
-
-    CD_t: float
+    CD_t: float  # transverse resistance, by lateral area
+    # longitudinal resistance in head and in following wind, by frontal area
     CD_l_bow: float
     CD_l_stern: float
-    delta: float
-    kappa: float
+    delta: float  # cross-force parameter
+    kappa: float  # rolling-moment factor
 
 
 #: Blendermann 1994, Parameter identification of wind loads on ships, Journal of Wind Engineering and
@@ -127,13 +114,7 @@ class WindTable:
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "wind table") -> WindTable:
-        """Read a table as it stands in JSON.
-
-        Raises
-        ------
-        InputError
-            For an unknown or missing row.
-        """
+        """Read a table as it stands in JSON; InputError for an unknown or missing row."""
         table = check_table(mapping, where)
         check_keys(table, ("angles_deg", "CX", "CY", "CN", "CK"), where)
         for name in ("angles_deg", "CX", "CY", "CN"):
@@ -149,13 +130,7 @@ def _row(values: Any, where: str) -> tuple[float, ...]:
 
 
 def check_coefficients(value: Any, where: str) -> None:
-    """Refuse what `Wind(coefficients=...)` does not understand.
-
-    Raises
-    ------
-    InputError
-        Naming the words that it does.
-    """
+    """InputError for what `Wind(coefficients=...)` does not understand, naming the words that it does."""
     if isinstance(value, WindTable) or (isinstance(value, str) and value in coefficient_names()):
         return
     hint = did_you_mean(value, coefficient_names()) if isinstance(value, str) else ""
@@ -180,24 +155,11 @@ def blendermann_type(name: str, block_coefficient: float) -> str:
 def blendermann_coefficients(
     row: Blendermann, angle: Floats, area_ratio: float, centroid_ratio: float
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Blendermann's coefficients for wind from 0 (ahead) to pi (astern) of one side.
+    """Blendermann's coefficients of a type of ship for wind from 0 (ahead) to pi (astern) of one side.
 
-    Parameters
-    ----------
-    row : Blendermann
-        Of the type of ship.
-    angle : array
-        Where the wind comes from, rad from the bow, 0 to pi.
-    area_ratio : float
-        Frontal by lateral area.
-    centroid_ratio : float
-        Centroid of the lateral area forward of midship by length overall.
-
-    Returns
-    -------
-    tuple of four arrays
-        CX by frontal area; CY to lee by lateral area; CN with the bow to lee by lateral area and length
-        overall; CK to lee by lateral area and the height of its centroid.
+    `area_ratio` is the frontal by the lateral area, `centroid_ratio` the centroid of the lateral area forward
+    of midship by length overall. Returns CX by frontal area; CY to lee by lateral area; CN with the bow to
+    lee by lateral area and length overall; CK to lee by lateral area and the height of its centroid.
     """
     CD_l_AF = np.where(angle <= np.pi / 2, row.CD_l_bow, row.CD_l_stern)
     CD_l = CD_l_AF * area_ratio
@@ -257,27 +219,13 @@ def isherwood_coefficients(
     masts: float,
     superstructure_area: float,
 ) -> tuple[Floats, Floats, Floats]:
-    """Isherwood's coefficients every 10 degrees from 0 (ahead) to 180 (astern).
+    """Isherwood's coefficients every 10 degrees from 0 (ahead) to 180 (astern), three arrays of shape (19,).
 
-    Parameters
-    ----------
-    length, beam : float
-        Length overall and beam, m.
-    lateral_area, frontal_area : float
-        Projected areas above the water, m2.
-    perimeter : float
-        Of the lateral projection without waterline, masts and ventilators, m.
-    bow_to_centroid : float
-        From the bow to the centroid of the lateral area, m.
-    masts : float
-        Groups of masts seen from the side.
-    superstructure_area : float
-        Of the lateral area, m2.
-
-    Returns
-    -------
-    tuple of three arrays of shape (19,)
-        CX by frontal area; CY to lee by lateral area; CN with the bow to lee by lateral area and length.
+    Lengths in m, projected areas above the water in m2; `length` is overall, `perimeter` that of the lateral
+    projection without waterline, masts and ventilators, `bow_to_centroid` reaches to the centroid of the
+    lateral area, `masts` are groups of masts seen from the side, `superstructure_area` is that of the lateral
+    area. Returns CX by frontal area; CY to lee by lateral area; CN with the bow to lee by lateral area and
+    length.
     """
     hull = [1.0, 2.0 * lateral_area / length**2, 2.0 * frontal_area / beam**2, length / beam]
     outline = [*hull, perimeter / length, bow_to_centroid / length]

@@ -1,7 +1,5 @@
 """The shipped models by name: reference ships, and identified models in `library/`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -14,7 +12,10 @@ from shipgym.ships import kvlcc2 as kvlcc2_file
 from shipgym.ships import tanker as tanker_file
 from shipgym.ships.equations import ShipEquations, read_ship_equations
 from shipgym.ships.mariner import mariner
+from shipgym.ships.particulars import Particulars
+from shipgym.ships.pmm import TABLE_11, XU
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, list_structures
 
 LIBRARY = Path(__file__).parent / "library"
@@ -49,17 +50,7 @@ def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
 
 
 def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m.
-
-    Parameters
-    ----------
-    form : {"published", "shipmmg"}
-        The standard method as published, or the variant of the package shipmmg 0.0.11.
-
-    Returns
-    -------
-    ShipModel
-    """
+    """KVLCC2 at full scale, 320 m: the standard method as published, or the variant of shipmmg 0.0.11."""
     model = kvlcc2_l7(form)
     scale = kvlcc2_file.FULL_SCALE
     return replace(
@@ -78,13 +69,18 @@ def kvlcc2_l7(form: Form = "published") -> ShipModel:
     return replace(model, name="kvlcc2-l7", provenance={"source": kvlcc2_file.SHIP.source, "form": form})
 
 
+def xu_ship(particulars: Particulars) -> ShipModel:
+    """The ship towed at SINTEF Ocean, of Table 11 in `shipgym.ships.pmm`; the paper prints no particulars.
+
+    She has neither rudder nor propeller.
+    """
+    source = {"source": f"{XU}, Table 11"}
+    return ShipModel("xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source)
+
+
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
-    "mariner": mariner,
-    "container": container,
-    "tanker": tanker,
-    "kvlcc2": kvlcc2,
-    "kvlcc2-l7": kvlcc2_l7,
-}
+    "mariner": mariner, "container": container, "tanker": tanker, "kvlcc2": kvlcc2, "kvlcc2-l7": kvlcc2_l7,
+}  # fmt: skip
 
 
 def list_models() -> list[str]:
@@ -101,10 +97,6 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     ship : ShipEquations, str or Path
         The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
         from a file, or from one that cannot be imported, stays in this process.
-
-    Returns
-    -------
-    ShipEquations
 
     Raises
     ------
@@ -132,10 +124,6 @@ def load_model(name: str | Path) -> ShipModel:
     name : str or Path
         A name of `list_models`, the path of a model file, or that of a Python file with the equations of a
         ship (`register_ship_equations`), which is run.
-
-    Returns
-    -------
-    ShipModel
 
     Raises
     ------

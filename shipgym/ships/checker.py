@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
@@ -19,7 +19,6 @@ from shipgym.ships.term_table import Structure
 if TYPE_CHECKING:
     from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 
 SAMPLES = 512
 #: Range of the states looked at, in service speed, service speed by length and rudder limit.
@@ -39,24 +38,14 @@ SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
 
 @dataclass(frozen=True)
 class ModelCheck:
-    """What a check of a model found.
+    """What a check of a model found."""
 
-    Attributes
-    ----------
-    name : str
-        Of the model.
-    problems : tuple of str
-        What makes it unfit to be simulated or steered, each with a remedy; empty for a sound model.
-    remarks : tuple of str
-        What is unusual, and may be right.
-    asymmetry : float
-        Root mean square of the accelerations' port/starboard difference over twice their own, over states
-        that a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated.
-    """
-
-    name: str
+    name: str  # of the model
+    # what makes it unfit to be simulated or steered, each with a remedy; empty for a sound model
     problems: tuple[str, ...]
-    remarks: tuple[str, ...]
+    remarks: tuple[str, ...]  # what is unusual, and may be right
+    # root mean square of the accelerations' port/starboard difference over twice their own, over states that
+    # a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated
     asymmetry: float
 
     @property
@@ -84,10 +73,6 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     model : ShipModel, str or Path
         A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
         coefficient is missing for instance, is a problem found.
-
-    Returns
-    -------
-    ModelCheck
     """
     if not isinstance(model, ShipModel):
         try:
@@ -243,7 +228,7 @@ def _wrong_rudder(model: ShipModel) -> Iterator[str]:
     try:
         turned = [_run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1] for side in (1.0, -1.0)]
     except UnstableModelError:
-        return  # told by the courses
+        return  # the courses say so
     if not turned[0] > turned[1]:
         port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
         yield (
@@ -267,7 +252,7 @@ def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
             "propeller of a single-screw ship explains; identify from trials that begin to both sides"
         )
     if not _steers(model):
-        yield "no rudder turns this model: it is none for an autopilot"
+        yield "no rudder turns this model: an autopilot has nothing to do on it"
     try:
         final = float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1]) / model.particulars["speed"]
     except UnstableModelError:

@@ -1,14 +1,12 @@
 """What a simulation happens in: depth of the water, weather, and the seed that the weather follows from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.loops import compile_loop, ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
@@ -19,50 +17,24 @@ from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, Sea, sea_parts
 from shipgym.sea.weather_column import as_weather, weather_column
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
-Floats = NDArray[np.float64]
 Seed = int | np.random.Generator
 CALM = Weather(name="calm")
 
 
 @dataclass(frozen=True)
 class Conditions:
-    """Depth of the water and weather of a simulation.
+    """Depth of the water and weather of a simulation."""
 
-    Attributes
-    ----------
-    water_depth : float
-        m.
-    weather : Weather or str or None
-        A weather, the name of a sea state, or None for calm.
-    seed : int or Generator
-        Of the random part of the weather.
-    """
-
-    water_depth: float = np.inf
-    weather: Weather | str | None = None
-    seed: Seed = 0
+    water_depth: float = np.inf  # m
+    weather: Weather | str | None = None  # A weather, the name of a sea state, or None for calm
+    seed: Seed = 0  # of the random part of the weather
 
 
 class Passage:
     """One ship on her way through given conditions: the loops for them and the arrays they work on.
 
-    Parameters
-    ----------
-    model : ManoeuvringModel
-        The ship.
-    conditions : Conditions
-        Where she sails.
-    dt : float
-        Step, s; the filters of the weather are made for it.
-
-    Attributes
-    ----------
-    windy : bool
-        Whether there is any weather.
-    numbers : array of shape (n_rows,)
-        The ship's numbers.
-    sea : tuple of array
-        State of the sea, that of its random numbers and its parameters, as loops take them.
+    `numbers` are the ship's, `sea` is its state, that of its random numbers and its parameters, as loops take
+    them, `windy` whether there is any weather; its filters are made for steps of `dt` seconds.
     """
 
     def __init__(self, model: ManoeuvringModel, conditions: Conditions, dt: float) -> None:
@@ -80,14 +52,7 @@ class Passage:
         return _windy_loop(self.vessel, name) if self.windy else ship_loop(self.vessel, name)
 
     def states(self, first: Floats, n_steps: int) -> Floats:
-        """Rows for n_steps + 1 states, and the weather behind each, with the first filled in.
-
-        Parameters
-        ----------
-        first : array of shape (n_columns,)
-            A state; the weather begins with it, unless it comes with one.
-        n_steps : int
-        """
+        """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
         width = len(self.vessel.state_names) + (len(SEA_CHANNELS) if self.windy else 0)
         states = np.empty((n_steps + 1, width))
         states[0, : len(first)] = first

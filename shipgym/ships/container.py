@@ -5,8 +5,6 @@ ship, J. Soc. Naval Architects of Japan 150; in the form of the function `contai
 (Fossen 1994). Prime system with L^2 and the instantaneous speed; u' is the total surge speed over U.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, pi, sqrt
 from typing import NamedTuple
 
@@ -173,27 +171,16 @@ SHIP = ShipEquations(
     Coefficients,
     accelerations,
     Particulars(
-        name="Container ship S175",
-        length=LENGTH,
-        beam=25.40,
-        draught=8.50,
-        mass=PUBLISHED.m * (0.5 * 1025.0 * LENGTH**3),
-        xg=0.0,
-        yaw_gyradius=LENGTH * (PUBLISHED.Iz / PUBLISHED.m) ** 0.5,
-        block_coefficient=0.559,
-        speed=8.376672395256,
-        rudder_area=RUDDER_AREA,
-        propeller_diameter=DIAMETER,
-        metacentric_height=GM,
-        water_density=1025.0,
-        X_udot=-PUBLISHED.mx,
-        Y_vdot=-PUBLISHED.my,
-        Y_rdot=-PUBLISHED.my * PUBLISHED.alpha_y,
-        N_vdot=-PUBLISHED.my * PUBLISHED.alpha_y,
+        name="Container ship S175", length=LENGTH, beam=25.40, draught=8.50,
+        mass=PUBLISHED.m * (0.5 * 1025.0 * LENGTH**3), xg=0.0,
+        yaw_gyradius=LENGTH * (PUBLISHED.Iz / PUBLISHED.m) ** 0.5, block_coefficient=0.559,
+        speed=8.376672395256, rudder_area=RUDDER_AREA, propeller_diameter=DIAMETER, metacentric_height=GM,
+        water_density=1025.0, X_udot=-PUBLISHED.mx, Y_vdot=-PUBLISHED.my,
+        Y_rdot=-PUBLISHED.my * PUBLISHED.alpha_y, N_vdot=-PUBLISHED.my * PUBLISHED.alpha_y,
         N_rdot=-PUBLISHED.Jz,
     ),
     SteeringGear(rudder_rate_deg_s=5.0, time_constant=1.0),
     shaft_acceleration=shaft_acceleration,
     service_shaft_speed=80.0 / 60.0,
     rolls=True,
-)
+)  # fmt: skip

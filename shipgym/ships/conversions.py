@@ -13,8 +13,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.linear import (
@@ -33,7 +34,6 @@ from shipgym.ships.steering import SteeringGear
 if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
 
-Floats = NDArray[np.float64]
 
 __all__ = [
     "Nomoto", "StraightRunning", "linear_steering_ship", "linearise", "nomoto", "nomoto1_ship",
@@ -45,26 +45,10 @@ __all__ = [
 def state_space(model: ShipModel, heading: bool = False, gear: bool = False) -> StateSpace:
     """A ship's steering about straight running as a linear system.
 
-    Parameters
-    ----------
-    model : ShipModel
-        Any ship with a straight course.
-    heading : bool
-        Whether the heading psi is a state.
-    gear : bool
-        Whether the rudder is a state, driven by its order through the gear's lag, without limit and rate.
-
-    Returns
-    -------
-    control.StateSpace
-        States v (q in a table with a memory of yaw), r, and psi, delta where asked for: deviations from
-        straight running in SI units, rudder positive to starboard. Input `delta`, or `delta_command`; the
-        states are the outputs.
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course, or its gear no lag to make a state of.
+    States are v (q in a table with a memory of yaw), r, and psi and delta where `heading` and `gear` ask for
+    them: deviations from straight running in SI units, rudder positive to starboard. The input is `delta`, or
+    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. Raises
+    InputError if the model has no straight course, or its gear no lag to make a state of.
     """
     import control  # here, because it takes a second to import
 
@@ -93,21 +77,8 @@ def state_space(model: ShipModel, heading: bool = False, gear: bool = False) -> 
 def transfer_function(form: Nomoto, order: int = 2) -> TransferFunction:
     """Nomoto's transfer function from rudder to yaw rate, both in rad.
 
-    Parameters
-    ----------
-    form : Nomoto
-        Of `nomoto`.
-    order : {2, 1}
-        K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), or K / (1 + T s).
-
-    Returns
-    -------
-    control.TransferFunction
-
-    Raises
-    ------
-    InputError
-        For another order, or a form of second order whose poles are a complex pair.
+    Order 2 is K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), order 1 is K / (1 + T s). Raises InputError for another
+    order, or a form of second order whose poles are a complex pair.
     """
     import control
 
@@ -123,30 +94,11 @@ def transfer_function(form: Nomoto, order: int = 2) -> TransferFunction:
 def nomoto1_ship(
     K: float, T: float, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto"
 ) -> ShipModel:
-    """The ship of Nomoto's first-order form, T rdot + r = K delta.
+    """The ship of Nomoto's first-order form, T rdot + r = K delta, as a model of structure `nomoto`.
 
-    Parameters
-    ----------
-    K : float
-        Gain, 1/s, positive to starboard; of the sign of T.
-    T : float
-        Time constant, s; both negative for a ship unstable on her course.
-    particulars : Particulars
-        Length and service speed, which she keeps.
-    steering : SteeringGear, optional
-        By default a usual one.
-    name : str
-        Of the model.
-
-    Returns
-    -------
-    ShipModel
-        Of structure `nomoto`.
-
-    Raises
-    ------
-    InputError
-        For a number that is none, or zero, or a rudder that turns to the wrong side (K / T < 0).
+    K is in 1/s, positive to starboard, T in s; both are negative for a ship unstable on her course. She keeps
+    the service speed of the particulars. Raises InputError for a number that is not finite or is zero, or a
+    rudder that turns to the wrong side (K / T < 0).
     """
     _check_effect(check_number(K, "K") * check_number(T, "T"), "K and T")
     coefficients = {"c_r": -1.0 / T, "c_d": K / T}
@@ -156,24 +108,9 @@ def nomoto1_ship(
 def nomoto2_ship(
     form: Nomoto, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto2"
 ) -> ShipModel:
-    """The ship of Nomoto's second-order form.
+    """The ship of Nomoto's second-order form, of structure `nomoto2`: she does not drift. T is not used.
 
-    Parameters
-    ----------
-    form : Nomoto
-        K, T1, T2, T3; its T is not used.
-    particulars, steering, name
-        As in `nomoto1_ship`.
-
-    Returns
-    -------
-    ShipModel
-        Of structure `nomoto2`, which turns as the form says and does not drift.
-
-    Raises
-    ------
-    InputError
-        For time constants that are zero or a complex pair.
+    Raises InputError for time constants that are zero or a complex pair.
     """
     _need_time_constants(form)
     product = form.T1 * form.T2
@@ -195,27 +132,11 @@ def linear_steering_ship(
     steering: SteeringGear | None = None,
     name: str = "linear-steering",
 ) -> ShipModel:
-    """The ship of linear steering dynamics d/dt (v, r) = A (v, r) + B delta at service speed.
+    """The ship of d/dt (v, r) = A (v, r) + B delta at service speed, of structure `linear-steering`.
 
-    Parameters
-    ----------
-    A : array-like of shape (2, 2)
-    B : array-like of shape (2, 1)
-        SI units, delta positive to starboard, as `steering_state_space` gives them.
-    particulars : Particulars
-        Length and service speed.
-    steering, name
-        As in `nomoto1_ship`.
-
-    Returns
-    -------
-    ShipModel
-        Of structure `linear-steering`: at another speed its derivatives follow by the prime system.
-
-    Raises
-    ------
-    InputError
-        For matrices of another shape, or with values that are no numbers.
+    A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as `steering_state_space` gives
+    them; at another speed her derivatives follow by the prime system. Raises InputError for other shapes or
+    values that are not finite.
     """
     a, b = prime_matrices(A, B, particulars.require("length"), particulars.require("speed"))
     rows = np.hstack([a, b])
@@ -228,25 +149,10 @@ def linear_steering_ship(
 
 
 def prime_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
-    """Linear steering dynamics in the prime system: v by U, r by U / L, time by L / U.
+    """Linear steering in the prime system: v by U, r by U / L, time by L / U.
 
-    Parameters
-    ----------
-    A : array-like of shape (2, 2)
-    B : array-like of shape (2, 1)
-        SI units.
-    length, speed : float
-        m and m/s.
-
-    Returns
-    -------
-    A : array of shape (2, 2)
-    B : array of shape (2, 1)
-
-    Raises
-    ------
-    InputError
-        For matrices of another shape, or a length or speed that is not positive.
+    A of shape (2, 2) and B of shape (2, 1) in SI units, length in m, speed in m/s. Raises InputError for
+    matrices of another shape, or a length or speed that is not positive.
     """
     a, b, unit, time = _checked(A, B, length, speed)
     return a * time * unit / unit[:, None], b * time / unit[:, None]

@@ -11,30 +11,22 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
+
 CHANNELS = ("u", "v", "r", "delta")
 
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
-    """Range and ellipsoid of (u, v, r, delta), SI units.
+    """Range and ellipsoid of (u, v, r, delta), SI units."""
 
-    Attributes
-    ----------
-    low, high : array of shape (4,)
-        Range of each channel.
-    centre : array of shape (4,)
-        Centre of the ellipsoid.
-    shape : array of shape (4, 4)
-        Upper triangular W; a state z is inside where |W (z - centre)| <= 1.
-    """
-
+    # shape (4,); range of each channel
     low: Floats
     high: Floats
-    centre: Floats
-    shape: Floats
+    centre: Floats  # shape (4,); centre of the ellipsoid
+    shape: Floats  # shape (4, 4); upper triangular W; a state z is inside where |W (z - centre)| <= 1
 
     @classmethod
     def from_samples(cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Envelope:
@@ -61,10 +53,6 @@ class Envelope:
         ----------
         u, v, r, delta : array-like of one shape
             SI units.
-
-        Returns
-        -------
-        array of the same shape
         """
         z = np.stack(np.broadcast_arrays(*map(np.asarray, (u, v, r, delta))), axis=-1) - self.centre
         distance: Floats = np.linalg.norm(z @ self.shape.T, axis=-1)
@@ -73,12 +61,9 @@ class Envelope:
     def to_dict(self) -> dict[str, Any]:
         """As it stands in a model file."""
         return {
-            "channels": list(CHANNELS),
-            "low": self.low.tolist(),
-            "high": self.high.tolist(),
-            "centre": self.centre.tolist(),
-            "shape": self.shape.tolist(),
-        }
+            "channels": list(CHANNELS), "low": self.low.tolist(), "high": self.high.tolist(),
+            "centre": self.centre.tolist(), "shape": self.shape.tolist(),
+        }  # fmt: skip
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any]) -> Envelope:
@@ -89,18 +74,9 @@ class Envelope:
 def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats, Floats]:
     """Ellipsoid of least volume around points, by Khachiyan's algorithm (Todd & Yildirim 2007).
 
-    Parameters
-    ----------
-    points : array of shape (n_points, n_dimensions)
-        Scaled to ranges near 1.
-    tolerance : float
-        Relative excess of the largest distance at which to stop.
-
-    Returns
-    -------
-    centre : array of shape (n_dimensions,)
-    quadratic : array of shape (n_dimensions, n_dimensions)
-        Positive definite Q; the ellipsoid is (z - centre)' Q (z - centre) <= 1.
+    The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the algorithm stops at a relative
+    excess `tolerance` of the largest distance. Returns the centre c, shape (n_dimensions,), and the positive
+    definite Q of (z - c)' Q (z - c) <= 1.
     """
     d = points.shape[1]
     floor = 1e-6 * np.eye(d)
@@ -118,5 +94,5 @@ def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats,
         weights *= 1.0 - step
         weights[farthest] += step
     centre = weights @ points
-    spread = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
-    return centre, np.linalg.inv(spread) / d
+    scatter = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
+    return centre, np.linalg.inv(scatter) / d

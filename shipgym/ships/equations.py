@@ -5,8 +5,6 @@ A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with t
 ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgym.engine` compiles them.
 """
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import math
@@ -20,8 +18,8 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
@@ -31,7 +29,6 @@ from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
-Floats = NDArray[np.float64]
 RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
@@ -202,10 +199,7 @@ def _vessel(
 def read_ship_equations(path: str | Path) -> ShipEquations:
     """The ship that a Python file defines as `SHIP`; the file is run.
 
-    Raises
-    ------
-    InputError
-        For a file that is not there, cannot be run, or defines no `SHIP`.
+    Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
     if not path.is_file():

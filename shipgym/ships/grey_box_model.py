@@ -1,7 +1,5 @@
 """Grey boxes by the name of their reference ship, and reference ships as models of other ships."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -32,10 +30,6 @@ def grey_box(
         Whether the target's shaft speed is known; by default if the reference ship knows one.
     name : str
         Of the structure.
-
-    Returns
-    -------
-    GreyBox
 
     Raises
     ------
@@ -73,10 +67,6 @@ def converted_model(
         Of the target, 1/s; 0: not known, and the reference ship's is taken as at service speed.
     name : str, optional
         By default the target's.
-
-    Returns
-    -------
-    ShipModel
     """
     box = reference
     if not isinstance(box, GreyBox):

@@ -5,16 +5,14 @@ minor rudder. Their equation 11 adds accelerations of two different ships; here 
 are converted back to the target first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
@@ -25,8 +23,6 @@ from shipgym.ships.structures import WITH_REFERENCE
 from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import CHANNEL, read_terms
-
-Floats = NDArray[np.float64]
 
 GREY_BOX = WITH_REFERENCE
 SOURCE = (
@@ -211,18 +207,10 @@ def accelerations(
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length
     at = Motion(
-        x=0.0,
-        y=0.0,
-        psi=0.0,
-        u=fast * motion.u,
-        v=fast * motion.v,
-        r=quick * motion.r,
-        p=quick * motion.p,
-        phi=motion.phi,
-        q=quick * quick * motion.q,
-        delta=motion.delta,
+        x=0.0, y=0.0, psi=0.0, u=fast * motion.u, v=fast * motion.v, r=quick * motion.r, p=quick * motion.p,
+        phi=motion.phi, q=quick * quick * motion.q, delta=motion.delta,
         n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
-    )
+    )  # fmt: skip
     surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
     linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)

@@ -1,37 +1,19 @@
 """Mass and added mass that belong to a ship's accelerations, so that these can be turned into forces."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.shared_structure import SharedStructure
 
-Floats = NDArray[np.float64]
-
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Mass and added mass, those with which the model's equations divide its forces.
+    """Mass and added mass with which the model's equations divide its forces, shape (3, 4), SI units.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A reference ship has them in its own numbers; an identified structure in its particulars, which are
-        estimated where absent.
-    water_depth : float
-        m; the tanker's added mass grows in shallow water.
-
-    Returns
-    -------
-    array of shape (3, 4)
-        From the accelerations in surge, sway, yaw and roll to surge force, sway force and yaw moment about
-        midship; SI units.
-
-    Raises
-    ------
-    InputError
-        If the particulars do not tell the mass.
+    From the accelerations in surge, sway, yaw and roll to surge force, sway force and yaw moment about
+    midship. A reference ship has them in its own numbers (the tanker's grow in shallow water, depth in m), an
+    identified structure in its particulars, estimated where absent. Raises InputError if these do not tell
+    the mass.
     """
     own = {"container": _container, "kvlcc2": _kvlcc2}
     if model.structure == "tanker":
@@ -81,11 +63,7 @@ def _container(model: ManoeuvringModel) -> Floats:
     c, L = model.coefficients, model.particulars["length"]
     prime = np.zeros((3, 4))
     prime[0, 0] = c["m"] + c["mx"]
-    prime[1, 1], prime[1, 2], prime[1, 3] = (
-        c["m"] + c["my"],
-        c["my"] * c["alpha_y"] * L,
-        -c["my"] * c["ly"] * L,
-    )
+    prime[1, 1], prime[1, 3] = c["m"] + c["my"], -c["my"] * c["ly"] * L
     prime[1, 2] = prime[2, 1] = c["my"] * c["alpha_y"] * L
     prime[2, 2] = (c["Iz"] + c["Jz"]) * L * L
     return _prime_mass(model) * prime

@@ -6,8 +6,6 @@ of scale. `PACKAGE_FORM` chooses the variant of the package shipmmg 0.0.11, whic
 another point and has another law for the wake.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, pi, sqrt
 from typing import NamedTuple
 
@@ -150,33 +148,16 @@ def particulars(name: str, c: Coefficients, beam: float, speed: float) -> Partic
     """Of the ship at a scale: beam in m, service speed in m/s."""
     to_prime = c.d / c.L  # added masses are given by rho L^2 d / 2
     return Particulars(
-        name=name,
-        length=c.L,
-        beam=beam,
-        draught=c.d,
-        mass=1000.0 * c.volume,
-        xg=c.xG,
-        yaw_gyradius=0.25 * c.L,
-        block_coefficient=0.81,
-        speed=speed,
-        rudder_area=c.A_R,
-        propeller_diameter=c.D_P,
-        water_density=1000.0,
-        X_udot=-c.mx * to_prime,
-        Y_vdot=-c.my * to_prime,
-        Y_rdot=0.0,
-        N_vdot=0.0,
-        N_rdot=-c.Jz * to_prime,
-    )
+        name=name, length=c.L, beam=beam, draught=c.d, mass=1000.0 * c.volume, xg=c.xG,
+        yaw_gyradius=0.25 * c.L, block_coefficient=0.81, speed=speed, rudder_area=c.A_R,
+        propeller_diameter=c.D_P, water_density=1000.0, X_udot=-c.mx * to_prime, Y_vdot=-c.my * to_prime,
+        Y_rdot=0.0, N_vdot=0.0, N_rdot=-c.Jz * to_prime,
+    )  # fmt: skip
 
 
 SHIP = ShipEquations(
     "kvlcc2",
     "Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions",
-    Coefficients,
-    accelerations,
-    particulars("KVLCC2, 7 m model", Coefficients(), 1.27, 1.179),
-    SteeringGear(rudder_rate_deg_s=15.8),
-    service_shaft_speed=11.85159,
-    switches=("PACKAGE_FORM",),
-)
+    Coefficients, accelerations, particulars("KVLCC2, 7 m model", Coefficients(), 1.27, 1.179),
+    SteeringGear(rudder_rate_deg_s=15.8), service_shaft_speed=11.85159, switches=("PACKAGE_FORM",),
+)  # fmt: skip

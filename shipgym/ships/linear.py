@@ -11,65 +11,41 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
     from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 
 STEP = 1e-4  # of the finite differences, prime system; the error is its square
 SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed where surge is to be believed
 LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
 LARGEST_SWAY = 0.5  # over service speed, likewise
-AT_REST = 1e-8  # prime acceleration that is none
-BALANCED_BY = {
-    "u": "u",
-    "v": "v",
-    "delta": "r",
-    "phi": "p",
-    "q": "q",
-    "n": "n",
-}  # rate that each unknown brings to 0
+AT_REST = 1e-8  # prime acceleration that counts as zero
+# rate that each unknown brings to 0
+BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
 
 @dataclass(frozen=True)
 class StraightRunning:
-    """The steady state in which a ship holds its course.
+    """The steady state in which a ship holds its course."""
 
-    Attributes
-    ----------
-    surge, sway : float
-        Speeds along the body's axes, m/s.
-    rudder : float
-        The neutral rudder, rad, positive to starboard.
-    heel : float
-        Rad, starboard down; 0 where the model knows no roll.
-    shaft_speed : float
-        1/s; 0 where the model's shaft has no dynamics.
-    memory : float
-        Yaw acceleration that a table with a memory `q` keeps, rad/s^2.
-    """
-
+    # speeds along the body's axes, m/s
     surge: float
     sway: float
-    rudder: float
-    heel: float = 0.0
-    shaft_speed: float = 0.0
-    memory: float = 0.0
+    rudder: float  # the neutral rudder, rad, positive to starboard
+    heel: float = 0.0  # rad, starboard down; 0 where the model knows no roll
+    shaft_speed: float = 0.0  # 1/s; 0 where the model's shaft has no dynamics
+    memory: float = 0.0  # yaw acceleration that a table with a memory `q` keeps, rad/s^2
 
     def state(self, model: ShipModel) -> Floats:
         """The state vector, in the order of `model.state_names`, shape (n_state,)."""
         values = {
-            "u": self.surge,
-            "v": self.sway,
-            "delta": self.rudder,
-            "phi": self.heel,
-            "n": self.shaft_speed,
+            "u": self.surge, "v": self.sway, "delta": self.rudder, "phi": self.heel, "n": self.shaft_speed,
             "q": self.memory,
-        }
+        }  # fmt: skip
         return np.array([values.get(name, 0.0) for name in model.state_names])
 
 
@@ -80,24 +56,14 @@ class Nomoto:
         r / delta = K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)),    about    K / (1 + T s).
 
     K and T are positive for a ship stable on its course and negative for one that is not.
-
-    Attributes
-    ----------
-    K : float
-        Gain, 1/s.
-    T1, T2 : float
-        Time constants, the larger magnitude first, s; nan where the poles are a complex pair.
-    T3 : float
-        Time constant of the zero, s.
-    T : float
-        Time constant of the first-order form, T1 + T2 - T3, s.
     """
 
-    K: float
+    K: float  # gain, 1/s
+    # time constants, the larger magnitude first, s; nan where the poles are a complex pair
     T1: float
     T2: float
-    T3: float
-    T: float
+    T3: float  # time constant of the zero, s
+    T: float  # time constant of the first-order form, T1 + T2 - T3, s
 
     @property
     def rudder_effect(self) -> float:
@@ -109,23 +75,9 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
     """Speed, drift and neutral rudder at which a ship runs straight.
 
     A single-screw ship needs a little rudder to run straight (Mariner 1.1 degrees to port). Where the model's
-    surge equation has no steady speed near service speed, that of service is held.
-
-    Parameters
-    ----------
-    model : ShipModel
-    speed : float, optional
-        Surge speed that is held instead, m/s, with the shaft as at service speed: a ship that has lost
-        speed in a turn or in weather.
-
-    Returns
-    -------
-    StraightRunning
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course within physical drift and rudder angles.
+    surge equation has no steady speed near service speed, that of service is kept; so is `speed`, m/s, where
+    given, with the shaft as at service speed: a ship that has lost speed in a turn or in weather. Raises
+    InputError if the model has no straight course within physical drift and rudder angles.
     """
     found = None
     if speed is None:
@@ -173,13 +125,9 @@ def _scales(model: ShipModel) -> Floats:
     """Unit of each state in the prime system (the shaft's: its service speed), shape (n_state,)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     units = {
-        "u": speed,
-        "v": speed,
-        "r": speed / length,
-        "p": speed / length,
-        "q": (speed / length) ** 2,
+        "u": speed, "v": speed, "r": speed / length, "p": speed / length, "q": (speed / length) ** 2,
         "n": model.service_shaft_speed or 1.0,
-    }
+    }  # fmt: skip
     return np.array([units.get(name, 1.0) for name in model.state_names])
 
 
@@ -195,24 +143,13 @@ def _rates(model: ShipModel, states: Floats) -> Floats:
 def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Floats, Floats]:
     """Linear steering dynamics about a state without yaw rate, by differences.
 
-    Speed and shaft are held. Roll, where the model knows it, is taken to follow at once. Where even the
-    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken,
-    unless a side is given.
+    Speed and shaft are kept. Roll, where the model knows it, is taken to follow at once. Where even the
+    smallest turns to either side differ, as with the flow at KVLCC2's rudder, the mean of both is taken
+    (`side` 0), or the turns to starboard (1) or to port (-1).
 
-    Parameters
-    ----------
-    model : ShipModel
-    at : StraightRunning
-        The state about which small deviations are taken.
-    side : {0, 1, -1}
-        Of both sides the mean, or turns to starboard (1: drift to port, yaw rate to starboard), or to port.
-
-    Returns
-    -------
-    A : array of shape (2, 2)
-    B : array of shape (2, 1)
-        d/dt (v, r) = A (v, r) + B delta, deviations in SI units, delta positive to starboard; the memory q of
-        yaw stands in place of v in a table that has one, because its ship does not drift.
+    Returns A, shape (2, 2), and B, (2, 1), of d/dt (v, r) = A (v, r) + B delta: deviations in SI units, delta
+    positive to starboard. In a table with a memory q of yaw, whose ship does not drift, q stands in place of
+    v.
     """
     first = "q" if "q" in model.state_names else "v"
     names = (first, "r", *(name for name in ("p", "phi") if name in model.state_names))
@@ -238,22 +175,9 @@ def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Flo
 
 
 def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
-    """Linear steering dynamics about straight running.
+    """Linear steering dynamics about straight running: A and B of `linearise`.
 
-    Parameters
-    ----------
-    model : ShipModel
-
-    Returns
-    -------
-    A : array of shape (2, 2)
-    B : array of shape (2, 1)
-        d/dt (v, r) = A (v, r) + B delta, SI units, delta positive to starboard.
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course.
+    Raises InputError if the model has no straight course.
     """
     return linearise(model, straight_running(model))
 
@@ -261,19 +185,7 @@ def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:
     """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, equations 7.40 to 7.44).
 
-    Parameters
-    ----------
-    A : array of shape (2, 2)
-    B : array of shape (2, 1)
-
-    Returns
-    -------
-    Nomoto
-
-    Raises
-    ------
-    InputError
-        If a steady rudder does not turn the ship.
+    Raises InputError if a steady rudder does not turn the ship.
     """
     determinant, trace = float(np.linalg.det(A)), float(np.trace(A))
     numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
@@ -289,37 +201,15 @@ def nomoto_of(A: Floats, B: Floats) -> Nomoto:
 def nomoto(model: ShipModel) -> Nomoto:
     """Nomoto's transfer function of a ship about straight running.
 
-    Parameters
-    ----------
-    model : ShipModel
-
-    Returns
-    -------
-    Nomoto
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course, or its rudder no effect.
+    Raises InputError if the model has no straight course, or its rudder no effect.
     """
     return nomoto_of(*steering_state_space(model))
 
 
 def is_course_stable(model: ShipModel) -> bool:
-    """Whether the ship, with the rudder held, comes back to a straight course after a disturbance.
+    """Whether the ship, with the rudder fixed, comes back to a straight course after a disturbance.
 
-    Parameters
-    ----------
-    model : ShipModel
-
-    Returns
-    -------
-    bool
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course.
+    Raises InputError if the model has no straight course.
     """
     A, _ = steering_state_space(model)
     return bool(np.all(np.linalg.eigvals(A).real < 0.0))

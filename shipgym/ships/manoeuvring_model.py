@@ -1,14 +1,13 @@
 """The equations of motion of one ship with her numbers: what every simulation is made from."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
@@ -16,44 +15,18 @@ from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.equations import ShipEquations
-from shipgym.ships.orders import check_units
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import PRINTED, SHIPPED_EQUATIONS, get_dynamics, get_structure
 from shipgym.ships.term_table import Structure
 
-Floats = NDArray[np.float64]
 FORMAT = 1  # of model files
+FASTEST_SHAFT = 5.0  # times the shaft speed at service speed; beyond it stands in other units
 
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """A ship's structure and coefficients, how certain they are, and where they hold (see `ShipModel`).
-
-    Attributes
-    ----------
-    name : str
-        Name of the ship or of the model file.
-    structure : str
-        Name of its structure.
-    particulars : Particulars
-        Length, mass, added mass, service speed, ...; what was estimated is marked.
-    steering : SteeringGear
-        Rudder limit, rate and lag.
-    coefficients : dict of str to float
-        By name, in the normalisation of the structure, rudder positive to starboard.
-    covariance : array of shape (n_coefficients, n_coefficients) or None
-        Of the coefficients in their order; None where not identified.
-    envelope : Envelope or None
-        Of the data it was identified from.
-    provenance : dict or None
-        Method, settings, software version and trials it came from, or the source of a reference ship.
-    own_table : Structure, ShipEquations or None
-        The table of terms a model file came with, or a registered table or ship; by default what is shipped
-        under the structure's name.
-    service_shaft_speed : float
-        Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
-    """
+    """A ship's structure and coefficients, their uncertainty and envelope; fields as in `ShipModel`."""
 
     name: str
     structure: str
@@ -103,13 +76,7 @@ class ManoeuvringModel:
 
     @property
     def table(self) -> Structure:
-        """The table of terms of its structure.
-
-        Raises
-        ------
-        InputError
-            If the ship has equations written by hand instead.
-        """
+        """The table of terms of its structure; InputError for a ship with equations written by hand."""
         dynamics = self.dynamics
         return dynamics if isinstance(dynamics, Structure) else get_structure(self.structure)
 
@@ -126,23 +93,15 @@ class ManoeuvringModel:
     def ship_numbers(self, water_depth: float = np.inf) -> Floats:
         """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
 
-        Raises
-        ------
-        InputError
-            For water that is too shallow, and particulars that the structure cannot do with.
+        Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
         p, gear = self.particulars, self.steering
         ship = Ship(
-            length=p["length"],
-            speed=p["speed"],
-            rudder_limit=gear.limit,
-            rudder_rate=gear.rate,
+            length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
             gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-            shaft=self.service_shaft_speed,
-            water_depth=water_depth,
-            scale_speed=p["speed"],
-        )
+            shaft=self.service_shaft_speed, water_depth=water_depth, scale_speed=p["speed"],
+        )  # fmt: skip
         return np.concatenate([ship, self.dynamics.numbers(self.coefficients, p, self.service_shaft_speed)])
 
     @property
@@ -182,10 +141,6 @@ class ManoeuvringModel:
             In the order of `command_names`: rudder angle in rad, positive to starboard.
         water_depth : float
             In m; only deep water is known to identified structures.
-
-        Returns
-        -------
-        array of shape (..., n_state)
 
         Raises
         ------
@@ -228,12 +183,7 @@ class ManoeuvringModel:
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """Refuse water that is too shallow, or shallow water in a ship that knows none.
-
-        Raises
-        ------
-        InputError
-        """
+        """InputError for water that is too shallow, or shallow water and a ship that knows none."""
         if water_depth == np.inf:
             return
         check_number(water_depth, "water_depth", above=0.0, hint="in m, or inf for deep water")
@@ -260,3 +210,47 @@ def two_commands(commands: Floats) -> Floats:
     two = np.zeros((len(commands), 2))
     two[:, : commands.shape[1]] = commands
     return two
+
+
+def checked_orders(model: ManoeuvringModel, commands: ArrayLike) -> Floats:
+    """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
+
+    A rudder ordered beyond its limit is brought to the limit, as its gear would do; beyond a right angle it
+    was meant in other units. InputError names the first row out of range.
+    """
+    orders = np.asarray(commands, dtype=float)
+    names = model.command_names
+    if orders.ndim != 2 or orders.shape[1] != len(names) or len(orders) < 2:
+        raise InputError(
+            f"commands: shape {orders.shape} found, expected (n_steps, {len(names)}) for {', '.join(names)}, "
+            "with at least 2 steps"
+        )
+    check_units(model, orders)
+    if "n" in names and not model.turns_astern:
+        expected = f"a number >= 0: the equations of {model.name!r} hold for a shaft turning ahead only"
+        _within(orders[:, names.index("n")], 0.0, np.inf, "shaft speed", expected, "commands")
+    return orders
+
+
+def check_units(model: ManoeuvringModel, orders: Floats, where: str = "commands") -> None:
+    """InputError for orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
+    names = model.command_names
+    if not np.all(np.isfinite(orders)):
+        raise InputError(f"{where}: row {int(np.argwhere(~np.isfinite(orders))[0, 0])} is not finite")
+    if "delta" in names:
+        rudder = orders[:, names.index("delta")]
+        _within(rudder, -np.pi / 2, np.pi / 2, "rudder", "rad (not degrees) between -pi/2 and pi/2", where)
+    if "n" in names:
+        most = FASTEST_SHAFT * model.service_shaft_speed
+        expected = (
+            f"1/s (not rpm) between {-most if model.turns_astern else 0.0:.4g} and {most:.4g}; "
+            f"{model.service_shaft_speed:.4g} at service speed"
+        )
+        _within(orders[:, names.index("n")], -most, most, "shaft speed", expected, where)
+
+
+def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:
+    wrong = np.flatnonzero((values < low) | (values > high))
+    if len(wrong):
+        row = int(wrong[0])
+        raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")

@@ -8,8 +8,6 @@ of the rudder changes its sign, so that a positive rudder turns the ship to star
 terms are inside the coefficients: Y_r is Y_r' - m', X_vr is m', and so on.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 from shipgym.ships.particulars import Particulars
@@ -36,38 +34,18 @@ N = {
 
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
-    """The Mariner class reference ship.
-
-    Parameters
-    ----------
-    service_speed : float
-        Speed U0 about which the polynomials are expanded, m/s.
-
-    Returns
-    -------
-    ShipModel
-    """
+    """The Mariner class reference ship, expanded about a service speed U0 in m/s."""
     coefficients = {
         f"{force}_{term}": value * 1e-5 * (-1.0) ** term.count("d")
         for force, table in (("X", X), ("Y", Y), ("N", N))
         for term, value in table.items()
     }
     particulars = Particulars(
-        name="Mariner class cargo ship",
-        length=LENGTH,
-        beam=23.17,
-        draught=8.23,
-        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3,
-        xg=XG * LENGTH,
-        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
-        speed=service_speed,
-        water_density=WATER_DENSITY,
-        X_udot=-42e-5,
-        Y_vdot=-748e-5,
-        Y_rdot=-9.354e-5,
-        N_vdot=4.646e-5,
-        N_rdot=-43.8e-5,
-    )
+        name="Mariner class cargo ship", length=LENGTH, beam=23.17, draught=8.23,
+        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3, xg=XG * LENGTH,
+        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2), speed=service_speed, water_density=WATER_DENSITY,
+        X_udot=-42e-5, Y_vdot=-748e-5, Y_rdot=-9.354e-5, N_vdot=4.646e-5, N_rdot=-43.8e-5,
+    )  # fmt: skip
     return ShipModel(
         name="mariner",
         structure="abkowitz",

@@ -21,9 +21,7 @@ Format 1:
     provenance     null or an object
 """
 
-from __future__ import annotations
-
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -61,21 +59,9 @@ def load(path: Path, make: Callable[..., Model]) -> Model:
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
-    """The model that `ManoeuvringModel.to_dict` wrote.
+    """The model that `ManoeuvringModel.to_dict` wrote, made by `make` (`ShipModel`).
 
-    Parameters
-    ----------
-    fields : mapping
-        Content of a model file.
-    where : str
-        Start of each message.
-    make : type
-        `ShipModel`.
-
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
+    Raises InputError that starts with `where` and names the field at fault.
     """
     if "format" in fields and fields["format"] != FORMAT:
         raise InputError(
@@ -144,53 +130,53 @@ def _grey_box(
     if not isinstance(shaft, bool):
         raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
     return GreyBox(
-        structure.name,
-        structure.source,
-        structure.equations,
-        structure.normalisation,
-        structure.quantity,
-        read_model(reference, f"{where}.reference", make),
-        shaft,
-    )
+        structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
+        read_model(reference, f"{where}.reference", make), shaft,
+    )  # fmt: skip
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
-    equations = check_table(table.get("equations"), f"{where}.equations")
-    check_keys(equations, EQUATION_NAMES, f"{where}.equations")
-    for equation, terms in equations.items():
-        if not isinstance(terms, list) or not terms:
-            raise InputError(f"{where}.equations.{equation}: expected a list of terms")
-        for i, entry in enumerate(terms):
-            place = f"{where}.equations.{equation}[{i}]"
-            term = check_table(entry, place)
-            check_keys(term, ("name", "powers"), place)
-            check_text(term.get("name"), f"{place}.name")
-            check_keys(check_table(term.get("powers"), f"{place}.powers"), SYMBOLS, f"{place}.powers")
-    check_text(table.get("source"), f"{where}.source")
-    check_text(table.get("name"), f"{where}.name")
+    _check_lists(table.get("equations"), EQUATION_NAMES, SYMBOLS, ("name",), f"{where}.equations", "terms")
+    for name in ("source", "name"):
+        check_text(table.get(name), f"{where}.{name}")
     return Structure.from_dict(table)
 
 
 def _shared(table: Mapping[str, Any], where: str) -> Structure:
     """A table for the forces of captive tests."""
     shares = check_table(table["shares"], f"{where}.shares")
-    check_keys(shares, AXES, f"{where}.shares")
-    known = (*SYMBOLS, *ACCELERATIONS)
-    for axis in AXES:
-        listed = shares.get(axis)
-        if not isinstance(listed, list) or not listed:
-            raise InputError(f"{where}.shares.{axis}: expected a list of shares")
-        for i, entry in enumerate(listed):
-            place = f"{where}.shares.{axis}[{i}]"
-            share = check_table(entry, place)
-            check_keys(share, ("coefficient", "name", "powers", "sign"), place)
-            for name in ("coefficient", "name"):
-                check_text(share.get(name), f"{place}.{name}")
-            check_keys(check_table(share.get("powers"), f"{place}.powers"), known, f"{place}.powers")
-            check_number(share.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
-    check_text(table.get("source"), f"{where}.source")
-    check_text(table.get("name"), f"{where}.name")
+    listed = {axis: shares.get(axis) for axis in AXES} | dict(shares)
+    known, texts = (*SYMBOLS, *ACCELERATIONS), ("coefficient", "name")
+    _check_lists(listed, AXES, known, texts, f"{where}.shares", "shares", sign=True)
+    for name in ("source", "name"):
+        check_text(table.get(name), f"{where}.{name}")
     return SharedStructure.from_dict(table)
+
+
+def _check_lists(
+    value: Any,
+    equations: Collection[str],
+    symbols: Collection[str],
+    texts: tuple[str, ...],
+    where: str,
+    what: str,
+    sign: bool = False,
+) -> None:
+    """Check lists of terms by equation, each with texts, powers of symbols, and perhaps a sign."""
+    table = check_table(value, where)
+    check_keys(table, equations, where)
+    for equation, listed in table.items():
+        if not isinstance(listed, list) or not listed:
+            raise InputError(f"{where}.{equation}: expected a list of {what}")
+        for i, entry in enumerate(listed):
+            place = f"{where}.{equation}[{i}]"
+            term = check_table(entry, place)
+            check_keys(term, (*texts, "powers", *(("sign",) if sign else ())), place)
+            for name in texts:
+                check_text(term.get(name), f"{place}.{name}")
+            check_keys(check_table(term.get("powers"), f"{place}.powers"), symbols, f"{place}.powers")
+            if sign:
+                check_number(term.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
 
 
 def _coefficients(value: Any, structure: Structure | ShipEquations, where: str) -> dict[str, float]:
@@ -215,13 +201,7 @@ def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float
 
 
 def read_envelope(value: Any, where: str) -> Envelope | None:
-    """The envelope that `Envelope.to_dict` wrote; None for null.
-
-    Raises
-    ------
-    InputError
-        Naming the field at fault.
-    """
+    """The envelope that `Envelope.to_dict` wrote; None for null. InputError names the field at fault."""
     if value is None:
         return None
     table = check_table(value, where)

@@ -39,38 +39,22 @@ class Particulars(Mapping[str, Any]):
 
     Parameters
     ----------
-    length : float
-        Between perpendiculars, m.
     name : str
         The ship's name.
-    beam, draught : float, optional
-        m.
-    mass : float, optional
-        Displacement mass, kg.
-    xg : float, optional
-        Centre of gravity forward of midship, m.
-    yaw_gyradius : float, optional
-        Radius of gyration in yaw about the centre of gravity, m.
-    block_coefficient : float, optional
-        Displaced volume by length * beam * draught.
-    speed : float, optional
-        Service speed, m/s.
-    rudder_area : float, optional
-        Movable area, m2.
-    propeller_diameter : float, optional
-        m.
-    length_overall : float, optional
-        m.
-    frontal_area, lateral_area : float, optional
-        Projected areas above the water seen from ahead and from the side, m2.
-    lateral_centroid : float, optional
-        Centroid of the lateral area forward of midship, m.
-    lateral_centroid_height : float, optional
-        Centroid of the lateral area above the water, m.
-    metacentric_height : float, optional
-        Transverse, GM, m.
-    roll_period : float, optional
-        Natural period of roll, s.
+    length, beam, draught : float
+        Length between perpendiculars, beam and draught, m; all but the length are optional.
+    mass, xg, yaw_gyradius : float, optional
+        Displacement mass, kg; centre of gravity forward of midship, m; radius of gyration in yaw about it, m.
+    block_coefficient, speed : float, optional
+        Displaced volume by length * beam * draught; service speed, m/s.
+    rudder_area, propeller_diameter : float, optional
+        Movable area of the rudder, m2; m.
+    length_overall, frontal_area, lateral_area : float, optional
+        m; projected areas above the water seen from ahead and from the side, m2.
+    lateral_centroid, lateral_centroid_height : float, optional
+        Centroid of the lateral area forward of midship and above the water, m.
+    metacentric_height, roll_period : float, optional
+        Transverse, GM, m; natural period of roll, s.
     water_density : float, optional
         kg/m3.
     X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot : float, optional
@@ -197,12 +181,7 @@ class Particulars(Mapping[str, Any]):
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass from the block
         coefficient, X_udot five per cent of the mass, the other added masses by the regressions of Clarke,
         Gedling and Hine 1983 (The application of manoeuvring criteria in hull design using linear theory,
-        Transactions of RINA 125).
-
-        Raises
-        ------
-        InputError
-            Naming what is missing, where not even that is possible.
+        Transactions of RINA 125). Raises InputError, naming what is missing, where not even that is possible.
         """
         ship = self
         for name, estimate in _ESTIMATES.items():

@@ -16,8 +16,6 @@ How the damaged print is read
   matrix of equation 42 and Table 2 have v |r|, and equation 41 r |r|: so here.
 """
 
-from __future__ import annotations
-
 from shipgym.ships.shared_structure import read_shares, shared_structure
 
 XU = (

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
@@ -17,9 +17,8 @@ from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    pass
 
-Floats = NDArray[np.float64]
 
 #: Powers of the length with which the particulars grow; those without unit stay.
 GROWTH = {
@@ -49,10 +48,6 @@ def scale_model(
     water_density : float, optional
         Of its water, kg/m3; by default as it was.
 
-    Returns
-    -------
-    ShipModel
-
     Raises
     ------
     InputError
@@ -78,12 +73,13 @@ def scale_model(
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
     factors = _coefficient_factors(table, model, size, fast)
+    scale = np.array(list(factors.values()))
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
         steering=_steering(model.steering, fast / size),
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
-        covariance=_covariance(model.covariance, factors),
+        covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
         envelope=_envelope(model.envelope, np.array([fast, fast, fast / size, 1.0])),
         provenance=(model.provenance or {})
         | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
@@ -114,14 +110,6 @@ def _particulars(ship: Particulars, size: float, speed: float, water_density: fl
 
 def _steering(gear: SteeringGear, quicker: float) -> SteeringGear:
     return SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker)
-
-
-def _covariance(covariance: Floats | None, factors: Mapping[str, float]) -> Floats | None:
-    if covariance is None:
-        return None
-    scale = np.array(list(factors.values()))
-    scaled: Floats = covariance * np.outer(scale, scale)
-    return scaled
 
 
 def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:

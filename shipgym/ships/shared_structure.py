@@ -14,14 +14,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term
-
-Floats = NDArray[np.float64]
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")
@@ -30,21 +28,11 @@ VR, RR, UR = Term("vr", (("v", 1), ("r", 1))), Term("rr", (("r", 2),)), Term("ur
 
 @dataclass(frozen=True)
 class Share:
-    """A coefficient's share in the force of one equation: sign times coefficient times term.
+    """A coefficient's share in the force of one equation: sign times coefficient times term."""
 
-    Attributes
-    ----------
-    coefficient : str
-        Its name: `Y_vdot`.
-    term : Term
-        Of velocities, or one acceleration (`udot`, `vdot`, `rdot`).
-    sign : float
-        1 or -1.
-    """
-
-    coefficient: str
-    term: Term
-    sign: float = 1.0
+    coefficient: str  # its name: `Y_vdot`
+    term: Term  # of velocities, or one acceleration (`udot`, `vdot`, `rdot`)
+    sign: float = 1.0  # 1 or -1
 
     @property
     def acceleration(self) -> str | None:
@@ -64,13 +52,9 @@ class SharedStructure(Structure):
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the shares, alike for
     sway and yaw, and the centripetal ones of the ship's own mass. Make one by `shared_structure`.
-
-    Attributes
-    ----------
-    shares : dict of str to tuple of Share
-        What makes up X (`u`), Y (`v`) and N (`r`).
     """
 
+    # what makes up X (`u`), Y (`v`) and N (`r`)
     shares: Mapping[str, tuple[Share, ...]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -114,10 +98,7 @@ class SharedStructure(Structure):
     def inertia(self, coefficients: Mapping[str, float], particulars: Particulars) -> Floats:
         """Mass of the ship and identified added mass, prime system, shape (3, 3).
 
-        Raises
-        ------
-        InputError
-            If it is not positive, or the particulars do not tell the mass.
+        Raises InputError if it is not positive, or the particulars do not tell the mass.
         """
         m, static = particulars.mass_prime, particulars.mass_prime * particulars.xg_prime
         rigid = np.array([[m, 0.0, 0.0], [0.0, m, static], [0.0, static, particulars.inertia_prime]])
@@ -163,13 +144,7 @@ class SharedStructure(Structure):
         return force
 
     def acceleration_matrix(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
-        """None: the added masses are among the unknowns, which free-running trials cannot tell apart.
-
-        Raises
-        ------
-        InputError
-            Always.
-        """
+        """InputError: free-running trials cannot tell the unknown added masses from the mass."""
         raise InputError(
             f"structure '{self.name}': free-running trials found, expected captive tests with the channels "
             "X, Y, N: its added masses are among the unknowns; use identification.identify_forces"
@@ -197,24 +172,7 @@ class SharedStructure(Structure):
 
 
 def shared_structure(name: str, source: str, shares: Mapping[str, tuple[Share, ...]]) -> SharedStructure:
-    """A table for forces from its shares.
-
-    Parameters
-    ----------
-    name, source : str
-        Of the table.
-    shares : dict of str to tuple of Share
-        Of the equations `u`, `v`, `r`.
-
-    Returns
-    -------
-    SharedStructure
-
-    Raises
-    ------
-    InputError
-        For a table that cannot be computed.
-    """
+    """A table for forces from the shares of equations `u`, `v`, `r`; InputError if it cannot be computed."""
     velocity = {
         axis: [share.term for share in listed if share.acceleration is None]
         for axis, listed in shares.items()
@@ -230,17 +188,10 @@ def _distinct(terms: list[Term]) -> tuple[Term, ...]:
 
 
 def read_shares(text: str) -> tuple[Share, ...]:
-    """Shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`, and others given as `Y_vdot:vr`.
+    """Shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`, separated by spaces.
 
-    Parameters
-    ----------
-    text : str
-        Separated by spaces; after a colon the term where it is not that of the coefficient's name, a leading
-        minus for the sign.
-
-    Returns
-    -------
-    tuple of Share
+    After a colon stands the term where it is not that of the coefficient's name, as in `Y_vdot:vr`; a leading
+    minus is the sign.
     """
     shares = []
     for word in text.split():

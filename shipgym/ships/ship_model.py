@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
@@ -18,8 +19,6 @@ from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import load, read_model
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,10 +102,6 @@ class ShipModel(ManoeuvringModel):
         seed : int or Generator
             Of the draw.
 
-        Returns
-        -------
-        list of ShipModel
-
         Raises
         ------
         InputError
@@ -136,23 +131,14 @@ class ShipModel(ManoeuvringModel):
 
     @classmethod
     def load(cls, path: str | Path) -> ShipModel:
-        """Read a model file.
-
-        Raises
-        ------
-        InputError
-            Naming the file and the field at fault.
-        """
+        """Read a model file; InputError, naming the file and the field at fault."""
         return load(Path(path), cls)
 
     @classmethod
     def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> ShipModel:
         """The model of what `to_dict` gave, or a model file holds.
 
-        Raises
-        ------
-        InputError
-            Naming the field at fault, after `where`.
+        Raises InputError, naming the field at fault, after `where`.
         """
         return read_model(fields, where, cls)
 

@@ -1,21 +1,18 @@
 """Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage, Seed
-from shipgym.ships.manoeuvring_model import ManoeuvringModel, two_commands
-from shipgym.ships.orders import checked_orders
+from shipgym.ships.manoeuvring_model import ManoeuvringModel, checked_orders, two_commands
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
-Floats = NDArray[np.float64]
 LONGEST_STEP = 0.025  # of the time to travel one ship length
 
 
@@ -45,26 +42,10 @@ def simulate(
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
 
-    The rudder is taken straight between the samples, as measured: no steering gear stands between.
-
-    Parameters
-    ----------
-    model : ManoeuvringModel
-        The ship.
-    trial : Trial
-        With the channels u, v, r, psi, delta (x and y where recorded; n where the model has a shaft).
-
-    Returns
-    -------
-    Trial
-        The simulated state at the times of the trial.
-
-    Raises
-    ------
-    InputError
-        If a channel is missing.
-    UnstableModelError
-        Where the simulated ship leaves every physical range.
+    The rudder is taken straight between the samples, as measured: no steering gear stands between. The trial
+    has u, v, r, psi, delta (x and y where recorded; n where the model has a shaft); the result is the
+    simulated state at its times. Raises InputError if a channel is missing, UnstableModelError where the
+    simulated ship leaves every physical range.
     """
     needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
     missing = [name for name in needed if name not in trial.channels]

@@ -4,37 +4,28 @@ Sources: Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SN
 Principles of Naval Architecture III, chapter IX, section 4 (the criterion C).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.ships.ship_model import ShipModel
 
-Floats = NDArray[np.float64]
 SIDES = {"starboard": 1, "port": -1}
 
 
 @dataclass(frozen=True)
 class StraightLineStability:
-    """Straight-line stability with the rudder held.
+    """Straight-line stability with the rudder held."""
 
-    Attributes
-    ----------
-    eigenvalues : dict of str to tuple of complex
-        Of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part
-        first. They are the same for a ship alike to both sides.
-    criterion : dict of str to float, or None
-        C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
-        where the particulars do not tell the mass.
-    """
-
+    # of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part first.
+    # They are the same for a ship alike to both sides
     eigenvalues: dict[str, tuple[complex, ...]]
+    # C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
+    # where the particulars do not tell the mass
     criterion: dict[str, float] | None
 
     @property
@@ -54,26 +45,11 @@ class StraightLineStability:
 
 
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
-    """Straight-line stability of a ship about straight running, rudder, speed and shaft held.
+    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll at once.
 
-    Parameters
-    ----------
-    model : ShipModel
-        Any ship that sails; roll is taken to follow at once.
-
-    Returns
-    -------
-    StraightLineStability
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course.
-
-    Notes
-    -----
     The criterion is the determinant of the linear derivatives of force, which is that of the inertia times
-    that of the linearised accelerations; the inertia is positive, so both tell the same.
+    that of the linearised accelerations; the inertia is positive, so both tell the same. Raises InputError if
+    the model has no straight course.
     """
     at = straight_running(model)
     matrices = {name: linearise(model, at, side)[0] for name, side in SIDES.items()}

@@ -5,18 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
-from typing import Any, TypedDict
+from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table
 
-
-class _Bounds(TypedDict, total=False):
-    above: float
-    at_least: float
-    at_most: float
-
-
-_BOUNDS: dict[str, _Bounds] = {
+_BOUNDS: dict[str, dict[str, Any]] = {
     "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
     "rudder_rate_deg_s": {"above": 0.0},
     "time_constant": {"at_least": 0.0},
@@ -58,19 +51,9 @@ class SteeringGear:
 
     @classmethod
     def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> SteeringGear:
-        """Make a steering gear from the keys of the ship file's ``[steering]``.
+        """A steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
 
-        Parameters
-        ----------
-        mapping : mapping of str to float
-            Any of ``rudder_limit_deg``, ``rudder_rate_deg_s``, ``time_constant``.
-        where : str, optional
-            Start of each message, such as ``"ship.toml: [steering]"``.
-
-        Raises
-        ------
-        InputError
-            For an unknown key or a value out of bounds.
+        Raises InputError, beginning with `where`, for an unknown key or a value out of bounds.
         """
         table = check_table(mapping, where)
         check_keys(table, [field.name for field in fields(cls)], where)

@@ -1,7 +1,5 @@
 """The printed structures by name, and those that users register."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -27,11 +25,7 @@ ABKOWITZ = Structure(
     name="abkowitz",
     source="Chislett & Strom-Tejsen 1965, Planar motion mechanism tests and full-scale steering and "
     "manoeuvring predictions for a Mariner class vessel; Cao 2015, equations 13 to 17",
-    equations={
-        "u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"),
-        "v": SWAY_AND_YAW,
-        "r": SWAY_AND_YAW,
-    },
+    equations={"u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"), "v": SWAY_AND_YAW, "r": SWAY_AND_YAW},
 )
 
 
@@ -151,10 +145,7 @@ def list_structures() -> list[str]:
 def get_structure(name: str) -> Structure:
     """An identified structure by name.
 
-    Raises
-    ------
-    InputError
-        If there is none of that name, or it is the grey box, which takes a reference ship.
+    Raises InputError if there is none of that name, or it is the grey box, which takes a reference ship.
     """
     if name == WITH_REFERENCE:
         raise InputError(
@@ -165,13 +156,7 @@ def get_structure(name: str) -> Structure:
 
 
 def get_dynamics(name: str) -> Structure | ShipEquations:
-    """A structure, or the equations of a ship that has her own, by name.
-
-    Raises
-    ------
-    InputError
-        If there is none of that name.
-    """
+    """A structure, or the equations of a ship that has her own, by name; InputError if there is none."""
     return EQUATIONS[name] if name in EQUATIONS else get_structure(name)
 
 
@@ -201,10 +186,6 @@ def register_structure(
         Units of the terms; see `Structure`.
     quantity : {"acceleration", "force"}
         What they make up; forces need the ship's mass and added mass.
-
-    Returns
-    -------
-    Structure
 
     Raises
     ------

@@ -5,8 +5,6 @@ form of the function `tanker` of the MSS toolbox (Fossen 1994). Bis system: per 
 The source's rudder is positive to port; here it is turned.
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs
 from typing import NamedTuple
 
@@ -119,18 +117,12 @@ SHIP = ShipEquations(
     Coefficients,
     accelerations,
     Particulars(
-        name="Esso 190 000 dwt tanker",
-        length=LENGTH,
-        beam=47.17,
-        draught=DRAUGHT,
-        mass=220_000.0 * 1025.0,
-        block_coefficient=0.83,
-        speed=8.225749013527,
-        water_density=1025.0,
+        name="Esso 190 000 dwt tanker", length=LENGTH, beam=47.17, draught=DRAUGHT, mass=220_000.0 * 1025.0,
+        block_coefficient=0.83, speed=8.225749013527, water_density=1025.0,
     ),
     SteeringGear(rudder_rate_deg_s=2.33, time_constant=1.0),
     shaft_acceleration=shaft_acceleration,
     service_shaft_speed=80.0 / 60.0,
     shallow_water=True,
     astern=True,
-)
+)  # fmt: skip

@@ -4,8 +4,6 @@ The function is written from the powers of the terms alone: fixed symbols, numbe
 numbers, so that no name or text of a model file becomes part of a program.
 """
 
-from __future__ import annotations
-
 import hashlib
 import linecache
 from collections import Counter
@@ -56,14 +54,10 @@ class Sum:
 
 
 def accelerations_source(sums: Mapping[str, Sum], damped: bool = True) -> str:
-    """Source of `accelerations(motion, c, ship)` for some equations: a factored sum of terms for each.
+    """Source of `accelerations(motion, c, ship)`: a factored sum of terms for each equation.
 
-    Parameters
-    ----------
-    sums : mapping of str to Sum
-        Of equations `u`, `v`, `r`, `p`, `q`; coefficients are numbered in their order.
-    damped : bool
-        Whether drift and turn die out where there is no equation of them; else their rate is 0.
+    Coefficients are numbered in the equations' order. `damped`: whether drift and turn die out where there is
+    no equation of them; else their rate is 0.
     """
     scaled = any(power < 0 for one in sums.values() for power in one.speed_powers)
     used: set[str] = set()
@@ -105,19 +99,10 @@ def coefficients_record(n: int, name: str = "TermCoefficients") -> Record:
 
 
 def factored(monomials: Sequence[Monomial]) -> str:
-    """A sum of products with what they share taken out, symbol by symbol (Horner's scheme).
+    """Python source of a sum of products with what they share taken out, symbol by symbol (Horner's scheme).
 
-    Half as many operations as a sum of products, and short chains of them: three times as fast.
-
-    Parameters
-    ----------
-    monomials : sequence of tuple of str and dict of str to int
-        Coefficient, and powers of the variables, of each term.
-
-    Returns
-    -------
-    str
-        Of Python source.
+    Half as many operations as a sum of products, and short chains of them: three times as fast. A monomial is
+    its coefficient and the powers of its variables.
     """
     shared = Counter(variable for _, powers in monomials for variable in powers)
     variable, count = shared.most_common(1)[0] if shared else ("", 0)

@@ -12,8 +12,8 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.engine.parts import Part
 from shipgym.engine.vessel import Vessel
@@ -26,8 +26,6 @@ from shipgym.ships.term_functions import (
     coefficients_record,
 )
 from shipgym.ships.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
-
-Floats = NDArray[np.float64]
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 #: As Zhu 2018 names the coefficients of surge, sway and yaw; roll, and the memory of yaw, go on from there.
@@ -243,16 +241,9 @@ class Structure:
         return 3 if equation == "q" else 2
 
     def feature_scale(self, equation: str, term: Term, length: float, speed: float, shaft: float) -> float:
-        """Coefficient of the SI feature that makes the term an acceleration for a coefficient of 1.
+        """Coefficient of the SI feature that makes a term an acceleration for a coefficient of 1.
 
-        Parameters
-        ----------
-        equation : str
-            `u`, `v`, `r`, `p` or `q`.
-        term : Term
-            One of its terms.
-        length, speed, shaft : float
-            Ship length, m, service speed, m/s, and shaft speed at service speed, 1/s.
+        Length of the ship in m, service speed in m/s and shaft speed at service speed in 1/s.
         """
         if self.normalisation == "si":
             return 1.0
@@ -266,23 +257,11 @@ class Structure:
     def features(
         self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Terms of one equation on samples, in SI units.
+        """Terms of one equation on samples, in SI units: what the acceleration is a linear combination of.
 
-        Parameters
-        ----------
-        equation : str
-            `u`, `v`, `r`, `p` or `q`.
-        channels : mapping of str to array of shape (n_samples,)
-            At least those of its terms and u, v; SI units.
-        particulars : Particulars
-            Gives the service speed.
-        shaft_speed : float
-            At service speed, 1/s.
-
-        Returns
-        -------
-        array of shape (n_samples, n_terms)
-            Features of which the acceleration is a linear combination.
+        Channels, each of shape (n_samples,), are at least those of its terms and u, v, in SI units; the
+        service speed is in the particulars, the shaft speed that at service speed, 1/s. Returns shape
+        (n_samples, n_terms).
         """
         u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
         offsets = {"du": particulars["speed"], "dn": shaft_speed}
@@ -301,28 +280,13 @@ class Structure:
         return np.stack(columns, axis=-1)
 
     def acceleration_matrix(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
-        """Matrix from the coefficients to those of the SI features of the accelerations.
+        """Square, invertible matrix from the coefficients to those of the SI features of the accelerations.
 
-        Forces are divided by inertia: surge by m' - X_udot', sway and yaw, which must have the same terms,
-        by their 2x2 inertia [[m' - Y_vdot', m'xG' - Y_rdot'], [m'xG' - N_vdot', Iz' - N_rdot']]
-        (Chislett & Strom-Tejsen 1965), either alone by its own entry of that.
-
-        Parameters
-        ----------
-        particulars : Particulars
-            Of forces with mass, inertia and added mass (`Particulars.completed`).
-        shaft_speed : float
-            At service speed, 1/s.
-
-        Returns
-        -------
-        array of shape (n_coefficients, n_coefficients)
-            Invertible, so that identified features give coefficients.
-
-        Raises
-        ------
-        InputError
-            If the inertia is not positive, or the shaft speed is needed and not known.
+        Forces are divided by inertia: surge by m' - X_udot', sway and yaw, which must have the same terms, by
+        their 2x2 inertia [[m' - Y_vdot', m'xG' - Y_rdot'], [m'xG' - N_vdot', Iz' - N_rdot']] (Chislett &
+        Strom-Tejsen 1965), either alone by its own entry of that. Particulars of forces have mass, inertia
+        and added mass (`Particulars.completed`). Raises InputError if the inertia is not positive, or the
+        shaft speed at service speed, 1/s, is needed and not known.
         """
         if self.needs_shaft_speed and not shaft_speed > 0.0:
             raise InputError(
@@ -395,10 +359,7 @@ def _vessel(source: str, n_terms: int, state_names: tuple[str, ...], lag: bool) 
 def inertia(particulars: Particulars) -> Floats:
     """Mass, yaw inertia and added mass of surge, sway and yaw, prime system, shape (3, 3).
 
-    Raises
-    ------
-    InputError
-        If it is not positive.
+    Raises InputError if it is not positive.
     """
     p = particulars
     m, xg = p.mass_prime, p.xg_prime

@@ -1,7 +1,5 @@
 """Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 
@@ -26,17 +24,10 @@ LARGEST_POWER = 9
 
 @dataclass(frozen=True)
 class Term:
-    """A product of integer powers of symbols, in the units of the structure.
+    """A product of integer powers of symbols, in the units of the structure."""
 
-    Attributes
-    ----------
-    name : str
-        As the field writes it: `vvr`, `0u`, `dd`, `|v|r`.
-    powers : tuple of (str, int)
-        Symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative.
-    """
-
-    name: str
+    name: str  # as the field writes it: `vvr`, `0u`, `dd`, `|v|r`
+    # symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative
     powers: tuple[tuple[str, int], ...]
 
     def power(self, *symbols: str) -> int:
@@ -44,13 +35,7 @@ class Term:
         return sum(power for symbol, power in self.powers if symbol in symbols)
 
     def check(self, where: str) -> None:
-        """Refuse symbols and powers that cannot be computed.
-
-        Raises
-        ------
-        InputError
-            Naming the term.
-        """
+        """InputError, naming the term, for symbols and powers that cannot be computed."""
         for symbol, power in self.powers:
             if symbol not in SYMBOLS:
                 raise InputError(
@@ -68,23 +53,11 @@ class Term:
 
 
 def read_terms(text: str) -> tuple[Term, ...]:
-    """Terms from formulas separated by commas.
+    """Terms from formulas separated by commas; InputError names one that cannot be read.
 
-    Parameters
-    ----------
-    text : str
-        Each formula is a product of symbols (`SYMBOLS`), written side by side with spaces between, with
-        powers after `^` and the speed U also below a stroke: `"v, |v| r, v^3/U, n^2 delta"`. `1` is the
-        constant. The name of a term is its formula without spaces and carets, `d` for `delta`: `v3/U`, `n2d`.
-
-    Returns
-    -------
-    tuple of Term
-
-    Raises
-    ------
-    InputError
-        For a formula that cannot be read, naming it.
+    Each formula is a product of symbols (`SYMBOLS`), written side by side with spaces between, with powers
+    after `^` and the speed U also below a stroke: `"v, |v| r, v^3/U, n^2 delta"`. `1` is the constant. The
+    name of a term is its formula without spaces and carets, `d` for `delta`: `v3/U`, `n2d`.
     """
     return tuple(_read_term(formula.strip()) for formula in text.split(","))
 

@@ -84,8 +84,9 @@ class Readings(NamedTuple):
     phi: float  # rad
     delta: float  # rad
     n: float  # 1/s
-    north: float  # m/s, over ground
-    east: float  # m/s
+    track_psi: float  # rad, heading to which the velocity over ground is seen
+    ahead: float  # m/s, over ground, ahead
+    aside: float  # m/s, over ground, to starboard
 
 
 @dataclass(frozen=True)

@@ -1,177 +1,45 @@
-"""A task file as the engine takes it: read from a module, a path or a name, checked, and registered."""
+"""A task file as the engine takes it: read from a module, a path or a name, checked, and with another reward."""
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+import importlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
-from typing import Any, get_args
+from types import FunctionType
+from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_keys, check_number, check_whole, did_you_mean, quoted
-from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
+from shipgym.checks import check_keys, did_you_mean, quoted
+from shipgym.engine.records import Record, field_types, leaves
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen, Setting
+from shipgym.tasks.settings import annotated, keywords, make_settings
+from shipgym.tasks.source import check_namespace, check_settings, read_source
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
+MOMENT = ("motion", "state", "interval", "ship", "settings")
 FUNCTIONS = {
     "begin": ("ship", "settings", "random", "plan"),
-    "step": ("motion", "state", "interval", "ship", "settings"),
-    "observe": ("readings", "state", "interval", "ship", "settings"),
-    "due": ("motion", "state", "interval", "ship", "settings"),
-    "on_event": ("motion", "state", "interval", "ship", "settings", "random", "plan"),
+    "step": MOMENT,
+    "observe": ("readings", *MOMENT[1:]),
+    "due": MOMENT,
+    "on_event": (*MOMENT, "random", "plan"),
     "worst_cost": ("settings",),
+    "plan_length": ("settings",),
+    "check": ("settings", "model"),
+    "listed": ("value",),
 }
 NEEDED = ("begin", "step", "observe")
-
-
-@dataclass(frozen=True, eq=False)
-class TaskDefinition:
-    """Records and functions of a task (`shipgym.tasks.contract`).
-
-    Attributes
-    ----------
-    name : str
-        Of the task.
-    source : str
-        Where it was read from, for messages.
-    Settings, State, Reward, Observation : type
-        Its records.
-    begin, step, observe, due, on_event, worst_cost : callable
-        Its functions.
-    reported : tuple of str
-        Fields of the state that `info` has.
-    episode_steps : int
-        Control intervals after which an episode is truncated, by default.
-    plan_length, check, listed : callable
-        See the contract.
-    """
-
-    name: str
-    source: str
-    Settings: Record
-    State: Record
-    Reward: Record
-    Observation: Record
-    begin: Callable[..., Any]
-    step: Callable[..., Any]
-    observe: Callable[..., Any]
-    due: Callable[..., Any]
-    on_event: Callable[..., Any]
-    worst_cost: Callable[..., Any]
-    reported: tuple[str, ...] = ()
-    episode_steps: int = 600
-    plan_length: Callable[[Any], int] = lambda settings: 0
-    check: Callable[[Any, Any], None] = lambda settings, model: None
-    listed: Callable[[Any], Any] = np.asarray
-
-    @cached_property
-    def seen(self) -> dict[str, Seen]:
-        """How each quantity is observed, by its path in `Observation`."""
-        return dict(_annotated(self.Observation, Seen))
-
-    @cached_property
-    def settings(self) -> dict[str, Setting]:
-        """Bounds of each setting by its keyword."""
-        return dict(_keywords(self.Settings))
-
-    @cached_property
-    def flags(self) -> tuple[str, ...]:
-        """Reported fields that are true or false."""
-        kinds = field_types(self.State, notes=True)
-        return tuple(name for name in self.reported if bool in getattr(kinds[name], "__metadata__", ()))
-
-    @cached_property
-    def reward_names(self) -> tuple[str, ...]:
-        """Names of the parts of its reward."""
-        return tuple(path.rpartition(".")[2] for path in leaves(self.Reward))
-
-    def make_settings(self, options: Mapping[str, Any]) -> Any:
-        """Settings by keywords, checked.
-
-        Raises
-        ------
-        InputError
-            For an unknown keyword, or a value out of its range.
-        """
-        check_keys(options, self.settings, f"{self.name} options")
-        settings = _made(self.Settings, options, self.settings, self.listed)
-        self.check(settings, None)
-        return settings
-
-
-def _annotated(record: Record, kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """What the fields of a record are annotated with, by their paths."""
-    for name, hint in field_types(record, notes=True).items():
-        base = get_args(hint)[0] if get_args(hint) else hint
-        if is_record(base):
-            yield from _annotated(base, kind, f"{prefix}{name}.")
-            continue
-        notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, kind)]
-        yield prefix + name, notes[0] if notes else None
-
-
-def _keywords(record: Record) -> Iterator[tuple[str, Setting]]:
-    """Keywords of a record of settings: its fields, and those of records within it that have defaults."""
-    for name, hint in field_types(record, notes=True).items():
-        kind = get_args(hint)[0] if get_args(hint) else hint
-        notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Setting)]
-        if is_record(kind) and kind._field_defaults:
-            yield from _keywords(kind)
-        else:
-            yield name, notes[0] if notes else Setting("")
-
-
-def _made(
-    record: Record, options: Mapping[str, Any], bounds: Mapping[str, Setting], listed: Callable[[Any], Any]
-) -> Any:
-    """A record of settings, the given ones in place of its defaults."""
-    values: dict[str, Any] = {}
-    for name, hint in field_types(record).items():
-        default = record._field_defaults[name]  # type: ignore[attr-defined]
-        if is_record(hint) and hint._field_defaults:
-            values[name] = _made(hint, options, bounds, listed)
-        elif name not in options:
-            values[name] = default
-        elif is_list(hint):
-            values[name] = _list_of_numbers(options[name], name, bounds[name], listed)
-        elif is_record(hint):
-            values[name] = _small_record(hint, options[name], name, bounds[name])
-        else:
-            values[name] = _number(options[name], name, bounds[name])
-    return record(**values)
-
-
-def _number(value: Any, name: str, bounds: Setting) -> float:
-    if bounds.whole:
-        check_whole(value, name, at_least=int(bounds.at_least or 0))
-    return check_number(value, name, above=bounds.above, at_least=bounds.at_least, at_most=bounds.at_most)
-
-
-def _small_record(kind: Record, value: Any, name: str, bounds: Setting) -> Any:
-    names = kind._fields  # type: ignore[attr-defined]
-    words = " and ".join(f"the {word}" for word in names)
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(names):
-        raise InputError(f"{name}: {value!r} found, expected {words}")
-    return kind(
-        *[_number(one, f"{name}: the {word}", bounds) for one, word in zip(value, names, strict=True)]  # type: ignore[arg-type]
-    )
-
-
-def _list_of_numbers(value: Any, name: str, bounds: Setting, listed: Callable[[Any], Any]) -> Any:
-    if value is None:
-        return np.zeros(0)
-    numbers = np.asarray(listed(value))
-    if numbers.ndim != 1:
-        raise InputError(f"{name}: {value!r} found, expected a list")
-    if len(numbers) == 0:
-        raise InputError(f"{name}: none found, expected one at least, or None")
-    return np.array([_number(one, f"{name}: number {i}", bounds) for i, one in enumerate(numbers.tolist())])
+#: Names in `info` that are the engine's.
+TAKEN = ("reward", "terminated", "truncated", "envelope_distance", "extrapolating", "end")
+#: Registered tasks: name to module name.
+TASKS = {
+    "CourseKeeping": "shipgym.tasks.course_keeping",
+    "PathFollowing": "shipgym.tasks.path_following",
+}
 
 
 def never_due(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> bool:
@@ -189,15 +57,106 @@ def no_worst_cost(settings: Any) -> float:
     return 0.0
 
 
+def no_plan(settings: Any) -> int:
+    """Of a task that remembers its state alone."""
+    return 0
+
+
+def any_settings(settings: Any, model: Any) -> None:
+    """Of a task whose settings fit in any combination."""
+
+
+@dataclass(frozen=True)
+class TaskDefinition:
+    """Records and functions of a task (`shipgym.tasks.contract`).
+
+    Attributes
+    ----------
+    name : str
+        Of the task.
+    source : str
+        Where it was read from, for messages.
+    Settings, State, Reward, Observation : type
+        Its records.
+    begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
+        Its functions.
+    reported : tuple of str
+        Fields of the state that `info` has.
+    episode_steps : int
+        Control intervals after which an episode is truncated, by default.
+    """
+
+    name: str
+    source: str
+    Settings: Record
+    State: Record
+    Reward: Record
+    Observation: Record
+    begin: Callable[..., Any]
+    step: Callable[..., Any]
+    observe: Callable[..., Any]
+    due: Callable[..., Any] = never_due
+    on_event: Callable[..., Any] = no_event
+    worst_cost: Callable[..., Any] = no_worst_cost
+    plan_length: Callable[[Any], int] = no_plan
+    check: Callable[[Any, Any], None] = any_settings
+    listed: Callable[[Any], Any] = np.asarray
+    reported: tuple[str, ...] = ()
+    episode_steps: int = 600
+
+    @cached_property
+    def seen(self) -> dict[str, Seen]:
+        """How each quantity is observed, by its path in `Observation`."""
+        return dict(annotated(self.Observation, Seen))
+
+    @cached_property
+    def settings(self) -> dict[str, Setting]:
+        """Bounds of each setting by its keyword."""
+        return {name: setting for name, setting, _ in keywords(self.Settings)}
+
+    @cached_property
+    def flags(self) -> tuple[str, ...]:
+        """Reported fields that are true or false."""
+        kinds = field_types(self.State, notes=True)
+        return tuple(name for name in self.reported if bool in getattr(kinds[name], "__metadata__", ()))
+
+    @cached_property
+    def reward_names(self) -> tuple[str, ...]:
+        """Names of the parts of its reward."""
+        return tuple(path.rpartition(".")[2] for path in leaves(self.Reward))
+
+    @property
+    def shipped(self) -> bool:
+        """Whether its reward is one of the package's."""
+        return self.Reward.__module__.partition(".")[0] == __name__.partition(".")[0]
+
+    def make_settings(self, options: Mapping[str, Any]) -> Any:
+        """Settings by keywords, checked.
+
+        Raises
+        ------
+        InputError
+            For an unknown keyword, or a value out of its range.
+        """
+        check_keys(options, self.settings, f"{self.name} options")
+        settings = make_settings(self.Settings, options, self.listed)
+        self.check(settings, None)
+        return settings
+
+
+#: Definitions by themselves: one that is read again is the same object, so that it is looked at once.
+_KNOWN: dict[TaskDefinition, TaskDefinition] = {}
+
+
 def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
-    """The task of a module, a file, or one registered by name.
+    """The task of a module, a file, or one of the package's by name.
 
     Parameters
     ----------
     source : str, Path or module
-        A registered name, the path of a Python file, or a module or object with the names of the contract.
+        A name, the path of a Python file, or a module or object with the names of the contract.
     reward : str, Path or module, optional
-        Likewise, with a `Reward` and a `step` of its own, which take the place of the task's.
+        The path of a file, or a module, whose reward takes the place of the task's.
 
     Returns
     -------
@@ -208,70 +167,35 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     InputError
         If something is missing or of another form, naming it.
     """
-    if isinstance(source, TaskDefinition):
-        return source
+    definition = source if isinstance(source, TaskDefinition) else _definition(*_named(source))
+    if reward is not None:
+        definition = _with_reward(definition, reward)
+    _check_names(definition)
+    return _KNOWN.setdefault(definition, definition)
+
+
+def _named(source: Any) -> tuple[Any, str]:
     if isinstance(source, str) and source in TASKS:
-        namespace: Any = (
-            importlib.import_module(TASKS[source]) if isinstance(TASKS[source], str) else TASKS[source]
-        )
-    elif isinstance(source, str | Path) and Path(source).suffix == ".py":
-        namespace = load_file(Path(source))
-    elif isinstance(source, str):
+        return read_source(importlib.import_module(TASKS[source]))
+    if isinstance(source, str) and Path(source).suffix != ".py":
         raise InputError(
             f"task: {source!r} found, expected the path of a .py file or one of {quoted(TASKS)}."
             f"{did_you_mean(source, TASKS)}"
         )
-    else:
-        namespace = source
-    where = str(getattr(namespace, "__file__", None) or getattr(namespace, "__name__", source))
-    if reward is not None:
-        other = load_file(Path(reward)) if isinstance(reward, str | Path) else reward
-        namespace = SimpleNamespace(**{**vars(namespace), "Reward": other.Reward, "step": other.step})
-    return _definition(namespace, where)
+    return read_source(source)
 
 
 def _definition(namespace: Any, where: str) -> TaskDefinition:
-    for name in (*RECORDS, *NEEDED):
-        if not hasattr(namespace, name):
-            raise InputError(
-                f"{where}: no {name!r} found, expected {_what(name)} (see shipgym.tasks.contract)"
-            )
-    for name in RECORDS:
-        if not is_record(getattr(namespace, name)):
-            raise InputError(f"{where}: {name} is no NamedTuple, expected {_what(name)}")
-    functions: dict[str, Any] = {"due": never_due, "on_event": no_event, "worst_cost": no_worst_cost}
-    functions |= {name: getattr(namespace, name) for name in FUNCTIONS if hasattr(namespace, name)}
-    for name, function in functions.items():
-        _check_arguments(function, name, where)
-    name = getattr(namespace, "NAME", None) or Path(where).stem
-    optional: dict[str, Any] = {
-        key: getattr(namespace, key) for key in ("plan_length", "check", "listed") if hasattr(namespace, key)
-    }
+    optional = [name for name in FUNCTIONS if name not in NEEDED]
+    check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
+    check_settings(namespace.Settings, where)
     definition = TaskDefinition(
-        name=name, source=where, **{record: getattr(namespace, record) for record in RECORDS}, **functions,
+        name=getattr(namespace, "NAME", None) or Path(where).stem,
+        source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
-        episode_steps=getattr(namespace, "EPISODE_STEPS", 600), **optional,
-    )  # fmt: skip
-    _check_records(definition)
-    return definition
-
-
-def _what(name: str) -> str:
-    if name in RECORDS:
-        return f"a NamedTuple {name!r} of floats"
-    return f"a function {name}({', '.join(FUNCTIONS[name])})"
-
-
-def _check_arguments(function: Any, name: str, where: str) -> None:
-    code = getattr(function, "__code__", None)
-    expected = FUNCTIONS[name]
-    if code is None or code.co_argcount != len(expected):
-        found = f"{code.co_argcount} arguments" if code is not None else "no plain function"
-        raise InputError(f"{where}: {name}: {found} found, expected {_what(name)}")
-
-
-def _check_records(definition: TaskDefinition) -> None:
-    where = definition.source
+        episode_steps=getattr(namespace, "EPISODE_STEPS", 600),
+        **{name: getattr(namespace, name) for name in (*RECORDS, *FUNCTIONS) if hasattr(namespace, name)},
+    )
     for path, seen in definition.seen.items():
         if seen is None or not (np.isfinite(seen.low) and np.isfinite(seen.high) and seen.low < seen.high):
             raise InputError(
@@ -279,51 +203,66 @@ def _check_records(definition: TaskDefinition) -> None:
                 "Annotated[float, Seen(low, high, unit, scale)] with finite bounds"
             )
     for name in definition.reported:
-        if name not in definition.State._fields:  # type: ignore[attr-defined]
-            raise InputError(f"{where}: REPORTED: {name!r} found, expected fields of State")
-    names = definition.reward_names
-    for kind, words in (("Reward", names), ("Settings", tuple(k for k, _ in _keywords(definition.Settings)))):
-        twice = [name for name in words if words.count(name) > 1]
+        if name not in definition.State._fields or name in TAKEN:  # type: ignore[attr-defined]
+            raise InputError(f"{where}: REPORTED: {name!r} found, expected fields of State, none of {TAKEN}")
+    return definition
+
+
+def _check_names(definition: TaskDefinition) -> None:
+    where = definition.source
+    seen = tuple(path.rpartition(".")[2] for path in definition.seen)
+    settings = tuple(name for name, *_ in keywords(definition.Settings))
+    rewards = ("end", *definition.reward_names)
+    for kind, names in (("Reward", rewards), ("Settings", settings), ("Observation", seen)):
+        twice = [name for name in names if names.count(name) > 1]
         if twice:
+            also = "; the engine has one of that name" if twice[0] == "end" else ""
             raise InputError(
-                f"{where}: {kind}: two fields named {twice[0]!r} found, expected names that differ"
+                f"{where}: {kind}: two fields named {twice[0]!r} found, expected names that differ{also}"
             )
-    for name in definition.Settings._fields:  # type: ignore[attr-defined]
-        if name not in definition.Settings._field_defaults:  # type: ignore[attr-defined]
-            raise InputError(f"{where}: Settings.{name}: no default found, expected one")
 
 
-def load_file(path: Path) -> ModuleType:
-    """A Python file as a module, executed once however often it is asked for while it stays the same.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be executed.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file")
-    resolved = path.resolve()
-    name = f"shipgym_user_{abs(hash((str(resolved), resolved.stat().st_mtime_ns)))}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, resolved)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[name]
-        raise InputError(f"{path}: cannot be executed: {type(error).__name__}: {error}") from error
-    return module
+def task_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+    """The step of a task whose reward is another's: a place, filled by `_with_reward`."""
+    raise NotImplementedError
 
 
-#: Registered tasks: name to module name, or what was registered.
-TASKS: dict[str, Any] = {
-    "CourseKeeping": "shipgym.tasks.course_keeping",
-    "PathFollowing": "shipgym.tasks.path_following",
-}
+def another_reward(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+    """The other's reward: a place, filled by `_with_reward`."""
+    raise NotImplementedError
 
-__all__ = ["TASKS", "TaskDefinition", "load_file", "read_definition"]
+
+def rewarded_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+    """What the task does in an interval, and what another's reward gives for it."""
+    after, _, failed, arrived = task_step(motion, state, interval, ship, settings)
+    return after, another_reward(motion, after, interval, ship, settings), failed, arrived
+
+
+def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
+    """A task with the reward of another file: `Reward` and `reward`, or `Reward` and a whole `step`."""
+    namespace, where = read_source(source)
+    name = "step" if hasattr(namespace, "step") and not hasattr(namespace, "reward") else "reward"
+    functions = {name: MOMENT, "worst_cost": ("settings",)}
+    check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
+    step = getattr(namespace, name)
+    if name == "reward":
+        places = {"__name__": __name__, "task_step": definition.step, "another_reward": step}
+        step = _filled(places)
+    return replace(
+        definition,
+        Reward=namespace.Reward,
+        step=step,
+        worst_cost=getattr(namespace, "worst_cost", definition.worst_cost),
+    )
+
+
+_FILLED: dict[Any, FunctionType] = {}
+
+
+def _filled(places: dict[str, Any]) -> FunctionType:
+    """`rewarded_step` with its places filled, one function for the same ones."""
+    key = tuple(places.values())
+    return _FILLED.setdefault(key, FunctionType(rewarded_step.__code__, places, "rewarded_step"))
+
+
+__all__ = ["TASKS", "TaskDefinition", "read_definition"]

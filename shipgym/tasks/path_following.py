@@ -314,16 +314,14 @@ def observe(
 ) -> Observation:
     """The path from where the instruments show the ship, her course over ground against it, and the turn ahead."""
     at = fix(readings.x, readings.y, state, ship, settings)
-    least = STANDSTILL * ship.scale_speed
-    per_speed = 1.0 / sqrt(
-        max(readings.north * readings.north + readings.east * readings.east, least * least)
-    )
-    sine, cosine = sin_cos(at.course)
+    ahead, aside, least = readings.ahead, readings.aside, STANDSTILL * ship.scale_speed
+    per_speed = 1.0 / sqrt(max(ahead * ahead + aside * aside, least * least))
+    sine, cosine = sin_cos(at.course - readings.track_psi)
     return Observation(
         helm=helm(at.course, state.integral, readings, interval, ship),
         cross_track=at.cross,
-        course_error_sin=(sine * readings.north - cosine * readings.east) * per_speed,
-        course_error_cos=(cosine * readings.north + sine * readings.east) * per_speed,
+        course_error_sin=(sine * ahead - cosine * aside) * per_speed,
+        course_error_cos=(cosine * ahead + sine * aside) * per_speed,
         turn_distance=state.to_go,
         turn_angle=state.turn,
         extras=extras(readings, interval, ship),

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
+from shipgym.instruments.sensor_set import SensorSet, read_sensors
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
@@ -23,6 +24,7 @@ Floats = NDArray[np.float64]
 Sea = str | Weather
 
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
+ENVIRONMENT_KEYWORDS = ("model", "task", "reward", "render_mode", "allow_unstable", "num_envs", "threads")
 STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
@@ -88,6 +90,12 @@ class Task:
         at the frequency of encounter.
     water_depth : float
         m; for ships that know shallow water.
+    sensors : SensorSet, optional
+        Instruments of a user's own in place of `noise` and `measurement`; as a keyword, the path of their file.
+    sensor_settings : NamedTuple, optional
+        Their settings.
+    options : mapping
+        Keywords that it was made by.
     """
 
     definition: TaskDefinition
@@ -101,6 +109,8 @@ class Task:
     noise: float = 0.0
     measurement: str = "raw"
     water_depth: float = float("inf")
+    sensors: SensorSet | None = None
+    sensor_settings: Any = None
     options: Mapping[str, Any] = field(default_factory=dict, compare=False)
 
     def __post_init__(self) -> None:
@@ -113,6 +123,11 @@ class Task:
         check_choice(self.action, ACTIONS, "action")
         check_choice(self.measurement, MEASUREMENTS, "measurement")
         check_number(self.noise, "noise", at_least=0.0)
+        if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
+            raise InputError(
+                f"sensors: {self.sensors.source} and noise or measurement found, expected one of the two: "
+                "noise and filters of a sensor set of your own are its own settings"
+            )
 
     @classmethod
     def of(cls, definition: Any, **options: Any) -> Self:
@@ -124,18 +139,38 @@ class Task:
             For a keyword that it does not have, or a value out of range.
         """
         task = read_definition(definition, options.pop("reward", None))
-        check_keys(options, cls.option_names(task), f"{task.name} options")
+        sensors = None if options.get("sensors") is None else read_sensors(options["sensors"])
+        check_keys(options, cls.option_names(task, sensors), f"{task.name} options")
         own = {name: value for name, value in options.items() if name in task.settings}
-        common = {name: value for name, value in options.items() if name not in own}
-        return cls(
-            task, task.make_settings(own), **{"episode_steps": task.episode_steps, **common}, options=options
-        )
+        common = {name: value for name, value in options.items() if name in cls.common_names()}
+        common |= {"episode_steps": options.get("episode_steps", task.episode_steps), "sensors": sensors}
+        if sensors is not None:
+            of_sensors = {name: value for name, value in options.items() if name in sensors.settings}
+            common["sensor_settings"] = sensors.make_settings(of_sensors)
+        return cls(task, task.make_settings(own), **common, options=options)
 
     @classmethod
-    def option_names(cls, definition: TaskDefinition) -> tuple[str, ...]:
-        """Keywords of a task."""
-        common = [item.name for item in fields(cls)[2:] if item.name != "options"]
-        return (*definition.settings, *common)
+    def common_names(cls) -> tuple[str, ...]:
+        """Keywords of all tasks."""
+        return tuple(item.name for item in fields(cls)[2:] if item.name not in ("sensor_settings", "options"))
+
+    @classmethod
+    def option_names(cls, definition: TaskDefinition, sensors: SensorSet | None = None) -> tuple[str, ...]:
+        """Keywords of a task with a sensor set.
+
+        Raises
+        ------
+        InputError
+            If two of them have one name.
+        """
+        names = (*definition.settings, *cls.common_names())
+        if sensors is not None:
+            names = (*names, *sensors.settings)
+        for name in names:
+            if names.count(name) > 1 or name in ENVIRONMENT_KEYWORDS:
+                where = definition.source if name in definition.settings else sensors.source  # type: ignore[union-attr]
+                raise InputError(f"{where}: Settings.{name} found, which is a keyword already; rename it")
+        return names
 
     def changed(self, **options: Any) -> Task:
         """The same task with other options."""

@@ -1,7 +1,5 @@
 """Which column of a file holds which channel, in which unit, and where a sample stands in the file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -25,21 +23,11 @@ class Column:
 
 @dataclass(frozen=True)
 class Source:
-    """The file behind some samples, so that a message can name line, column and unit.
+    """The file behind some samples, so that a message can name line, column and unit."""
 
-    Attributes
-    ----------
-    table : CsvTable
-        The file.
-    columns : dict of str to Column
-        By channel, ``t`` included.
-    rows : ndarray of shape (n_samples,) of int
-        Row of the table behind each sample.
-    """
-
-    table: CsvTable
-    columns: Mapping[str, Column]
-    rows: npt.NDArray[np.intp]
+    table: CsvTable  # the file
+    columns: Mapping[str, Column]  # by channel, ``t`` included
+    rows: npt.NDArray[np.intp]  # shape (n_samples,); row of the table behind each sample
 
     def at(self, sample: int, channel: str) -> str:
         """Return the place of a value: ``run.csv: line 12 (data row 11), column 'yaw'``."""

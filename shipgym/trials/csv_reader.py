@@ -1,7 +1,5 @@
 """Reading numbers from CSV files: fast where the file is sound, exact about the place where it is not."""
 
-from __future__ import annotations
-
 import csv
 import math
 import re
@@ -24,27 +22,13 @@ _REMEDY_TEXT = "save the table as comma-separated text in UTF-8"
 
 @dataclass(frozen=True)
 class CsvTable:
-    """A CSV file, split into header and rows whose cells are not parsed yet.
+    """A CSV file, split into header and rows whose cells are not parsed yet."""
 
-    Attributes
-    ----------
-    path : Path
-        The file, for messages.
-    header : tuple of str
-        Names of the columns, stripped of blanks.
-    rows : list of str
-        The rows that are not blank.
-    line_numbers : list of int
-        Line of the file on which each row stands; the file begins with line 1.
-    delimiter : str
-        Comma, semicolon or tab.
-    """
-
-    path: Path
-    header: tuple[str, ...]
-    rows: list[str]
-    line_numbers: list[int]
-    delimiter: str
+    path: Path  # the file, for messages
+    header: tuple[str, ...]  # names of the columns, stripped of blanks
+    rows: list[str]  # the rows that are not blank
+    line_numbers: list[int]  # line of the file on which each row stands; the file begins with line 1
+    delimiter: str  # comma, semicolon or tab
 
     def place(self, row: int) -> str:
         """Return the place of a row for a message: ``line 12 (data row 11)``."""
@@ -53,10 +37,7 @@ class CsvTable:
     def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
         """Some columns as numbers, shape (n_rows, n_names); nan where a cell is empty or says nan or NA.
 
-        Raises
-        ------
-        InputError
-            For a missing column, a row with more or fewer cells than the header, or text in a number.
+        InputError for a missing column, a row with more or fewer cells than the header, or text in a number.
         """
         for name in names:
             if name not in self.header:
@@ -118,11 +99,8 @@ class CsvTable:
 def read_table(path: str | Path) -> CsvTable:
     """Read a CSV file in UTF-8 with one header line; delimiter comma, semicolon or tab.
 
-    Raises
-    ------
-    InputError
-        For a missing file, a folder, an empty or binary file, and a header without names or with a name
-        twice.
+    Raises InputError for a missing file, a folder, an empty or binary file, and a header with no names or
+    repeated ones.
     """
     path = Path(path)
     lines = _read_lines(path)

@@ -1,34 +1,24 @@
 """Time derivatives of sampled and noisy signals."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from shipgym.arrays import Floats
 
 _DEGREE = 5
 _FEWEST_SPANS = 8
 _STEEPEST_GROWTH = 0.8
 
 
-def time_derivative(t: Array, values: Array) -> Array:
+def time_derivative(t: Floats, values: Floats) -> Floats:
     """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
 
     Quintic splines are fitted by least squares with a knot at every second, third, fifth, ... sample. While
     the knots resolve the motion, the residual is the noise and hardly grows from one fit to the next, whether
     the noise is white or not; once they are too far apart it grows with a high power of their distance. The
     last fit before that growth is differentiated. Where it sets in at once, the samples hold no noise to
-    speak of and a cubic spline through all of them is differentiated.
-
-    Parameters
-    ----------
-    t : ndarray of shape (n_samples,)
-        Time, s, strictly increasing; the steps may differ.
-    values : ndarray of shape (n_samples,)
-        The signal, finite.
+    speak of and a cubic spline through all of them is differentiated. Steps of the time, s, may differ.
     """
     from scipy.interpolate import make_interp_spline, make_lsq_spline
 

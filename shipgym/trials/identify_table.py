@@ -30,32 +30,17 @@ WHOLE_OR_TEXT, TEXT_OR_TABLE = "a whole number or a text", "a text or a table"
 
 @dataclass(frozen=True)
 class Option:
-    """What is known of an option.
+    """What is known of an option."""
 
-    Attributes
-    ----------
-    section : str
-        Part of the documentation that it belongs to.
-    kind : str
-        A key of `KINDS`; in Python some options take objects besides.
-    meaning : str
-        What it sets, as the help of the command line says it.
-    choices : mapping of str to str
-        Meaning of each value that it may have; empty where there is no fixed set of them.
-    bounds : mapping
-        Keywords of `shipgym.checks.check_number`.
-    setting : bool
-        Whether it belongs to the method, which has a default of its own, and not to `identify`.
-    common : bool
-        Whether the command line has it by name; the others are given as `--set NAME=VALUE`.
-    """
-
-    section: str
-    kind: str
-    meaning: str
+    section: str  # part of the documentation that it belongs to
+    kind: str  # a key of `KINDS`; in Python some options take objects besides
+    meaning: str  # what it sets, as the help of the command line says it
+    # meaning of each value that it may have; empty where there is no fixed set of them
     choices: Mapping[str, str] = field(default_factory=dict)
-    bounds: Mapping[str, Any] = field(default_factory=dict)
+    bounds: Mapping[str, Any] = field(default_factory=dict)  # keywords of `shipgym.checks.check_number`
+    # whether it belongs to the method, which has a default of its own, and not to `identify`
     setting: bool = False
+    # whether the command line has it by name; the others are given as `--set NAME=VALUE`
     common: bool = False
 
 
@@ -89,12 +74,8 @@ _uncertainty, _prior = partial(_option, "uncertainty"), partial(_option, "prior"
 class Options:
     """The options of `identify`; each field says in its metadata what it is.
 
-    Settings of the method are None where they were not given: the method has defaults of its own.
-
-    Raises
-    ------
-    InputError
-        For an unknown uncertainty, and for settings of a prior without one.
+    Settings of the method are None where they were not given: the method has defaults of its own. Raises
+    InputError for an unknown uncertainty, and for settings of a prior without one.
     """
 
     structure: str = _model(TEXT, "terms of the model", "abkowitz", common=True)
@@ -268,13 +249,7 @@ class Options:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Options:
-        """Options by name.
-
-        Raises
-        ------
-        InputError
-            For a name that there is none of.
-        """
+        """Options by name; InputError for an unknown name."""
         for name in given:
             if name not in OPTIONS:
                 hint = did_you_mean(name, OPTIONS) or f" Options: {quoted(OPTIONS)}"
@@ -326,21 +301,8 @@ KINDS: dict[str, Callable[[Any], bool]] = {
 def check_options(table: Any, where: str) -> dict[str, Any]:
     """Check names, kinds and bounds of options; which of them fit together is known to the methods.
 
-    Parameters
-    ----------
-    table : mapping
-        Values by option.
-    where : str
-        Start of messages: ``"ship.toml: [identify]"``.
-
-    Returns
-    -------
-    dict
-
-    Raises
-    ------
-    InputError
-        For an unknown option, a value of another kind or out of bounds.
+    Raises InputError, which begins with `where` (``"ship.toml: [identify]"``), for an unknown option, a value
+    of another kind or out of bounds.
     """
     options = check_table(table, where)
     check_keys(options, OPTIONS, where)

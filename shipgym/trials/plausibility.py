@@ -1,7 +1,5 @@
 """Values that no ship can have, and channels that contradict each other: most often a wrong unit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any
@@ -9,33 +7,25 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
 
-Array = npt.NDArray[np.float64]
 _DEGREE = math.pi / 180.0
 
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
 LIMITS: dict[str, float] = {
-    "psi": 100.0,
-    "r": 60.0 * _DEGREE,
-    "p": 360.0 * _DEGREE,
-    "phi": 180.0 * _DEGREE,
-    "delta": 90.0 * _DEGREE,
-    "delta_command": 90.0 * _DEGREE,
-    "u": 50.0,
-    "v": 50.0,
-    "n": 200.0,
-    "n_command": 200.0,
-}
+    "psi": 100.0, "r": 60.0 * _DEGREE, "p": 360.0 * _DEGREE, "phi": 180.0 * _DEGREE, "delta": 90.0 * _DEGREE,
+    "delta_command": 90.0 * _DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
+}  # fmt: skip
 
 _FASTEST_TURN = 60.0 * _DEGREE
 _LARGEST_JUMP = 30.0 * _DEGREE
 _WINDOWS = 30
 
 
-def check_ranges(channels: Mapping[str, Array], source: Source) -> None:
+def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
     """Refuse values beyond :data:`LIMITS`, and name the unit that would make them plausible.
 
     The channels are in SI units, of shape (n_samples,); the source is the file, for messages.
@@ -57,7 +47,7 @@ def check_ranges(channels: Mapping[str, Array], source: Source) -> None:
         )
 
 
-def check_heading(t: Array, psi: Array, raw_psi: Array, source: Source) -> None:
+def check_heading(t: Floats, psi: Floats, raw_psi: Floats, source: Source) -> None:
     """Refuse a heading that turns faster than any ship.
 
     Single outliers of a noisy sensor pass; a jump of more than 30 degrees, or steps most of which are too
@@ -85,7 +75,7 @@ def check_heading(t: Array, psi: Array, raw_psi: Array, source: Source) -> None:
     )
 
 
-def check_consistency(t: Array, channels: Mapping[str, Array], frame: str, source: Source) -> None:
+def check_consistency(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
     """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
 
     Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
@@ -98,8 +88,8 @@ def check_consistency(t: Array, channels: Mapping[str, Array], frame: str, sourc
         _check_velocity(t, channels, frame, source)
 
 
-def _check_yaw_rate(t: Array, psi: Array, r: Array, source: Source) -> None:
-    turned, expected = (_detrended(t, part) for part in (psi, _integral(t, r)))
+def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
+    turned, expected = (_detrended(t, part) for part in (psi, integral(t, r)))
     if max(np.ptp(turned), np.ptp(expected)) < 2.0 * _DEGREE:
         return
     gain, misfit = _fit(np.diff(expected), np.diff(turned))
@@ -118,11 +108,11 @@ def _check_yaw_rate(t: Array, psi: Array, r: Array, source: Source) -> None:
     )
 
 
-def _check_velocity(t: Array, channels: Mapping[str, Array], frame: str, source: Source) -> None:
+def _check_velocity(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
     moved = np.diff(_at_windows(channels["x"] + 1j * channels["y"]))
     velocity = channels["u"] + 1j * channels["v"]
     velocities = {"body": velocity * np.exp(1j * channels["psi"]), "earth": velocity}
-    fits = {name: _fit(np.diff(_at_windows(_integral(t, part))), moved) for name, part in velocities.items()}
+    fits = {name: _fit(np.diff(_at_windows(integral(t, part))), moved) for name, part in velocities.items()}
     gain, misfit = fits.pop(frame)
     ((other, (other_gain, other_misfit)),) = fits.items()
     x, y, u, v = (source.columns[channel].name for channel in ("x", "y", "u", "v"))
@@ -139,18 +129,13 @@ def _check_velocity(t: Array, channels: Mapping[str, Array], frame: str, source:
         )
 
 
-def _integral(t: Array, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    steps = 0.5 * np.diff(t) * (values[1:] + values[:-1])
-    return np.concatenate([np.zeros(1), np.cumsum(steps)])
-
-
 def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Return the values at the edges of at most 30 windows."""
     edges = np.unique(np.linspace(0, values.size - 1, _WINDOWS + 1).round().astype(int))
     return np.asarray(values[edges])
 
 
-def _detrended(t: Array, values: Array) -> Array:
+def _detrended(t: Floats, values: Floats) -> Floats:
     """Return the values at the windows' edges without their straight line: a rate sensor has a bias."""
     time, ends = _at_windows(t - t[0]), _at_windows(values)
     slope, level = np.polyfit(time, ends, 1)

@@ -1,7 +1,5 @@
 """Whether a trial can be that of a ship of this size and speed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

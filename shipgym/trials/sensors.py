@@ -1,7 +1,5 @@
 """Measurement errors of a ship's sensors: noise, resolution, outliers, gaps, delay and drift."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from types import MappingProxyType
@@ -9,13 +7,12 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS, check_channel
-
-Floats = NDArray[np.float64]
 
 DEGREE = float(np.pi / 180.0)
 FEWEST_SAMPLES = 3  # of a trial
@@ -97,18 +94,12 @@ GNSS = Sensor(noise=0.3, drift=0.8, drift_time_s=300.0)
 #: feedback and shaft pick-up. Orders are logged as they were given.
 SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
     {
-        "x": GNSS,
-        "y": GNSS,
-        "psi": Sensor(noise=0.1 * DEGREE),
-        "u": Sensor(noise=0.03),
-        "v": Sensor(noise=0.02),
-        "r": Sensor(noise=0.02 * DEGREE),
-        "p": Sensor(noise=0.02 * DEGREE),
-        "phi": Sensor(noise=0.1 * DEGREE),
-        "delta": Sensor(resolution=0.1 * DEGREE),
+        "x": GNSS, "y": GNSS, "psi": Sensor(noise=0.1 * DEGREE), "u": Sensor(noise=0.03),
+        "v": Sensor(noise=0.02), "r": Sensor(noise=0.02 * DEGREE), "p": Sensor(noise=0.02 * DEGREE),
+        "phi": Sensor(noise=0.1 * DEGREE), "delta": Sensor(resolution=0.1 * DEGREE),
         "n": Sensor(resolution=0.1 / 60.0),
     }
-)
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -40,27 +40,14 @@ class TrialEntry:
 
 @dataclass(frozen=True)
 class ShipFile:
-    """A ship file, read and checked; :meth:`load` makes one.
+    """A ship file, read and checked; :meth:`load` makes one."""
 
-    Attributes
-    ----------
-    path : Path
-        The TOML file.
-    particulars : Particulars
-        As given; ``particulars.completed()`` estimates the rest.
-    steering : SteeringGear or None
-        None where the file has no ``[steering]``.
-    identify : dict
-        Defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`.
-    entries : tuple of TrialEntry
-        The trials, not read yet.
-    """
-
-    path: Path
-    particulars: Particulars
-    steering: SteeringGear | None
+    path: Path  # the TOML file
+    particulars: Particulars  # as given; ``particulars.completed()`` estimates the rest
+    steering: SteeringGear | None  # none where the file has no ``[steering]``
+    # defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`
     identify: dict[str, Any]
-    entries: tuple[TrialEntry, ...]
+    entries: tuple[TrialEntry, ...]  # the trials, not read yet
 
     @classmethod
     def load(cls, path: str | Path) -> ShipFile:
@@ -102,17 +89,9 @@ class ShipFile:
             raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
-        """Read the trials, in the order of the file, each named by its ``file``.
+        """Read the trials of a use, by default all but those to skip, each named by its ``file``.
 
-        Parameters
-        ----------
-        use : {"fit", "validate", "skip"}, optional
-            Only trials of this use; by default all but those to skip.
-
-        Raises
-        ------
-        InputError
-            For anything wrong with a CSV file.
+        In the order of the file. Raises InputError for anything wrong with a CSV file.
         """
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
@@ -129,18 +108,10 @@ class ShipFile:
         c = entry.conventions
         try:
             trial = Trial.from_csv(
-                entry.path,
-                entry.columns,
-                c.rudder_positive,
-                c.velocity_frame,
-                origin=c.origin,
-                xg=c.xg,
-                repair=c.repair,
-                name=entry.file,
-                kind=entry.kind,
-                use=entry.use,
+                entry.path, entry.columns, c.rudder_positive, c.velocity_frame, origin=c.origin, xg=c.xg,
+                repair=c.repair, name=entry.file, kind=entry.kind, use=entry.use,
                 length=self.particulars.length,
-            )
+            )  # fmt: skip
         except InputError as error:
             raise InputError(f"{entry.where}: {error}") from None
         check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")

@@ -13,13 +13,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.trials.trial_import import Conventions, import_csv
 from shipgym.trials.units import CHANNELS, check_channel
-
-Array = npt.NDArray[np.float64]
 
 #: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
 KINDS = ["zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"]
@@ -67,8 +66,8 @@ class Trial:
         For unknown channels, lengths that differ, values that are not finite, or time that goes back.
     """
 
-    t: Array
-    channels: Mapping[str, Array]
+    t: Floats
+    channels: Mapping[str, Floats]
     name: str
     kind: str | None
     use: str
@@ -140,7 +139,7 @@ class Trial:
     def __reduce__(self) -> tuple[Any, ...]:
         return partial(Trial, **self._settings()), (self.t, dict(self.channels))
 
-    def __getitem__(self, channel: str) -> Array:
+    def __getitem__(self, channel: str) -> Floats:
         if channel == "t":
             return self.t
         try:
@@ -181,19 +180,8 @@ class Trial:
     ) -> Trial:
         """Return a copy with some channels replaced, of which this trial is the raw one.
 
-        Parameters
-        ----------
-        channels : mapping of str to array-like of shape (n_samples,)
-            Those that change; all of them where `t` is given.
-        t : array-like of shape (n_samples,), optional
-            Other times, s.
-        repaired : mapping of str to int, optional
-            How many values were filled in, by channel, on top of those filled before.
-
-        Raises
-        ------
-        InputError
-            As for a new trial.
+        With other times `t`, s, all channels are given. `repaired` counts filled values by channel, on top of
+        those filled before. Raises InputError as for a new trial.
         """
         counts = Counter(self.repaired) + Counter(repaired or {})
         settings = self._settings() | {"repaired": counts, "raw": self}
@@ -255,17 +243,8 @@ class Trial:
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
 
-        The file is written beside its target and then renamed, so that it is never there in part.
-
-        Parameters
-        ----------
-        path : str or Path
-            The file to write; one that exists is replaced.
-
-        Raises
-        ------
-        InputError
-            Where the file cannot be written.
+        The file, replaced where it exists, is never there in part. Raises InputError where it cannot be
+        written.
         """
         names = ["t", *self.channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
@@ -275,7 +254,7 @@ class Trial:
 
 def _frozen_channels(
     channels: Mapping[str, npt.ArrayLike], shape: tuple[int, ...], where: str
-) -> dict[str, Array]:
+) -> dict[str, Floats]:
     """The channels as read-only arrays, after checking names and lengths."""
     if not channels:
         raise InputError(f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}")
@@ -290,7 +269,7 @@ def _frozen_channels(
     return arrays
 
 
-def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
+def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:
     """Return `values` as a read-only copy of shape (n_samples,), all finite."""
     hint = 'leave such samples out, or import the file with repair = "interpolate"'
     array = check_finite(values, where, hint)
@@ -299,7 +278,7 @@ def _frozen_array(values: npt.ArrayLike, where: str) -> Array:
     return array
 
 
-def _check_time(t: Array, where: str) -> None:
+def _check_time(t: Floats, where: str) -> None:
     if t.size < 3:
         raise InputError(f"{where}: {t.size} samples found, expected at least 3")
     back = np.diff(t) <= 0.0

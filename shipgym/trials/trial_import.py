@@ -1,7 +1,5 @@
 """From the columns of a CSV file to channels in SI units with the project's signs, frame and origin."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source, choose_columns
@@ -17,8 +16,6 @@ from shipgym.trials.csv_reader import read_table
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
 from shipgym.trials.units import QUANTITIES, si_factor
-
-Array = npt.NDArray[np.float64]
 
 RUDDER_SIGNS = ("starboard", "port")
 VELOCITY_FRAMES = ("body", "earth")
@@ -62,7 +59,7 @@ class Conventions:
 
 def import_csv(
     path: Path, columns: Mapping[str, Any] | None, conventions: Conventions
-) -> tuple[Array, dict[str, Array], frozenset[str], dict[str, int]]:
+) -> tuple[Floats, dict[str, Floats], frozenset[str], dict[str, int]]:
     """Read a CSV file: time, channels, names of the derived channels and counts of the repaired values.
 
     The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels are in SI
@@ -93,8 +90,8 @@ def import_csv(
 
 
 def to_project_conventions(
-    t: Array, recorded: Mapping[str, Array], conventions: Conventions, where: str
-) -> tuple[dict[str, Array], frozenset[str]]:
+    t: Floats, recorded: Mapping[str, Floats], conventions: Conventions, where: str
+) -> tuple[dict[str, Floats], frozenset[str]]:
     """Convert signs, frame and origin, and derive the channels that follow from others; also their names.
 
     The recorded channels are in SI units with the file's conventions, the heading without jumps, of shape
@@ -126,13 +123,13 @@ def to_project_conventions(
     return channels, frozenset(derived)
 
 
-def rotate_to_body(north: Array, east: Array, psi: Array) -> tuple[Array, Array]:
+def rotate_to_body(north: Floats, east: Floats, psi: Floats) -> tuple[Floats, Floats]:
     """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s
 
 
-def _earth_to_body(channels: dict[str, Array], derived: set[str], where: str) -> None:
+def _earth_to_body(channels: dict[str, Floats], derived: set[str], where: str) -> None:
     if not {"u", "v"} & channels.keys():
         return
     absent = [name for name in ("u", "v", "psi") if name not in channels or name in derived]
@@ -144,7 +141,7 @@ def _earth_to_body(channels: dict[str, Array], derived: set[str], where: str) ->
     channels["u"], channels["v"] = rotate_to_body(channels["u"], channels["v"], channels["psi"])
 
 
-def _cg_to_midship(channels: dict[str, Array], xg: float, where: str) -> None:
+def _cg_to_midship(channels: dict[str, Floats], xg: float, where: str) -> None:
     """Move position, sway and yaw moment from the centre of gravity to midship: v = v_cg - xg r."""
     needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
     for name, other in needed.items():
@@ -162,14 +159,14 @@ def _cg_to_midship(channels: dict[str, Array], xg: float, where: str) -> None:
         channels["N"] = channels["N"] + xg * channels["Y"]
 
 
-def _antiderivative(t: Array, values: Array) -> Array:
+def _antiderivative(t: Floats, values: Floats) -> Floats:
     from scipy.interpolate import make_interp_spline
 
     spline = make_interp_spline(t, values, k=min(3, t.size - 1)).antiderivative()
     return np.asarray(spline(t) - spline(t[0]), dtype=np.float64)
 
 
-def _repaired(values: Array, source: Source, repair: str | None) -> tuple[Array, Source]:
+def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Floats, Source]:
     """Refuse or fill missing values of shape (n_rows, n_columns), time first, and check the time."""
     names = list(source.columns)
     missing = ~np.isfinite(values)
@@ -206,7 +203,7 @@ def _repaired(values: Array, source: Source, repair: str | None) -> tuple[Array,
     return filled, repaired
 
 
-def _check_holes(t: Array, missing: npt.NDArray[np.bool_], channel: str, source: Source) -> None:
+def _check_holes(t: Floats, missing: npt.NDArray[np.bool_], channel: str, source: Source) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
     edges = np.flatnonzero(np.diff(missing))
     first, after = edges[::2] + 1, edges[1::2] + 1
@@ -223,7 +220,7 @@ def _check_holes(t: Array, missing: npt.NDArray[np.bool_], channel: str, source:
         )
 
 
-def _fill(t: Array, column: Array, *, unwrap: bool, unit: str) -> None:
+def _fill(t: Floats, column: Floats, *, unwrap: bool, unit: str) -> None:
     """Fill the gaps of a column in place, by a shape-preserving cubic (PCHIP) through its neighbours."""
     from scipy.interpolate import PchipInterpolator
 
@@ -237,7 +234,7 @@ def _fill(t: Array, column: Array, *, unwrap: bool, unit: str) -> None:
     column[~gaps] = known
 
 
-def _check_time(values: Array, source: Source) -> None:
+def _check_time(values: Floats, source: Source) -> None:
     t = values[:, 0]
     unit = source.columns["t"].unit
     if t.size < 3:

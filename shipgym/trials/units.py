@@ -1,7 +1,5 @@
 """Channels of a trial and the units in which a file may hold them."""
 
-from __future__ import annotations
-
 import math
 
 from shipgym.checks import did_you_mean, quoted
@@ -23,31 +21,12 @@ UNITS: dict[str, dict[str, float]] = {
 
 #: The quantity that each channel measures.
 QUANTITIES: dict[str, str] = {
-    "t": "time",
-    "x": "length",
-    "y": "length",
-    "psi": "angle",
-    "u": "speed",
-    "v": "speed",
-    "r": "angular rate",
-    "p": "angular rate",
-    "phi": "angle",
-    "delta": "angle",
-    "n": "shaft speed",
-    "delta_command": "angle",
-    "n_command": "shaft speed",
-    "X": "force",
-    "Y": "force",
-    "N": "moment",
-    "psi_wave": "angle",
-    "r_wave": "angular rate",
-    "phi_wave": "angle",
-    "p_wave": "angular rate",
-    "current_north": "speed",
-    "current_east": "speed",
-    "wind_speed": "speed",
-    "wind_from": "angle",
-}
+    "t": "time", "x": "length", "y": "length", "psi": "angle", "u": "speed", "v": "speed",
+    "r": "angular rate", "p": "angular rate", "phi": "angle", "delta": "angle", "n": "shaft speed",
+    "delta_command": "angle", "n_command": "shaft speed", "X": "force", "Y": "force", "N": "moment",
+    "psi_wave": "angle", "r_wave": "angular rate", "phi_wave": "angle", "p_wave": "angular rate",
+    "current_north": "speed", "current_east": "speed", "wind_speed": "speed", "wind_from": "angle",
+}  # fmt: skip
 
 #: Names of the channels, without time.
 CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name != "t")

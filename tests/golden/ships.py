@@ -94,7 +94,7 @@ def record_manoeuvres(name: str) -> dict[str, Floats]:
     model = ship_named(name)
     found: dict[str, Floats] = {}
     judged: dict[str, Callable[[], Any]] = {
-        what: (lambda one=one: one.judge(model))
+        what: (lambda one=one: one.evaluate(model))
         for what, one in manoeuvres.standard_manoeuvres(model).items()
     }
     judged["reverse spiral"] = lambda: manoeuvres.spiral_indices(manoeuvres.reverse_spiral(model))
@@ -109,7 +109,7 @@ def record_manoeuvres(name: str) -> dict[str, Floats]:
     if name == "tanker":
         depth = 1.5 * model.particulars["draught"]
         judged |= {
-            f"shallow {what}": (lambda one=one: one.judge(model))
+            f"shallow {what}": (lambda one=one: one.evaluate(model))
             for what, one in manoeuvres.standard_manoeuvres(model, depth).items()
         }
     for what, judge in judged.items():

@@ -12,9 +12,9 @@ from identification import identify
 from identification.regression.forces import force_regression, identify_forces
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
+from shipgym.ships.catalogue import xu_ship
 from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
 from shipgym.ships.structures import get_structure
-from shipgym.ships.xu import xu_ship
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shipgym.kernels import layout, path_following
-from shipgym.kernels import voyage_rows as rows
 
 import shipgym
 from shipgym import InputError
+from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.tasks.guidance import Path, line_of_sight, wrapped
@@ -249,10 +248,20 @@ def test_a_current_sets_the_ship_off_and_course_error_shows_it():
 
 
 MIRRORED = (
-    *(layout.Y, layout.PSI, layout.V, layout.R, layout.DELTA), rows.LAST_RUDDER, rows.COURSE, rows.INTEGRAL,
-    path_following.LEG_EAST, path_following.LEG_SINE, path_following.LEG_COURSE, path_following.TURN,
-    path_following.CROSS_TRACK,
-)  # fmt: skip
+    *(
+        "y",
+        "psi",
+        "v",
+        "r",
+        "delta",
+        "rudder_before",
+        "rudder_command",
+        "course",
+        "integral",
+        "heading_error",
+    ),
+    *("east", "sine", "leg_course", "turn", "cross_track"),
+)
 SEEN_MIRRORED = (
     "heading_error_sin", "yaw_rate", "sway", "rudder", "last_command", "heading_error_integral",
     "cross_track", "course_error_sin", "turn_angle",
@@ -264,21 +273,24 @@ def test_the_mirrored_voyage_earns_the_same():
     mariner = shipgym.load_model("mariner")
     even = {name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"}
     symmetric = replace(mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)})
-    task = path_following_task(n_legs=3, leg_lengths=(3.0, 5.0))
-    engine = Engine(symmetric, 2, task)
-    engine.reset([4, 4])
-    tile = engine._states[0]
-    odd = (*MIRRORED, *(rows.END + (2 * k + 1) * layout.LANES for k in range(task.legs + 1)))
-    for row in odd:
-        tile[row + 1] *= -1.0
+    drawn = Engine(symmetric, 1, path_following_task(n_legs=3, leg_lengths=(3.0, 5.0)))
+    drawn.reset([4])
+    task = path_following_task(waypoints=drawn.waypoints())
+    engine = Engine(symmetric, 1, task)
+    mirror = Engine(symmetric, 1, task.changed(waypoints=drawn.waypoints() * [1.0, -1.0]))
+    for one in (engine, mirror):
+        one.reset([4])
+    for name in (*Motion._fields[:6], "delta", *task.definition.State._fields):
+        mirror.write(name, (-1.0 if name in MIRRORED else 1.0) * engine.read(name))
     signs = np.array([-1.0 if q.name in SEEN_MIRRORED else 1.0 for q in task.observed(symmetric)])
     random = np.random.default_rng(0)
-    seen = engine.observations[:1].repeat(2, axis=0)
+    seen = engine.observations
     for _ in range(250):
         order = pd(seen[0]) + 0.3 * random.normal()
-        seen, rewards, *_ = engine.step([[order], [-order]])
-        assert rewards[0] == pytest.approx(rewards[1], rel=1e-6, abs=1e-9)
-        np.testing.assert_allclose(seen[0], signs * seen[1], atol=1e-5)
+        seen, rewards, *_ = engine.step([[order]])
+        reflected, earned, *_ = mirror.step([[-order]])
+        assert rewards[0] == pytest.approx(earned[0], rel=1e-6, abs=1e-9)
+        np.testing.assert_allclose(seen[0], signs * reflected[0], atol=1e-5)
     assert engine.info("distance_made_good")[0] > 5.0 * LENGTH
 
 

@@ -13,9 +13,10 @@ from shipgym.sea import (
     wave_motion,
 )
 from shipgym.sea.estimates import GRAVITY, weather_particulars
-from shipgym.sea.harmonics import circle, evaluate_cosines
+from shipgym.sea.harmonics import circle
 from shipgym.sea.motions import heading_response, roll_response
-from shipgym.sea.waves import spread
+from shipgym.sea.waves import over_directions
+from tests.shipgym.harmonics import evaluate_cosines
 
 GAMMAS = [1.0, 2.0, 3.3, 7.0]
 SHIPS = ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"]
@@ -160,9 +161,9 @@ def test_long_crested_waves_from_ahead_neither_turn_nor_heel():
 def test_spreading_keeps_the_mean_over_all_directions():
     chi = circle()
     curve, sea = np.sin(chi) ** 4, Waves(1.0, 8.0)
-    assert spread(curve, sea).mean() == pytest.approx(curve.mean())
+    assert over_directions(curve, sea).mean() == pytest.approx(curve.mean())
     # (2 / pi) integral of cos(mu)^2 cos(2 mu) over half a circle is 1 / 2
-    np.testing.assert_allclose(spread(np.cos(2 * chi), sea), 0.5 * np.cos(2 * chi), atol=1e-4)
+    np.testing.assert_allclose(over_directions(np.cos(2 * chi), sea), 0.5 * np.cos(2 * chi), atol=1e-4)
 
 
 def test_variances_grow_with_the_square_of_the_height():

@@ -8,17 +8,17 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
 
 import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
+from shipgym.envs.engine import Engine
 from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.simulate import open_loop, simulate
+from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer
 
@@ -273,7 +273,7 @@ def test_voyages_in_weather_go_on_from_leg_to_leg():
 
 
 def engine(model, lanes, sea="rough", **task):
-    return CourseKeepingEngine(model, lanes, CourseKeepingTask(sea, **task))
+    return Engine(model, lanes, course_keeping_task(sea=sea, **task))
 
 
 def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
@@ -300,7 +300,7 @@ def test_lanes_with_ships_of_their_own_and_the_same_weather(mariner):
     np.testing.assert_array_equal(*observations)
 
 
-def test_the_environment_shows_the_measured_and_judges_the_slow_heading(mariner):
+def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner):
     rough = engine(mariner, 8)
     rough.reset(np.arange(8))
     for _ in range(30):
@@ -346,11 +346,11 @@ def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
     assert env.physical_state()["wind_from"] != first
 
 
-FLY = """
+RUN = """
 import numpy as np, shipgym
-from shipgym.envs.course_keeping import CourseKeepingEngine
-from shipgym.envs.course_keeping_task import CourseKeepingTask
-engine = CourseKeepingEngine(shipgym.load_model("mariner"), 2, CourseKeepingTask("rough"))
+from shipgym.envs.engine import Engine
+from shipgym.tasks.task import course_keeping_task
+engine = Engine(shipgym.load_model("mariner"), 2, course_keeping_task(sea="rough"))
 engine.reset([1, 2])
 for k in range(30):
     observations, *_ = engine.step(np.full((2, 1), np.sin(k)))
@@ -361,7 +361,7 @@ print(repr([*observations[1].tolist(), float(trial["r_wave"][-1]), float(trial["
 
 def test_without_compiling_the_weather_is_the_same():
     runs = [
-        subprocess.run([sys.executable, "-c", FLY], env={**os.environ, **extra}, capture_output=True,
+        subprocess.run([sys.executable, "-c", RUN], env={**os.environ, **extra}, capture_output=True,
                        text=True, check=True).stdout
         for extra in ({}, {"NUMBA_DISABLE_JIT": "1"})
     ]  # fmt: skip
@@ -377,6 +377,6 @@ def test_wrong_weather(mariner):
     with pytest.raises(InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"):
         ahead(mariner, "rugh", 2)
     with pytest.raises(InputError, match="sea: 7 found"):
-        CourseKeepingTask(7)
+        course_keeping_task(sea=7)
     with pytest.raises(InputError, match="seed: -1 found"):
         ahead(mariner, "rough", 2, seed=-1)

@@ -8,8 +8,8 @@ import pytest
 from shipgym import InputError, Particulars, Wind, load_model
 from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.harmonics import evaluate_cosines, evaluate_sines
 from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names
+from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
     "length_overall": 180.0, "frontal_area": 600.0, "lateral_area": 2700.0, "lateral_centroid": -4.0,

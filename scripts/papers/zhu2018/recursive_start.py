@@ -48,7 +48,7 @@ PRINTED = {
     "LSSVR-RLS": (0.4278, -0.0042, -0.0162, 0.0129, -0.1850, 0.0),
 }
 VARIANCE = (
-    "the variance at the start is not printed, here 1e6; a finite one holds a22 near zero on raw columns"
+    "the variance at the start is not printed, here 1e6; a finite one keeps a22 near zero on raw columns"
 )
 COUNTS, INTERVALS = (50, 100, 200, 300), range(1, 11)  # of Figure 7.3.2
 JUDGED_FOR = 500.0  # s, of the predicted 10/10

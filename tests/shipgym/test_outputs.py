@@ -40,7 +40,7 @@ def test_what_is_held_stays_as_it_is(env, hold):
 
 def test_what_nobody_holds_is_used_again(env):
     used = {step(env)[0].ctypes.data for _ in range(8)}
-    assert len(used) == 1
+    assert len(used) <= 2
 
 
 def test_a_refused_command_changes_nothing(env):

@@ -1,0 +1,143 @@
+"""Files of a user's own, such as tasks, rewards and sensor sets: read, and checked for what they must have."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from shipgym.engine.records import field_types, is_list, is_record, leaves
+from shipgym.errors import InputError
+
+
+def load_file(path: Path) -> ModuleType:
+    """A Python file as a module, executed once however often it is asked for while it stays the same.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be executed.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected a Python file")
+    resolved = path.resolve()
+    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
+    name = f"shipgym_user_{content.hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, resolved)
+    assert spec is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        # compiled here, because Python's own cache takes a file changed within a second for the same
+        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
+    except Exception as error:
+        del sys.modules[name]
+        line = _line_in(resolved, error)
+        raise InputError(f"{path}{line}: cannot be executed: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _line_in(path: Path, error: Exception) -> str:
+    """The last line of a file that an error passed through."""
+    traceback, line = error.__traceback__, getattr(error, "lineno", None)
+    while traceback is not None:
+        if traceback.tb_frame.f_code.co_filename == str(path):
+            line = traceback.tb_lineno
+        traceback = traceback.tb_next
+    return f", line {line}" if line else ""
+
+
+def read_source(source: Any) -> tuple[Any, str]:
+    """The names that a file or module defines, and where, for messages."""
+    namespace = load_file(Path(source)) if isinstance(source, str | Path) else source
+    return namespace, str(getattr(namespace, "__file__", None) or getattr(namespace, "__name__", source))
+
+
+def kept_source(source: Any) -> Any:
+    """The same file for whoever reads it from another folder: paths are made absolute."""
+    if isinstance(source, str | Path) and Path(source).suffix == ".py":
+        return str(Path(source).resolve())
+    return source
+
+
+def check_namespace(
+    namespace: Any,
+    where: str,
+    records: Sequence[str],
+    functions: Mapping[str, Sequence[str]],
+    optional: Sequence[str] = (),
+) -> None:
+    """Refuse what lacks a record or a function, or has one of another form.
+
+    Raises
+    ------
+    InputError
+        Naming the file, the name and what is expected.
+    """
+    for name in (*records, *functions):
+        if not hasattr(namespace, name):
+            if name in optional:
+                continue
+            what = _what(name, functions)
+            raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
+        found = getattr(namespace, name)
+        if name in functions:
+            _check_function(found, name, where, functions)
+        elif not is_record(found):
+            raise InputError(f"{where}: {name} is no NamedTuple, expected {_what(name, functions)}")
+        else:
+            _check_record(found, name, where)
+
+
+def _what(name: str, functions: Mapping[str, Sequence[str]]) -> str:
+    if name in functions:
+        return f"a function {name}({', '.join(functions[name])})"
+    return f"a NamedTuple {name!r} of floats"
+
+
+def _check_function(function: Any, name: str, where: str, functions: Mapping[str, Sequence[str]]) -> None:
+    code = getattr(function, "__code__", None)
+    if code is None or code.co_argcount != len(functions[name]):
+        found = f"{code.co_argcount} arguments" if code is not None else "no plain function"
+        raise InputError(f"{where}: {name}: {found} found, expected {_what(name, functions)}")
+
+
+def _check_record(record: Any, name: str, where: str) -> None:
+    try:
+        kinds = field_types(record)
+    except (NameError, TypeError) as error:
+        raise InputError(f"{where}: {name}: an annotation cannot be read: {error}") from None
+    if not leaves(record):
+        raise InputError(f"{where}: {name}: no fields found, expected one number at least")
+    for field, kind in kinds.items():
+        default = record._field_defaults.get(field)
+        if is_record(kind):
+            _check_record(kind, f"{name}.{field}", where)
+        elif is_list(kind) and not name.startswith("Settings"):
+            raise InputError(f"{where}: {name}.{field}: {kind!r} found, expected a float")
+        elif isinstance(default, str) or (is_list(kind) and field != list(kinds)[-1]):
+            raise InputError(
+                f"{where}: {name}.{field}: {default!r} found, expected a number, or a list as the last field"
+            )
+
+
+def check_settings(record: Any, where: str) -> None:
+    """Refuse settings without defaults.
+
+    Raises
+    ------
+    InputError
+        Naming the field.
+    """
+    for name in record._fields:
+        if name not in record._field_defaults:
+            raise InputError(f"{where}: Settings.{name}: no default found, expected one")
+
+
+__all__ = ["check_namespace", "check_settings", "kept_source", "load_file", "read_source"]
