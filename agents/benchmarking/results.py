@@ -143,9 +143,7 @@ def check_new(folder: Path, resume: bool) -> Path:
             f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
         )
     if found and not ours:
-        raise InputError(
-            f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder"
-        )
+        raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder")
     return folder
 
 
