@@ -101,7 +101,7 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
     try:
         with global_compiler_lock, lean(name.rpartition("_")[2], name):
             dispatcher.compile(signature)
-    except numba.core.errors.NumbaError as error:
+    except (numba.core.errors.NumbaError, TypeError) as error:  # TypeError: a record of other fields
         raise InputError(explanation(error, what)) from None
 
 
