@@ -122,7 +122,7 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
 
 
 def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, None]) -> dict[Any, None]:
-    """Libraries that one calls, and those beneath them that have not been linked, each after what it calls."""
+    """Libraries that one calls and those beneath them that were not linked, each after what it calls."""
     for other in library._linking_libraries:
         if other not in found:
             if is_inner(other.name):
