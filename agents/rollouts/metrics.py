@@ -5,7 +5,7 @@ no course change, no path) is NaN.
 
 Sources: Norrbin 1972, On the added resistance due to steering on a straight course (steering cost); van
 Amerongen 1982, Adaptive steering of ships (way lengthened and speed lost by steering); Carlton 2012, Marine
-Propellers and Propulsion, chapter 6 (propeller law: power goes with the cube of the shaft speed).
+Propellers and Propulsion, chapter 6 (propeller law: power is proportional to the cube of the shaft speed).
 """
 
 from __future__ import annotations
@@ -210,10 +210,10 @@ def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
 def fuel_per_distance(run: Rollout) -> Floats:
     """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
 
-    The power is taken to go with the cube of the shaft speed (propeller law); the way made good is along the
-    path, over ground, or in course keeping along the ordered course, through the water. So it counts the
-    speed lost to rudder and drift, the way lengthened by yawing, and the weather. It is no consumption: how
-    the engine answers to load is not modelled.
+    Power is proportional to the cube of the shaft speed (propeller law); the way made good is along the path,
+    over ground, or in course keeping along the ordered course, through the water. So it counts the speed lost
+    to rudder and drift, the way lengthened by yawing, and the weather. It is no consumption: how the engine
+    answers to load is not modelled.
 
     Returns
     -------
