@@ -385,7 +385,7 @@ class Engine:
         )
         name = self.task.reward_parts[part]
         raise InputError(
-            f"{self.task.definition.source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
+            f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
             f"{self.steps[lane]:g}, expected a finite number; look for a division by zero or a root of a "
             "negative number (shipgym.check_task helps)"
         )

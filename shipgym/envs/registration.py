@@ -44,13 +44,14 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     Raises
     ------
     InputError
-        If the task is not what the contract asks, or the id belongs to another task; nothing is registered then.
+        If the task is not what the contract asks, or the id belongs to another; nothing is registered then.
     """
-    from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
+    from shipgym.envs.ship_env import DEFAULT_MODEL, ENV_OPTIONS, read_options
 
     given = {"task": kept_source(task), **options}
     given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}
-    _, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), options)
+    own = {name: value for name, value in options.items() if name == "reward" or name not in ENV_OPTIONS}
+    _, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
     if env_id in gymnasium.registry:
         if gymnasium.registry[env_id].kwargs == given:
             return

@@ -70,8 +70,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
     """One ship under a task; the environments differ by their task alone.
 
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The observation holds the
-    quantities of `observation_names`, each divided by its entry of `observation_scales`. The reward is the sum of
-    its parts, which `info` has by name. What is asked, observed and paid is told by the task's file
+    quantities of `observation_names`, each divided by its entry of `observation_scales`. The reward is the
+    sum of its parts, which `info` has by name. What is asked, observed and paid is told by the task's file
     (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of your own).
 
     Parameters

@@ -56,6 +56,6 @@ def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """What is shown."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
-        motion.x, motion.y, motion.psi, motion.u, motion.v, motion.r, motion.p, motion.phi, motion.delta, motion.n,
-        motion.psi, ahead, aside,
+        motion.x, motion.y, motion.psi, motion.u, motion.v, motion.r, motion.p, motion.phi, motion.delta,
+        motion.n, motion.psi, ahead, aside,
     )  # fmt: skip

@@ -1,29 +1,36 @@
-"""What a task is: a file of plain functions on named records, and what the engine gives them.
+"""What a task, a reward and a sensor set are: files of plain functions on named records.
 
-A task file defines (see `shipgym/tasks/course_keeping.py` for one)
+A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
-* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings` has defaults, which are the
-  keywords of its environment; a last field annotated `Numbers` is a list. The reward is the sum of the fields of
-  `Reward`, which `info` has as `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings` has defaults, which are
+  keywords of its environment; a last field annotated `Numbers` is a list. The reward is the sum of the fields
+  of `Reward`, which `info` has as `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: how an episode begins.
-* `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`: a control interval is over.
+* `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`: after an interval.
 * `observe(readings, state, interval, ship, settings) -> Observation`: what the autopilot sees, in SI units.
 
 and may define
 
 * `due(motion, state, interval, ship, settings) -> bool` and
-  `on_event(motion, state, interval, ship, settings, random, plan) -> State`: what comes seldom, such as the next
-  set-point.
+  `on_event(motion, state, interval, ship, settings, random, plan) -> State`: what comes seldom, such as the
+  next set-point.
 * `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays it for the rest of the
   episode, so that ending early never pays.
+* `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true or false.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts over an episode.
-* `check(settings, model)`: raises `InputError` for settings that do not fit; `listed(settings)`: what a keyword of
-  another kind, such as a list of waypoints, means as numbers.
+* `check(settings, model)`: raises `InputError` for settings that do not fit; `listed(value)`: what a keyword
+  of another kind, such as a list of waypoints, means as numbers.
 
-`step` and `observe` are compiled into a loop over ships: they call functions of `math` that the compiler
-vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose by `pick` or a conditional
-expression. The other functions are called ship by ship and may do what Numba can.
+A field `course` of `State`, rad, is the course to steer in `physical_state()` and in pictures.
+
+A reward file defines `Reward` and `reward(motion, state, interval, ship, settings) -> Reward`, where `state`
+is the task's after the interval, and may define `worst_cost`. A sensor file defines `Settings`, `Memory`,
+`measure` and `readings` (`shipgym/instruments/perfect.py` is one); its settings are keywords too.
+
+`step`, `observe`, `reward`, `measure` and `readings` are compiled into a loop over ships: they call functions
+of `math` that the compiler vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose
+by `pick` or a conditional expression. The other functions are called ship by ship and may do what Numba can.
 """
 
 from __future__ import annotations
@@ -35,6 +42,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.random import uniform
 
@@ -150,6 +158,11 @@ __all__ = [
     "Seen",
     "Setting",
     "Ship",
+    "arctan2",
     "at_service_speed",
+    "clip",
     "drawn",
+    "pick",
+    "sin_cos",
+    "wrap",
 ]

@@ -1,8 +1,8 @@
 """Course keeping: hold a heading, and change it when the set-point changes.
 
-The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder rate (weight 0.01), all in
-units of 30 degrees, the rate per ship length sailed (Norrbin 1972; van Amerongen 1982). Losing control costs as
-much as the rest of the episode at the largest heading error, so that it never pays to end early.
+The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder rate (weight 0.01), all
+in units of 30 degrees, the rate per ship length sailed (Norrbin 1972; van Amerongen 1982). Losing control
+costs as much as the rest of the episode at the largest heading error, so that it never pays to end early.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ class Settings(NamedTuple):
     course_changes_deg: Annotated[
         Numbers,
         Setting(
-            "Changes of the set-point one after another, degrees, positive to starboard, in place of drawn ones: "
-            "the first at the start, the others every `change_interval_steps`.",
+            "Changes of the set-point one after another, degrees, positive to starboard, in place of drawn "
+            "ones: the first at the start, the others every `change_interval_steps`.",
             at_least=-180.0,
             at_most=180.0,
         ),

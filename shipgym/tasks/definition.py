@@ -1,8 +1,9 @@
-"""A task file as the engine takes it: read from a module, a path or a name, checked, and with another reward."""
+"""A task file as the engine takes it: read from a module, path or name, checked, its reward replaced."""
 
 from __future__ import annotations
 
 import importlib
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -130,6 +131,11 @@ class TaskDefinition:
         """Whether its reward is one of the package's."""
         return self.Reward.__module__.partition(".")[0] == __name__.partition(".")[0]
 
+    @property
+    def reward_source(self) -> str:
+        """The file of its reward, for messages."""
+        return str(getattr(sys.modules.get(self.Reward.__module__), "__file__", None) or self.source)
+
     def make_settings(self, options: Mapping[str, Any]) -> Any:
         """Settings by keywords, checked.
 
@@ -222,20 +228,20 @@ def _check_names(definition: TaskDefinition) -> None:
             )
 
 
-def task_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+def step_of_task(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
     """The step of a task whose reward is another's: a place, filled by `_with_reward`."""
     raise NotImplementedError
 
 
-def another_reward(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+def reward_of_another(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
     """The other's reward: a place, filled by `_with_reward`."""
     raise NotImplementedError
 
 
 def rewarded_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
     """What the task does in an interval, and what another's reward gives for it."""
-    after, _, failed, arrived = task_step(motion, state, interval, ship, settings)
-    return after, another_reward(motion, after, interval, ship, settings), failed, arrived
+    after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
+    return after, reward_of_another(motion, after, interval, ship, settings), failed, arrived
 
 
 def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
@@ -246,7 +252,7 @@ def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
     check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
     step = getattr(namespace, name)
     if name == "reward":
-        places = {"__name__": __name__, "task_step": definition.step, "another_reward": step}
+        places = {"__name__": __name__, "step_of_task": definition.step, "reward_of_another": step}
         step = _filled(places)
     return replace(
         definition,

@@ -1,9 +1,9 @@
 """Path following: sail along straight legs from waypoint to waypoint.
 
-The reward is minus the square of the distance from the leg in units of the corridor, minus what is missing in way
-made along the path at service speed, and the costs of the rudder. Way is the change of the path's length behind
-the ship, so that circling and going back earn nothing; a step cannot earn more way than at service speed. Running
-aground costs as much as the rest of the episode there.
+The reward is minus the square of the distance from the leg in units of the corridor, minus what is missing in
+way made along the path at service speed, and the costs of the rudder. Way is the change of the path's length
+behind the ship, so that circling and going back earn nothing; a step cannot earn more way than at service
+speed. Running aground costs as much as the rest of the episode there.
 
 Guidance by line of sight: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3.
 """
@@ -296,8 +296,8 @@ def step(
         steering=steering_reward(motion, interval, ship, settings.weights),
     )
     after = State(
-        state.leg, state.north, state.east, state.cosine, state.sine, state.length, state.leg_course, state.turn,
-        state.before, sailed, to_go, at.course, integral, error, at.cross, sailed,
+        state.leg, state.north, state.east, state.cosine, state.sine, state.length, state.leg_course,
+        state.turn, state.before, sailed, to_go, at.course, integral, error, at.cross, sailed,
         pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0), pick(aground, 1.0, 0.0),
     )  # fmt: skip
     return after, reward, aground, arrived
@@ -312,7 +312,7 @@ def worst_cost(settings: Settings) -> float:
 def observe(
     readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> Observation:
-    """The path from where the instruments show the ship, her course over ground against it, and the turn ahead."""
+    """The path from where the instruments show the ship, her course over ground, and the turn ahead."""
     at = fix(readings.x, readings.y, state, ship, settings)
     ahead, aside, least = readings.ahead, readings.aside, STANDSTILL * ship.scale_speed
     per_speed = 1.0 / sqrt(max(ahead * ahead + aside * aside, least * least))

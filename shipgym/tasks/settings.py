@@ -25,7 +25,7 @@ def annotated(record: Record, kind: type, prefix: str = "") -> Iterator[tuple[st
 
 
 def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
-    """Name, bounds and default of each keyword: the fields, and those of records within that have defaults."""
+    """Name, bounds and default of each keyword: fields, and those of records within with defaults."""
     for name, hint in field_types(record, notes=True).items():
         kind = get_args(hint)[0] if get_args(hint) else hint
         notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Setting)]

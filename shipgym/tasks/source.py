@@ -1,9 +1,8 @@
-"""Files of a user's own, such as tasks, rewards and sensor sets: read, and checked for what they must have."""
+"""Files of a user's own, such as tasks, rewards and sensor sets: read, and checked for what lacks."""
 
 from __future__ import annotations
 
 import hashlib
-import importlib.util
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -29,9 +28,8 @@ def load_file(path: Path) -> ModuleType:
     name = f"shipgym_user_{content.hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, resolved)
-    assert spec is not None
-    module = importlib.util.module_from_spec(spec)
+    module = ModuleType(name)
+    module.__file__ = str(resolved)
     sys.modules[name] = module
     try:
         # compiled here, because Python's own cache takes a file changed within a second for the same

@@ -1,4 +1,4 @@
-"""A task with its options: what is asked of an autopilot, in which sea, by which commands, with which sensors."""
+"""A task with its options: what is asked of an autopilot, in which sea, by which commands and sensors."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class Task:
     water_depth : float
         m; for ships that know shallow water.
     sensors : SensorSet, optional
-        Instruments of a user's own in place of `noise` and `measurement`; as a keyword, the path of their file.
+        Instruments of a user's own in place of `noise` and `measurement`; as a keyword, their file.
     sensor_settings : NamedTuple, optional
         Their settings.
     options : mapping

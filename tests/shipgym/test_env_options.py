@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import document_settings
 import gymnasium
 import numpy as np
 import pytest
@@ -307,3 +308,19 @@ def test_a_model_found_unstable_is_refused_unless_asked_for():
             build(PATH, model=marked)
         with pytest.warns(UserWarning, match="found unstable"):
             build(PATH, model=marked, allow_unstable=True)
+
+
+@pytest.mark.parametrize("path", document_settings.PAGES, ids=lambda path: path.stem)
+def test_pages_name_every_setting_with_its_default(path):
+    text = path.read_text(encoding="utf-8")
+    assert document_settings.page(text) == text, "run python scripts/document_settings.py"
+    assert "| `heading_scale_deg` | 30 | above 0 |" in text
+
+
+def test_weights_and_scales_are_settings():
+    env = gymnasium.make("shipgym/CourseKeeping-v0", rudder_weight=2.0, heading_scale_deg=10.0).unwrapped
+    env.reset(seed=0)
+    *_, info = env.step(np.array([1.0], dtype=np.float32))
+    rudder = env.physical_state()["delta"]
+    assert info["reward_heading"] == pytest.approx(-((info["heading_error"] / np.radians(10.0)) ** 2))
+    assert info["reward_rudder"] == pytest.approx(-2.0 * (rudder / np.radians(10.0)) ** 2)

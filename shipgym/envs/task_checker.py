@@ -1,0 +1,241 @@
+"""What is wrong with a task: a battery for any task, reward or sensor set of a user's own."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.engine import episodes
+from shipgym.engine.compiling import plain as plain_loop
+from shipgym.engine.parts import Part
+from shipgym.engine.records import leaves
+from shipgym.envs.engine import Engine
+from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
+from shipgym.errors import InputError
+
+Floats = NDArray[np.float64]
+
+STEPS, PLAIN_STEPS = 400, 40
+LANES, PLAIN_LANES = 70, 3  # more than a tile
+AGREEMENT = 1e-5  # of compiled and plain results, whose last digits differ
+BEYOND = 1e-6  # of a bound, what rounding makes
+OFTEN = 0.05  # part of the observations beyond their bounds that is worth a remark
+
+
+@dataclass(frozen=True)
+class TaskCheck:
+    """What a check of a task found.
+
+    Attributes
+    ----------
+    name : str
+        Of the task, or its file.
+    problems : tuple of str
+        What makes it unfit to be used, each with its place; empty for a sound task.
+    remarks : tuple of str
+        What is unusual, and may be right.
+    """
+
+    name: str
+    problems: tuple[str, ...]
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are no problems."""
+        return not self.problems
+
+    def __str__(self) -> str:
+        """Verdict, then a line for each problem and remark."""
+        verdict = "sound" if self.ok else f"{len(self.problems)} problem(s)"
+        lines = [f"{self.name}: {verdict}", *(f"  problem: {problem}" for problem in self.problems)]
+        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+
+
+def check_task(task: Any, **options: Any) -> TaskCheck:
+    """Look for what is wrong with a task.
+
+    Its records and functions; compilation; some steps in plain Python, whose errors name the line; some
+    hundred steps of many ships by orders of a beginner: rewards, state and observations finite and within
+    their bounds; the same results compiled and in plain Python, for one ship and for many.
+
+    Parameters
+    ----------
+    task : str, Path or module
+        The file of a task (`shipgym.tasks.contract`), or the name of one of the package's.
+    **options
+        Keywords of the environment, `model`, `reward` and `sensors` among them.
+
+    Returns
+    -------
+    TaskCheck
+    """
+    try:
+        model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
+        name = asked.name
+        few, plain, beyond = _plain_engine(Engine(model, PLAIN_LANES, asked, randomisation))
+        many = Engine(model, LANES, asked, randomisation)
+        one = Engine(model, 1, asked, randomisation)
+    except InputError as error:
+        return TaskCheck(str(task), (str(error),))
+    with np.errstate(all="ignore"):  # the random numbers' words overflow, as they should
+        problem = _fails_in_python(plain)
+        if problem:
+            return TaskCheck(name, (problem,))
+        problems = [*_not_finite(many), *_differ_compiled(few, plain), *_differ_alone(many, one)]
+    return TaskCheck(name, tuple(problems), tuple(_beyond_bounds(beyond)))
+
+
+class _Beyond(dict[str, list[float]]):
+    """Observations beyond their bounds, by name; and how many were looked at."""
+
+    looked_at = 0
+    bounds: dict[str, tuple[float, float]]
+
+
+def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
+    """An engine, and one alike whose loop is plain Python and that notes observations beyond their bounds."""
+    plain = Engine(engine.model, engine.num_envs, engine.task)
+    made = plain._voyages
+    store, beyond = made.parts["store_observation"].function, _Beyond()
+    beyond.bounds = {path: (seen.low, seen.high) for path, seen in engine.task.definition.seen.items()}
+    shown = {quantity.path for quantity in engine.task.observed(engine.model)}
+    paths = leaves(engine.task.definition.Observation)
+
+    def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
+        if lane < plain.num_envs:
+            beyond.looked_at += 1
+            for path, value, per_scale in zip(paths, _numbers(record), _numbers(scale), strict=True):
+                low, high = beyond.bounds[path]
+                if path in shown and not low - BEYOND <= value * per_scale <= high + BEYOND:
+                    beyond.setdefault(path, []).append(value * per_scale)
+        store(tile, lane, record, scale)
+
+    parts = {**made.parts, "store_observation": Part(noted, code=lambda: None, key="noted")}
+    plain._run = plain_loop(episodes.run, parts)
+    return engine, plain, beyond
+
+
+def _numbers(record: Any) -> Iterator[float]:
+    """Numbers of a record and of those within it."""
+    for value in record:
+        if isinstance(value, tuple):
+            yield from _numbers(value)
+        else:
+            yield float(value)
+
+
+def _orders(engine: Engine, step: int) -> Floats:
+    """What a beginner orders: nothing, hard over, to and fro; the same for the same lane."""
+    lanes = np.arange(engine.num_envs)
+    swing = np.sin(0.11 * step * (1.0 + 0.3 * (lanes % 7)) + lanes)
+    kinds = np.stack([swing, np.sign(swing), np.zeros(len(lanes)), np.ones(len(lanes))])
+    rudder = kinds[lanes % 4, np.arange(len(lanes))]
+    return np.repeat(rudder[:, None], engine.task.n_commands, axis=1)
+
+
+def _fails_in_python(plain: Engine) -> str | None:
+    """The first error that plain Python meets, with its line."""
+    step = -1
+    try:
+        plain.reset(np.arange(plain.num_envs))
+        for step in range(PLAIN_STEPS):
+            plain.step(_orders(plain, step))
+    except InputError as error:
+        return str(error)
+    except Exception as error:
+        own = plain.task.definition.source
+        frames = traceback.extract_tb(error.__traceback__)
+        at = next((frame for frame in reversed(frames) if frame.filename == own), frames[-1])
+        return (
+            f"{at.filename}, line {at.lineno}, in {at.name}: {type(error).__name__}: {error}, "
+            f"at step {step + 1} in plain Python"
+        )
+    return None
+
+
+def _not_finite(engine: Engine) -> Iterator[str]:
+    """Parts of the reward, of the state and observations that are no finite numbers, each once."""
+    engine.reset(np.arange(engine.num_envs))
+    state = engine.task.definition.State
+    names = [path for path in leaves(state) if path in engine._voyages.state["state"].present]
+    found: set[str] = set()
+    for step in range(min(STEPS, engine.task.episode_steps)):
+        seen, *_ = engine.step(_orders(engine, step))
+        numbers: dict[str, NDArray[Any]] = {f"State.{name}": engine.read(name) for name in names}
+        numbers |= {name: engine.info(name) for name in engine.task.reward_parts}
+        observed = engine.task.observed(engine.model)
+        numbers |= {f"Observation.{quantity.path}": seen[:, k] for k, quantity in enumerate(observed)}
+        for name, values in numbers.items():
+            if name not in found and not np.isfinite(values).all():
+                found.add(name)
+                lane = int(np.argmax(~np.isfinite(values)))
+                yield (
+                    f"{_file_of(engine, name)}: {name} is {values[lane]} in lane {lane} at step "
+                    f"{step + 1}, expected finite numbers"
+                )
+
+
+def _file_of(engine: Engine, name: str) -> str:
+    """Where a number is worked out."""
+    definition = engine.task.definition
+    return definition.reward_source if name.startswith("reward_") else definition.source
+
+
+def _differ_compiled(compiled: Engine, plain: Engine) -> Iterator[str]:
+    """Observations and rewards that are not the same compiled and in plain Python."""
+    seeds = np.arange(plain.num_envs)
+    first, second = compiled.reset(seeds), plain.reset(seeds)
+    names = [quantity.path for quantity in compiled.task.observed(compiled.model)]
+    for step in range(PLAIN_STEPS + 1):
+        wrong = np.argwhere(~np.isclose(first, second, rtol=AGREEMENT, atol=AGREEMENT, equal_nan=True))
+        if len(wrong):
+            lane, k = wrong[0]
+            yield (
+                f"Observation.{names[k]} is {first[lane, k]} compiled and {second[lane, k]} in plain Python "
+                f"in lane {lane} at step {step}; look for what differs, such as a global that changes"
+            )
+            return
+        orders = _orders(plain, step)
+        first, earned, *_ = compiled.step(orders)
+        second, expected, *_ = plain.step(orders)
+        if not np.allclose(earned, expected, rtol=AGREEMENT, atol=AGREEMENT, equal_nan=True):
+            yield f"rewards are {earned} compiled and {expected} in plain Python at step {step + 1}"
+            return
+
+
+def _differ_alone(many: Engine, one: Engine) -> Iterator[str]:
+    """Results that differ between one ship and the same one among many, which are equal bit for bit."""
+    lane = many.num_envs - 1
+    seen, single = many.reset(np.arange(many.num_envs)), one.reset([lane])
+    for step in range(min(STEPS, many.task.episode_steps) // 4):
+        if not np.array_equal(seen[lane], single[0], equal_nan=True):
+            yield f"observations of one ship alone and among many differ at step {step}, expected the same"
+            return
+        orders = _orders(many, step)
+        seen, earned, *_ = many.step(orders)
+        single, alone, *_ = one.step(orders[lane:])
+        if earned[lane] != alone[0] and np.isfinite(earned[lane]):
+            yield f"rewards of one ship alone and among many differ at step {step + 1}, expected the same"
+            return
+
+
+def _beyond_bounds(beyond: _Beyond) -> Iterator[str]:
+    """Observations that are clipped often."""
+    for path, values in beyond.items():
+        part, furthest = len(values) / beyond.looked_at, max(values, key=abs)
+        if part > OFTEN:
+            low, high = beyond.bounds[path]
+            yield (
+                f"Observation.{path}: {furthest:.3g} found in units of its scale, beyond its bounds {low:g} "
+                f"to {high:g} in {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds "
+                "or a larger scale if more is to be seen"
+            )
+
+
+__all__ = ["TaskCheck", "check_task"]

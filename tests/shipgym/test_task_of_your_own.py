@@ -1,0 +1,231 @@
+"""A task, a reward and a sensor set from files outside the package: those of their documentation page."""
+
+import re
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AsyncVectorEnv
+from stable_baselines3 import PPO
+
+import shipgym
+from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
+from shipgym.envs.engine import Engine
+from shipgym.tasks.task import Task
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "task_of_your_own.md").read_text(encoding="utf-8")
+FAIRWAY = (ROOT / "examples" / "fairway.py").read_text(encoding="utf-8")
+REWARD, SENSORS = (
+    re.search(rf'```python\n("""{name}.*?)```', PAGE, re.DOTALL)[1]  # type: ignore[index]
+    for name in ("my_reward", "my_sensors")
+)
+COURSE = "shipgym/CourseKeeping-v0"
+SHIP = {"model": "kvlcc2", "action": "rudder-shaft"}
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def fairway(tmp_path):
+    known = set(gymnasium.registry)
+    register_task("harbour/Fairway-v0", written(tmp_path, "fairway.py", FAIRWAY), **SHIP)
+    yield "harbour/Fairway-v0"
+    for name in set(gymnasium.registry) - known:
+        del gymnasium.registry[name]
+
+
+def test_the_example_is_a_task_of_one_screen_and_sound():
+    assert FAIRWAY.count("\n") < 80
+    assert f"```python\n{FAIRWAY}```" in PAGE
+    assert str(check_task(ROOT / "examples" / "fairway.py", **SHIP)) == "fairway: sound"
+
+
+def test_a_task_works_everywhere(fairway):
+    env = gymnasium.make(fairway, render_mode="rgb_array", episode_steps=60).unwrapped
+    check_env(env)
+    assert env.observation_names[-1] == "to_zone"
+    seen, info = env.reset(seed=70)
+    assert {"speeding", "cross_track", "reward_delay", "reward_over_speed", "reward_end"} <= info.keys()
+    assert env.render().shape == (600, 600, 3)
+    many = gymnasium.make_vec(fairway, num_envs=71, episode_steps=60)
+    check_vector_env(
+        lambda: gymnasium.make_vec(fairway, num_envs=3, episode_steps=60),
+        lambda: gymnasium.make(fairway, episode_steps=60),
+    )
+    np.testing.assert_array_equal(many.reset(seed=0)[0][70], seen)
+    for k in range(50):
+        action = np.array([0.2 * np.sin(k), 0.8], dtype=np.float32)
+        seen, reward, *_, info = env.step(action)
+        all_seen, rewards, *_ = many.step(np.tile(action, (71, 1)))
+        np.testing.assert_array_equal(all_seen[70], seen)
+        assert rewards[70] == reward == pytest.approx(sum(info[name] for name in env.task.reward_parts))
+
+
+def test_the_limit_is_what_it_says(fairway):
+    """At service speed the zone costs the square of the excess; a ship that fails pays for the rest."""
+    env = gymnasium.make(fairway, zone_begins=0.0, speed_limit=0.5).unwrapped
+    env.reset(seed=0)
+    *_, info = env.step(np.array([0.0, 1.0], dtype=np.float32))
+    u = env.physical_state()["u"] / env.model.particulars["speed"]
+    assert info["speeding"]
+    assert info["reward_over_speed"] == pytest.approx(-50.0 * (u - 0.5) ** 2)
+    over = False
+    while not over:
+        *_, over, _, info = env.step(np.array([1.0, 1.0], dtype=np.float32))
+    assert info["reward_end"] == pytest.approx(-52.0 * (600 - env._engine.steps[0]))
+
+
+def test_an_agent_is_trained_for_it(fairway):
+    agent = PPO("MlpPolicy", ShipVecEnv(fairway, num_envs=4, seed=0), n_steps=16, batch_size=32, n_epochs=1)
+    agent.learn(128)
+    assert agent.num_timesteps == 128
+
+
+def test_spawned_workers_read_the_file(tmp_path):
+    path = str(written(tmp_path, "fairway.py", FAIRWAY))
+
+    def make():
+        import gymnasium
+
+        import shipgym  # noqa: F401 - registers
+
+        return gymnasium.make(COURSE, task=path, model="kvlcc2", action="rudder-shaft")
+
+    workers = AsyncVectorEnv([make, make], context="spawn")
+    try:
+        seen, _ = workers.reset(seed=3)
+    finally:
+        workers.close()
+    np.testing.assert_array_equal(seen[1], make().reset(seed=4)[0])
+
+
+def test_a_reward_of_ones_own_is_paid_for_the_same_voyage(tmp_path):
+    path = written(tmp_path, "my_reward.py", REWARD)
+    assert check_task("CourseKeeping", reward=path).problems == ()
+    plain = gymnasium.make(COURSE).unwrapped
+    env = gymnasium.make(COURSE, reward=str(path)).unwrapped
+    check_env(env)
+    for one in (plain, env):
+        one.reset(seed=5)
+    for k in range(40):
+        action = np.array([np.sin(k / 5.0)], dtype=np.float32)
+        expected, *_ = plain.step(action)
+        seen, reward, *_, info = env.step(action)
+        np.testing.assert_array_equal(seen, expected)
+        rudder = env.physical_state()["delta"] / env.model.steering.limit
+        assert info["reward_rudder"] == pytest.approx(-0.5 * rudder**2)
+        assert reward == pytest.approx(-(info["heading_error"] ** 2) - 0.5 * rudder**2)
+    many = gymnasium.make_vec(COURSE, num_envs=3, reward=path)
+    many.reset(seed=5)
+    assert set(many.step(np.zeros((3, 1), dtype=np.float32))[4]) >= {"reward_heading", "reward_end"}
+
+
+def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
+    path = written(tmp_path, "my_sensors.py", SENSORS)
+    assert check_task("PathFollowing", sensors=path, sea="rough").problems == ()
+    plain = gymnasium.make(COURSE, model="mariner").unwrapped
+    env = gymnasium.make(COURSE, model="mariner", sensors=str(path), compass_error=0.2).unwrapped
+    for one in (plain, env):
+        one.reset(seed=5)
+    lagged, part = env.physical_state()["u"], env.dt / (20.0 + env.dt)
+    for _ in range(20):
+        action = np.array([0.7], dtype=np.float32)
+        expected, reward, *_ = plain.step(action)
+        seen, same, *_ = env.step(action)
+        assert same == reward
+        error = np.arctan2(*expected[:2]) - np.arctan2(*seen[:2])
+        assert error == pytest.approx(0.2, abs=1e-5)
+        lagged += part * (env.physical_state()["u"] - lagged)
+        assert seen[4] * env.observation_scales[4] == pytest.approx(lagged, rel=1e-6)
+    with pytest.raises(InputError, match=r"sensors: .*my_sensors.py and noise or measurement found"):
+        gymnasium.make(COURSE, sensors=path, noise=1.0)
+    with pytest.raises(InputError, match="log_time_constant: 0 found"):
+        gymnasium.make(COURSE, sensors=path, log_time_constant=0.0)
+
+
+def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
+    path = written(tmp_path, "my_reward.py", REWARD)
+    first = gymnasium.make(COURSE, reward=path).unwrapped
+    more = REWARD.replace("    rudder: float\n", "    rudder: float\n    bonus: float\n")
+    written(tmp_path, "my_reward.py", more.replace("** 2)", "** 2, 7.0)"))
+    second = gymnasium.make(COURSE, reward=path).unwrapped
+    assert [len(env.task.definition.reward_names) for env in (first, second)] == [2, 3]
+    for env in (first, second):
+        env.reset(seed=1)
+    action = np.array([0.3], dtype=np.float32)
+    assert second.step(action)[1] - first.step(action)[1] == pytest.approx(7.0)
+    assert Task.of("CourseKeeping", reward=path).definition is second.task.definition
+
+
+WRONG = [
+    ("class State", "class Sate", "fairway.py: no 'State' found, expected a NamedTuple"),
+    ("def observe", "def obsrve", r"no 'observe' found, expected a function observe\(readings, state"),
+    ("def begin(ship, settings,", "def begin(ship,", "begin: 3 arguments found, expected a function begin"),
+    ("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float", "Observation.heading_sin: no bounds"),
+    ('"speeding", ', '"speding", ', "REPORTED: 'speding' found"),
+    ("at_most=1.0)] = 0.7", "at_most=1.0)]", "[Nn]on-default namedtuple field|no default found"),
+    ("    speeding: Flag", "    speeding: str", "State.speeding: .* found, expected a float"),
+    ("    delay: float", "    end: float", "Reward: two fields named 'end'"),
+    ("half_width: Annotated", "dt: Annotated", "Settings.dt found, which is a keyword already"),
+    ("class Reward", "class Reward(", "fairway.py, line .*: cannot be executed: SyntaxError"),
+    ("drawn(random, 1,", "drwn(random, 1,", "in begin.*drwn"),
+    ("return 2.0 + settings", "return settings.weight + settings", "in worst_cost.*weight"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "message"), WRONG, ids=[new for _, new, _ in WRONG])
+def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, message):
+    assert old in FAIRWAY
+    path = written(tmp_path, "fairway.py", FAIRWAY.replace(old, new, 1))
+    found = check_task(path, **SHIP)
+    assert len(found.problems) == 1
+    assert re.search(message, found.problems[0])
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=str(path), **SHIP)
+    if "in " not in message:  # what compiling would find is found when an environment is made
+        with pytest.raises(InputError, match=message):
+            register_task("harbour/Wrong-v0", path, **SHIP)
+        assert "harbour/Wrong-v0" not in gymnasium.registry
+
+
+def test_a_reward_that_is_not_finite_is_named(tmp_path):
+    text = REWARD.replace("** 2)", "** 2 + (interval.steps >= 3.0) * (interval.dt - interval.dt) / 0.0)")
+    path = written(tmp_path, "my_reward.py", text.replace("/ 0.0", "/ (state.course - state.course)"))
+    message = r"reward_rudder is nan in lane 0 at step 1"
+    for env in (gymnasium.make(COURSE, reward=path), gymnasium.make_vec(COURSE, num_envs=2, reward=path)):
+        env.reset(seed=0)
+        with pytest.raises(InputError, match=message):
+            env.step(env.action_space.sample())
+    problem = check_task("CourseKeeping", reward=path).problems[0]
+    assert re.search(f"my_reward.py: {message}", problem)
+
+
+def test_ids_are_taken_once(fairway, tmp_path):
+    register_task(fairway, tmp_path / "fairway.py", **SHIP)  # the same again changes nothing
+    with pytest.raises(InputError, match=r"harbour/Fairway-v0: registered already, for .*fairway.py"):
+        register_task(fairway, "PathFollowing")
+    with pytest.raises(InputError, match="'Fair way' found, expected an id such as 'harbour/fairway-v0'"):
+        register_task("Fair way", tmp_path / "fairway.py", **SHIP)
+    with pytest.raises(InputError, match="Did you mean 'speed_limit'"):
+        register_task("harbour/Other-v0", tmp_path / "fairway.py", speed_limt=0.5, **SHIP)
+    assert "harbour/Other-v0" not in gymnasium.registry
+
+
+def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
+    task = Task.of(written(tmp_path, "fairway.py", FAIRWAY), action="rudder-shaft", sea="rough")
+    ship = shipgym.load_model("kvlcc2")
+    small, large = Engine(ship, 3, task), Engine(ship, 130, task, threads=2)
+    np.testing.assert_array_equal(small.reset([127, 128, 129]), large.reset(np.arange(130))[127:])
+    for k in range(40):
+        order = [0.3 * np.sin(k), 0.7]
+        seen, rewards, *_ = small.step(np.tile(order, (3, 1)))
+        many, earned, *_ = large.step(np.tile(order, (130, 1)))
+        np.testing.assert_array_equal(seen, many[127:])
+        np.testing.assert_array_equal(rewards, earned[127:])
