@@ -30,7 +30,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     path : str or Path
         A file, or the name of a pretrained agent, `mariner-calm-ppo` (`list_pretrained`).
     model : ShipModel, optional
-        The ship it shall steer; one with other observation scales is refused.
+        The ship to steer; one with other observation scales is refused.
 
     Returns
     -------

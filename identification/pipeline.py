@@ -145,7 +145,7 @@ def _covariance(
 
 
 def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
-    """What a fit came from and what became of it, for the model's provenance."""
+    """The origin of a fit and its outcome, for the model's provenance."""
     return {
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": regression.window,

@@ -115,10 +115,6 @@ class Transfer:
         costs = self.costs[contestant][ship]
         return mean_cost(costs, Draws(1, costs.shape[1]), 0)
 
-    def loss(self, contestant: str, ship: str = REFERENCE) -> Interval:
-        """How much more a contestant costs on a ship than what was learned on her, as a part of that."""
-        return self._paired(ship, contestant, lambda own, known: own / known - 1.0, REFERENCE)
-
     def gain(self, contestant: str, ship: str) -> Interval:
         """How much less a contestant costs than the tuned classical one on the same ship, a part of that."""
         return self._paired(ship, contestant, lambda own, tuned: 1.0 - own / tuned, TUNED)

@@ -10,9 +10,9 @@ A contestant is named on the command line as
     runs/agent.json            a file of an agent or controller
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
     a.json+b.json              training runs, one by one
-    my_module:factory          a function of one's own: given a `BenchmarkTask`, it returns a controller
-    my_module:Mine             a class of one's own, a subclass of `agents.Controller`
-    name=...                   any of these under a name of one's own
+    my_module:factory          your own function: given a `BenchmarkTask`, it returns a controller
+    my_module:Mine             your own class, a subclass of `agents.Controller`
+    name=...                   any of these under another name
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The summary of a benchmark: per task and contestant, the ranking, and who improves on whom."""
+"""The summary of a benchmark: per task and contestant, the ranking, and who improves on which other."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def cache_finding() -> Finding:
         return Finding(
             "cache",
             "wrong",
-            f"{folder} cannot be written ({error.strerror}): every process compiles its ships anew; set "
+            f"{folder} cannot be written ({error.strerror}): every process compiles its ships again; set "
             f"{CACHE_VARIABLE} to a folder that can be",
         )
     return Finding("cache", "fine", kept)

@@ -1,4 +1,4 @@
-"""`shipgym warm`: compile beforehand what environments and models need, so that nobody waits for it."""
+"""`shipgym warm`: compile beforehand what environments and models need, so that no run waits for it."""
 
 from __future__ import annotations
 
@@ -24,20 +24,11 @@ SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
 
 @dataclass(frozen=True)
 class Warmed:
-    """One thing that is ready now.
-
-    Attributes
-    ----------
-    what : str
-    seconds : float
-        That it took; little if it was in the cache.
-    refused : str
-        Why it cannot be; empty as a rule.
-    """
+    """One thing that is ready now."""
 
     what: str
-    seconds: float
-    refused: str = ""
+    seconds: float  # that compiling took; few if it was in the cache
+    refused: str = ""  # why it cannot be; empty as a rule
 
 
 @answered

@@ -1,4 +1,4 @@
-"""Adaptive autopilot: LQ designed anew, while the ship sails, for the steering that is identified.
+"""Adaptive autopilot: LQ redesigned, while the ship sails, for the steering that is identified.
 
 Sources: Astrom & Wittenmark 1995, Adaptive Control, chapter 4 (self-tuning regulators, certainty
 equivalence); van Amerongen 1982, Adaptive steering of ships; Song 2020, chapter 4 (TMILS,
@@ -134,7 +134,7 @@ class AdaptiveLQ(Stateful):
         return N_MEMORY
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
-        """Learn from the last interval, now and then design anew, and feed back."""
+        """Learn from the last interval, redesign now and then, and feed back."""
         kept = memory.copy()
         kept[begins] = self._fresh()
         speed = np.maximum(np.hypot(seen["surge"], seen["sway"]), 0.1 * self.design["speed"])

@@ -113,18 +113,8 @@ class Guided(Controller):
     def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
         """Course to steer against that of the leg, and what is remembered of the drift next.
 
-        Parameters
-        ----------
-        cross_track : array of shape (n,)
-            m, positive to starboard of the leg.
-        drift : array of shape (n,)
-            What was remembered.
-
-        Returns
-        -------
-        course : array of shape (n,)
-            rad.
-        drift : array of shape (n,)
+        `cross_track`: m, positive to starboard of the leg, shape (n,); `drift`: what was remembered, shape
+        (n,). Returns `course`: rad, shape (n,); `drift`: shape (n,).
         """
 
     def predict(

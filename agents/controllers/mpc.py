@@ -92,7 +92,7 @@ class MPC(Stateful):
             limits is taken.
         rate_weight_s2 : float, optional
             Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
-            (`linear_loop.rate_weight`), because LQ does not know that the gear is slow.
+            (`linear_loop.rate_weight`), because LQ's model has no slow gear.
 
         Raises
         ------
@@ -207,7 +207,7 @@ class MPC(Stateful):
         return float(self._solver.solve(raise_error=False).x[0])
 
     def __getstate__(self) -> dict[str, Any]:
-        """All but the solver, which is set up anew in another process."""
+        """Everything but the solver, which another process sets up again."""
         return {name: value for name, value in self.__dict__.items() if name != "_solver"}
 
 

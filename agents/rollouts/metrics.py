@@ -5,7 +5,7 @@ no course change, no path) is NaN.
 
 Sources: Norrbin 1972, On the added resistance due to steering on a straight course (steering cost); van
 Amerongen 1982, Adaptive steering of ships (way lengthened and speed lost by steering); Carlton 2012, Marine
-Propellers and Propulsion, chapter 6 (propeller law: power goes with the cube of the shaft speed).
+Propellers and Propulsion, chapter 6 (propeller law: power is proportional to the cube of the shaft speed).
 """
 
 from __future__ import annotations
@@ -127,18 +127,8 @@ def lost(run: Rollout) -> Flags:
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
     """How often an angle turns round, by more than a dead band each time.
 
-    Parameters
-    ----------
-    angle : array of shape (n_steps + 1, n)
-        rad.
-    counts : bool array of shape (n_steps, n)
-        Intervals that count.
-    dead_band : float
-        rad; a smaller way back is none.
-
-    Returns
-    -------
-    array of shape (n,)
+    `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, shape (n_steps, n); `dead_band`:
+    rad; a smaller return does not count. Returns an array of shape (n,).
     """
     low, high = angle[0], angle[0]  # since the last turn
     way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
@@ -157,15 +147,11 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
 def course_changes(run: Rollout) -> dict[str, Floats]:
     """Overshoot and settling after the course changes of an episode, means over its changes.
 
-    A change begins with a new set-point at least 5 degrees from the heading, and lasts until the next or
-    the end of the episode. Its overshoot is the largest heading error on the other side, in percent of the
-    first error; it has settled at the time from which on the error stays within 5 % of the first one, but no
-    less than 1 degree. One that has not counts as unsettled, with the whole of its duration as the time.
-
-    Returns
-    -------
-    dict of str to array of shape (n,)
-        overshoot_percent, settling_s, unsettled (share of the changes); NaN on paths.
+    A change begins with a new set-point at least 5 degrees from the heading, and lasts until the next or the
+    end of the episode. Its overshoot is the largest heading error on the other side, in percent of the first
+    error; it has settled at the time from which on the error stays within 5 % of the first one, but no less
+    than 1 degree. One that has not counts as unsettled, with the whole of its duration as the time. Returns
+    overshoot_percent, settling_s, unsettled (share of the changes); NaN on paths, shape (n,).
     """
     n = len(run.seeds)
     names = ("overshoot_percent", "settling_s", "unsettled")
@@ -191,12 +177,7 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
 def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
     """Overshoot in percent, settling time in s and whether it has not settled, of one change of course.
 
-    Parameters
-    ----------
-    error : array of shape (n_samples,)
-        Heading error from the change on, rad.
-    dt : float
-        Between the samples, s.
+    `error`: heading error from the change on, rad, shape (n_samples,); `dt`: between the samples, s.
     """
     first = float(error[0])
     beyond = max(0.0, float((-np.sign(first) * error).max()))
@@ -210,15 +191,10 @@ def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
 def fuel_per_distance(run: Rollout) -> Floats:
     """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
 
-    The power is taken to go with the cube of the shaft speed (propeller law); the way made good is along the
-    path, over ground, or in course keeping along the ordered course, through the water. So it counts the
-    speed lost to rudder and drift, the way lengthened by yawing, and the weather. It is no consumption: how
-    the engine answers to load is not modelled.
-
-    Returns
-    -------
-    array of shape (n,)
-        NaN where no way was made good.
+    Power is proportional to the cube of the shaft speed (propeller law); the way made good is along the path,
+    over ground, or in course keeping along the ordered course, through the water. So it counts the speed lost
+    to rudder and drift, the way lengthened by yawing, and the weather. It is no consumption: how the engine
+    answers to load is not modelled. NaN where no way was made good, shape (n,).
     """
     service = run.model.service_shaft_speed if "n" in run.model.state_names else 0.0
     shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
@@ -283,16 +259,8 @@ def evaluate(
 ) -> Evaluation:
     """Sail the episodes of a task, all at once, whatever the policy does (`rollout`, tolerant).
 
-    Parameters
-    ----------
-    policy : Policy
-        Anything with `predict`; it is given the observations of all ships together.
-    task : BenchmarkTask
-        Of a suite.
-    seeds : array-like of int, shape (n,), optional
-        By default those that are scored.
-    model : ShipModel, optional
-        Another ship than the task's own.
+    `policy`: anything with `predict`; it is given the observations of all ships together; `task`: of a suite;
+    `seeds`: by default those that are scored, shape (n,); `model`: another ship than the task's own.
     """
     numbers = np.asarray(task.seeds if seeds is None else seeds, dtype=np.int64)
     engine = task.engine(len(numbers), model)

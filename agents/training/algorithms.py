@@ -83,7 +83,7 @@ def scaled_rewards(ships: VecEnv, settings: Settings) -> VecEnv:
 def make_agent(plan: Plan, base: Controller | None) -> Any:
     """An agent that has learned nothing yet, with its ships.
 
-    `base`: what it adds to. The agent's seed is also that of the ships; random numbers begin anew.
+    `base`: what it adds to. The agent's seed is also that of the ships; the random numbers start again.
     """
     kind = algorithm_class(plan.algorithm)
     ships = make_ships(plan, base)
@@ -139,7 +139,7 @@ def _rate(settings: Settings) -> float | Callable[[float], float]:
 
 
 def set_deviation(agent: Any, settings: Settings) -> None:
-    """Let PPO's exploration be what it shall be at this part of the training, unless it is learned."""
+    """Set PPO's exploration for this stage of the training, unless it is learned."""
     if not isinstance(settings, PPOSettings) or settings.log_std_end == LEARNED:
         return
     if hasattr(agent.policy, "log_std"):  # discrete orders have none

@@ -110,7 +110,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         Returns what the ships inside return, rewards summed up to the end of an episode, infos of that end.
         """
         observations, rewards, dones, infos = self._interval()
-        infos = list(infos)  # the ships fill theirs anew
+        infos = list(infos)  # the ships overwrite theirs
         for _ in range(self.action_repeat - 1):
             if self.base is not None:
                 self._outputs[dones] = 0

@@ -58,7 +58,7 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, BaseDis
 def with_parameters(settings: Settings, parameters: Mapping[str, Any]) -> Settings:
     """The settings that parameters stand for.
 
-    Raises InputError if they do not go with the settings that are not varied.
+    Raises InputError if they conflict with the settings that are not varied.
     """
     given = {name: value for name, value in parameters.items() if name not in STANDS_FOR}
     if "one_minus_gamma" in parameters:

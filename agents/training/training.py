@@ -55,7 +55,7 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True)
 class TrainingResult:
-    """What came out."""
+    """The result of a training."""
 
     plan: Plan  # the run
     policy: LearnedPolicy  # the best one
@@ -292,7 +292,7 @@ class _Training:
         write_values({"run": own, "agent": checkpoints.take(self.agent)}, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:
-        """Go on from a checkpoint; a run that was killed before its first one begins anew."""
+        """Resume from a checkpoint; a run that was killed before its first one starts again."""
         self.resumed_from = 0
         for draft in checkpoint.parent.glob(".*.draft"):  # of a file that was being written
             draft.unlink(missing_ok=True)

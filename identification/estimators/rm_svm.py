@@ -160,7 +160,7 @@ class RMSVM(LinearRegressor):
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     """Slopes of an epsilon-SVR without offset.
 
-    By coordinate descent, whose time goes with the number of samples; where it does not converge, by
+    By coordinate descent, whose time is proportional to the number of samples; where it does not converge, by
     sequential minimal optimisation of the samples and their mirror image, which makes the offset zero.
     """
     quick = LinearSVR(

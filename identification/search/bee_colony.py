@@ -19,7 +19,7 @@ class ArtificialBeeColony:
 
     Employed bees move each food source along one dimension towards or away from another; onlookers do the
     same to sources drawn by their fitness; a source that did not improve for too long is left and
-    drawn anew. All bees of a stage move at once, from the same sources, so that the objective is
+    drawn again. All bees of a stage move at once, from the same sources, so that the objective is
     evaluated for a batch of candidates; of several onlookers at one source the best counts.
 
     Parameters

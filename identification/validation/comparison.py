@@ -64,7 +64,7 @@ def compare_methods(
     methods : sequence of str or estimator, optional
         As for `identify`; by default `USUAL`, and `rm-svm` for a grey box.
     **arguments
-        Of `identify` but for `method`. A method is not given settings that it does not know.
+        Of `identify` but for `method`. A method is not given settings that it does not have.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def _usual(structure: str | None) -> list[str]:
 
 
 def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Settings that each method does not know, which some other one does."""
+    """Settings that each method does not have but another one does."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
 

@@ -33,7 +33,7 @@ class Ranking:
     standings: tuple[Standing, ...]
     results: dict[str, IdentificationResult]  # by method, identified from all trials to fit
     refused: dict[str, str]  # why a method could not be fitted
-    left_out: dict[str, tuple[str, ...]]  # settings that a method does not know and was not given
+    left_out: dict[str, tuple[str, ...]]  # settings that a method does not have and was not given
     in_turn: bool  # whether no trial was marked `validate`, so that each trial to fit was held out in turn
 
     @property

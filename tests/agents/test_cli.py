@@ -195,7 +195,7 @@ def test_doctor_tells_of_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
     answer = shipgym("doctor")
     assert answer.exit_code == 1
-    assert "compiles its ships anew" in answer.stdout
+    assert "compiles its ships again" in answer.stdout
 
 
 def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
