@@ -133,7 +133,7 @@ def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, Non
 
 
 def _refresh_seldom(replace: Replace) -> None:
-    """Numba looks for new declarations a thousand times; the lengths of its lists show whether there are any."""
+    """Numba looks for new declarations a thousand times; the lengths of its lists show if there are any."""
 
     def seldom(refresh: Callable[[Any], None]) -> Callable[[Any], None]:
         seen: dict[int, int] = {}
