@@ -1,4 +1,4 @@
-"""Machine code of a loop in a file named by all that it depends on, so never stale, and checked when read."""
+"""Machine code of a loop in a file: named by all it depends on, so never stale, and checked when read."""
 
 from __future__ import annotations
 
