@@ -45,6 +45,7 @@ evidence: $(VENV)/dev-installed
 
 docs: $(VENV)/docs-installed
 	$(BIN)/python scripts/document_options.py
+	$(BIN)/python scripts/document_settings.py
 	$(BIN)/python scripts/draw_architecture.py
 	$(BIN)/mkdocs build --strict
 
