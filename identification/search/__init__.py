@@ -16,16 +16,9 @@ from shipgym.checks import check_choice
 from shipgym.errors import InputError
 
 __all__ = [
-    "OPTIMISERS",
-    "ArtificialBeeColony",
-    "DifferentialEvolution",
-    "GridSearch",
-    "Optimiser",
-    "ParticleSwarm",
-    "SearchResult",
-    "get_optimiser",
-    "minimise",
-]
+    "OPTIMISERS", "ArtificialBeeColony", "DifferentialEvolution", "GridSearch", "Optimiser",
+    "ParticleSwarm", "SearchResult", "get_optimiser", "minimise",
+]  # fmt: skip
 
 OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
     "abc": ArtificialBeeColony,

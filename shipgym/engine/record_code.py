@@ -145,13 +145,9 @@ def summer(record: Record) -> Part:
 
 
 def _part(
-    name: str,
-    of: Rows | Record,
-    more: object,
-    function: Any,
-    generate: Generate,
-    answer: Callable[[], Any] | None = None,
-) -> Part:
+    name: str, of: Rows | Record, more: object, function: Any, generate: Generate, answer: Callable[[],
+    Any] | None = None,
+) -> Part:  # fmt: skip
     """A part whose code depends on a record, on its rows, and on what more there is."""
     record = of.record if isinstance(of, Rows) else of
     rows = (of.first, of.present) if isinstance(of, Rows) else ()

@@ -235,6 +235,3 @@ def view_of_lane(common: Any, ships: Any, lane: int) -> Any:
 def voyages(vessel: Vessel, task: TaskDefinition, sensors: Sensors, windy: bool, shared: bool) -> Voyages:
     """Episodes, compiled once in a process."""
     return Voyages(vessel, task, sensors, windy, shared)
-
-
-__all__ = ["Sensors", "Voyages", "sensors_for", "voyages"]

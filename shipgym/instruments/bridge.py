@@ -55,14 +55,9 @@ class Memory(NamedTuple):
 
 
 def measure(
-    motion: Motion,
-    sea: Sea,
-    memory: Memory,
-    frequency: float,
-    interval: Interval,
-    settings: Settings,
+    motion: Motion, sea: Sea, memory: Memory, frequency: float, interval: Interval, settings: Settings,
     random: Random,
-) -> Memory:
+) -> Memory:  # fmt: skip
     """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
     psi, r, x, y, u, v = sea.psi_wave, sea.r_wave, 0.0, 0.0, 0.0, 0.0
     if HAS_NOISE:

@@ -22,14 +22,9 @@ class Memory(NamedTuple):
 
 
 def measure(
-    motion: Motion,
-    sea: Sea,
-    memory: Memory,
-    frequency: float,
-    interval: Interval,
-    settings: Settings,
+    motion: Motion, sea: Sea, memory: Memory, frequency: float, interval: Interval, settings: Settings,
     random: Random,
-) -> Memory:
+) -> Memory:  # fmt: skip
     """What is remembered from sample to sample.
 
     Parameters

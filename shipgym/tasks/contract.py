@@ -147,22 +147,6 @@ def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
 
 
 __all__ = [
-    "NO_NUMBERS",
-    "Flag",
-    "Interval",
-    "Motion",
-    "Numbers",
-    "Random",
-    "Readings",
-    "Scale",
-    "Seen",
-    "Setting",
-    "Ship",
-    "arctan2",
-    "at_service_speed",
-    "clip",
-    "drawn",
-    "pick",
-    "sin_cos",
-    "wrap",
-]
+    "NO_NUMBERS", "Flag", "Interval", "Motion", "Numbers", "Random", "Readings", "Scale", "Seen",
+    "Setting", "Ship", "arctan2", "at_service_speed", "clip", "drawn", "pick", "sin_cos", "wrap",
+]  # fmt: skip

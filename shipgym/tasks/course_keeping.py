@@ -122,14 +122,9 @@ def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: 
 
 
 def on_event(
-    motion: Motion,
-    state: State,
-    interval: Interval,
-    ship: Ship,
-    settings: Settings,
-    random: Random,
+    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings, random: Random,
     plan: Numbers,
-) -> State:
+) -> State:  # fmt: skip
     """A new set-point."""
     return changed(state, interval.steps, settings, random)
 

@@ -261,14 +261,9 @@ def last_leg(settings: Settings) -> float:
 
 
 def on_event(
-    motion: Motion,
-    state: State,
-    interval: Interval,
-    ship: Ship,
-    settings: Settings,
-    random: Random,
+    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings, random: Random,
     plan: Numbers,
-) -> State:
+) -> State:  # fmt: skip
     """Go on to the next leg; the way round the corner that is cut counts as sailed."""
     leg = leg_from(int(state.leg) + 1, state.before + state.length, plan)
     along = fix(motion.x, motion.y, leg, ship, settings).along

@@ -46,17 +46,6 @@ def smoothed_channels(trial: Trial, names: Sequence[str], preprocessing: str) ->
 
 
 __all__ = [
-    "FILTERS",
-    "NOISY",
-    "PREPROCESSING",
-    "is_noisy",
-    "median",
-    "noise_level",
-    "noise_ratio",
-    "outliers",
-    "repaired",
-    "savitzky_golay",
-    "smooth",
-    "smooth_kinematics",
-    "smoothed_channels",
-]
+    "FILTERS", "NOISY", "PREPROCESSING", "is_noisy", "median", "noise_level", "noise_ratio", "outliers",
+    "repaired", "savitzky_golay", "smooth", "smooth_kinematics", "smoothed_channels",
+]  # fmt: skip
