@@ -231,7 +231,7 @@ GIVERS = {"the ship": "#cfe0f5", "the sea": "#cdeae4", "the sensor set": "#e3d8f
 FILES = {
     "the ship": "a file of shipgym/ships, or yours",
     "the sea": "shipgym/sea/open_sea.py",
-    "the sensor set": "a file of shipgym/instruments",
+    "the sensor set": "shipgym/instruments, or yours",
     "the task": "a file of shipgym/tasks, or yours",
 }
 SHIP_FUNCTIONS = ("accelerations", "shaft_acceleration")  # places of `shipgym.engine.motion`

@@ -14,12 +14,8 @@ class InputError(ValueError):
 class UnstableModelError(RuntimeError):
     """A simulated ship left every physical range: its model runs away.
 
-    Attributes
-    ----------
-    time_s : float
-        Simulated time at which it was noticed, s.
-    state : dict of str to float
-        The last state that was still physical, SI units.
+    `time_s` is the simulated time at which it was noticed, s, and `state` the last state that was still
+    physical, by name in SI units.
     """
 
     def __init__(self, message: str, time_s: float, state: dict[str, float]) -> None:
@@ -29,13 +25,7 @@ class UnstableModelError(RuntimeError):
 
 
 class ManoeuvreError(RuntimeError):
-    """A manoeuvre never got where it had to: to its switch heading, or to the speed at which it ends.
-
-    Attributes
-    ----------
-    trial : shipgym.Trial
-        The manoeuvre so far.
-    """
+    """A manoeuvre, so far in `trial`, never reached its switch heading or the speed at which it ends."""
 
     def __init__(self, message: str, trial: Any) -> None:  # a Trial's own file imports this one
         super().__init__(message)

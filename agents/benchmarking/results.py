@@ -135,7 +135,7 @@ def check_new(folder: Path, resume: bool) -> Path:
     if not folder.exists():
         return folder
     if not folder.is_dir():
-        raise InputError(f"{folder}: is no folder, expected one to write the results to; choose another")
+        raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
     found = sorted(entry.name for entry in folder.iterdir())
     ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
     if ours and not resume:
@@ -143,7 +143,7 @@ def check_new(folder: Path, resume: bool) -> Path:
             f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
         )
     if found and not ours:
-        raise InputError(f"{folder}: holds '{found[0]}', which is no result of this; choose a new folder")
+        raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder")
     return folder
 
 
@@ -234,7 +234,7 @@ def load_results(path: str | Path) -> BenchmarkResult:
     content = read_json(where, "file of benchmark results", REMEDY)
     if content.get("kind") != KIND:
         raise InputError(
-            f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': no benchmark results"
+            f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not benchmark results"
         )
     if content.get("format") != FORMAT:
         raise InputError(

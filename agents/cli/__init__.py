@@ -29,6 +29,7 @@ from agents.cli.identification import advise_command, identify_command, reduce_c
 from agents.cli.reproduction import reproduce_command
 from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
+from agents.cli.warm import warm_command
 
 if TYPE_CHECKING:
     from agents.cli.standard_trials import StandardTrials
@@ -69,6 +70,7 @@ app.command("train")(train_command)
 app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)
 app.command("reproduce")(reproduce_command)
+app.command("warm")(warm_command)
 
 
 @app.command("trials")

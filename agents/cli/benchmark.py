@@ -90,7 +90,7 @@ def benchmark_command(
     except KeyboardInterrupt:
         fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
         return
-    _told(result, out, as_json)
+    _print_result(result, out, as_json)
 
 
 def _remove_page(out: Path) -> None:
@@ -111,7 +111,7 @@ def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progres
         warn(f"there is no {PAGE}: {error}")
 
 
-def _told(result: BenchmarkResult, out: Path, as_json: bool) -> None:
+def _print_result(result: BenchmarkResult, out: Path, as_json: bool) -> None:
     """Print the ranking, or all of the summary."""
     from agents.cli.benchmark_tables import costs_table, ranking_table
     from agents.cli.terminal import out as console

@@ -81,5 +81,6 @@ class IdentifyCommand(TyperCommand):
         from agents.cli.identify_options import takes_identify_options
 
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        app.command(self.name)(takes_identify_options(self.callback.__wrapped__))  # type: ignore[union-attr]
+        whole = takes_identify_options(self.callback.__wrapped__)  # type: ignore[union-attr]
+        app.command(self.name)(answered(whole))
         return typer.main.get_command(app).make_context(*args, **kwargs)

@@ -10,15 +10,15 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from platformdirs import user_cache_path
 from rich.markup import escape
 
 import shipgym
-from shipgym.engine.compiling import CACHE_VARIABLE
+from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder
 
 NEEDED = (
     "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
     "threadpoolctl", "safetensors", "jinja2", "joblib", "lazy-loader",
+    "filelock",
 )  # fmt: skip
 EXTRAS = {
     "report": ("plotly",),
@@ -79,20 +79,24 @@ def _installed(what: str, names: tuple[str, ...], otherwise: str, remedy: str) -
 
 
 def cache_finding() -> Finding:
-    """Whether compiled ships can be kept, so that a second start is fast."""
-    folder = Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
+    """Where compiled ships are kept and how much, so that a second start is fast."""
+    folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        files = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
+        kept = f"{folder}, {len(files)} files, {sum(files) / 1e6:.1f} MB"
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except OSError as error:
+        if folder.is_dir() and os.access(folder, os.R_OK | os.X_OK) and any(folder.iterdir()):
+            return Finding("cache", "fine", f"{kept}, to be read only: what is missing is compiled in memory")
         return Finding(
             "cache",
             "wrong",
             f"{folder} cannot be written ({error.strerror}): every process compiles its ships anew; set "
             f"{CACHE_VARIABLE} to a folder that can be",
         )
-    return Finding("cache", "fine", os.fspath(folder))
+    return Finding("cache", "fine", kept)
 
 
 def name_finding(name: str) -> Finding:

@@ -109,7 +109,7 @@ def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str |
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
     for name, left in found.left_out.items():
-        warn(f"{name} does not know, and was not given: {', '.join(left)}")
+        warn(f"{name} has no setting of these names and was fitted without them: {', '.join(left)}")
     first = found.standings[0]
     if not first.stable or first.error is None:
         fail("no method gives a model that stays stable on every trial held out", FAILED)

@@ -92,7 +92,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_
     if resume:
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):
-            warn(f"the run began with other versions: {line}; it may not go on bit for bit")
+            warn(f"the run began with other versions: {line}; the result may differ in the last digits")
     from agents.training.training import train
 
     command = shlex.join(["shipgym", *sys.argv[1:]])

@@ -66,7 +66,7 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
 def no_path(kind: str, task: BenchmarkTask) -> InputError:
     """What is said where guidance has nothing to follow."""
     where = task.name or task.environment
-    return InputError(f"controller: '{kind}' found, but '{where}' has no path to be led along")
+    return InputError(f"controller: '{kind}' found, but '{where}' has no path to follow")
 
 
 @lru_cache(maxsize=256)

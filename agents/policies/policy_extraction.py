@@ -21,7 +21,7 @@ from shipgym.errors import InputError
 
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 #: Keywords of a vector environment that say how it runs, not what is asked.
-RUNNING = ("model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
+RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 N_COMPARED = 16
@@ -174,6 +174,6 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
         agrees = bool(np.abs(np.clip(output, -1.0, 1.0) - theirs).max() < AGREEMENT)
     if not agrees:
         raise InputError(
-            f"agent: {type(agent.policy).__name__} commands otherwise than its layers say, expected "
+            f"agent: {type(agent.policy).__name__} gives other commands than its layers do, expected "
             f"'MlpPolicy' with actions in [-1, 1]"
         )

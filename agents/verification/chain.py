@@ -150,7 +150,7 @@ def verify(
     episodes = [*found.episodes, *(sail(guest, found.draws, seeds=seeds) for guest in guests)]
     stable = [draw for draw, lost in zip(found.draws, found.manoeuvres.unstable, strict=True) if not lost]
     pilots, autopilots = [], [*controllers, *guests]
-    keys = _told_apart([str(one.name) for one in autopilots])
+    keys = _unique_keys([str(one.name) for one in autopilots])
     for k, controller in enumerate(autopilots):
         _tell(progress, "step responses", k, len(autopilots))
         step = step_response(controller, [model, *stable], STEP_DEG)
@@ -179,7 +179,7 @@ def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     check_fits(guest, task, model, where)
 
 
-def _told_apart(names: Sequence[str]) -> list[str]:
+def _unique_keys(names: Sequence[str]) -> list[str]:
     """Names, those that were there before with a number."""
     return [
         name if name not in names[:k] else f"{name}-{names[:k].count(name) + 1}"

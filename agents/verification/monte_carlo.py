@@ -80,7 +80,7 @@ def monte_carlo(
         controller.check_fits_model(model)
     nominal = nominal_runs(model)
     drawn = model.sample(draws, seed)
-    found = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _told(progress, draws))
+    found = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _by_draw(progress, draws))
     episodes = zip(*(part["episodes"] for part in found), strict=True) if controllers else ()
     return MonteCarlo(
         draws=tuple(drawn),
@@ -136,7 +136,7 @@ def keeps_course(model: ShipModel) -> bool:
         return False
 
 
-def _told(progress: Callable[[int], None] | None, draws: int) -> JobProgress:
+def _by_draw(progress: Callable[[int], None] | None, draws: int) -> JobProgress:
     def tell(done: int, total: int) -> None:
         if progress is not None:
             progress(min(done * DRAWS_A_JOB, draws) if done < total else draws)

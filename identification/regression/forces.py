@@ -157,7 +157,7 @@ def _one_piece(
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
     targets = [trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES]
     if model_inertia:
-        own = _ship_s_own(prime, ship)
+        own = _rigid_body_forces(prime, ship)
         targets = [target + ours for target, ours in zip(targets, own, strict=True)]
     column = {name: i for i, name in enumerate(structure.coefficient_names)}
     features = []
@@ -172,7 +172,7 @@ def _one_piece(
     return features, targets
 
 
-def _ship_s_own(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
+def _rigid_body_forces(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
     """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3), prime."""
     m, static, yaw = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
     u, v, r, udot, vdot, rdot = (prime[name] for name in (*AXES, *ACCELERATIONS))

@@ -5,25 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from shipgym.engine.motion import Push, sail
+from shipgym.engine.places import common_ship, load_motion, ship_at, store_motion
 from shipgym.engine.records import LANES
 
 SIGNATURE = "void(float64[:, ::1], float64[:, ::1], float64, int64, float64[:, ::1])"
-
-
-def common_ship(ships: Any) -> Any:
-    """The ship that all lanes share, or nothing; a part."""
-
-
-def ship_at(common: Any, ships: Any, lane: int) -> Any:
-    """Ship and coefficients of one lane; a part."""
-
-
-def load_motion(tile: Any, lane: int) -> Any:
-    """A part."""
-
-
-def store_motion(tile: Any, lane: int, motion: Any) -> None:
-    """A part."""
 
 
 def advance_tile(state: Any, command: Any, h: float, ships: Any) -> None:

@@ -8,21 +8,16 @@ and may only be read is used as it is.
 
 from __future__ import annotations
 
-import os
 import re
 import sys
-import warnings
-from contextlib import AbstractContextManager, nullcontext
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from platformdirs import user_cache_path
-
+from shipgym.engine.cache_folder import locked, usable_folder
 from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
 from shipgym.errors import InputError
 
-CACHE_VARIABLE = "SHIPGYM_CACHE"
 SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
 
 
@@ -59,20 +54,21 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     from shipgym.engine.lean_numba import LeanCompiler, without_scipy
 
     without_scipy()
-    jit = partial(numba.njit, pipeline_class=LeanCompiler, **SEMANTICS)
-    copy = Specialisation(parts, tag, jit).copy(loop)
-    dispatcher = jit(nogil=True)(copy)
-    folder = _folder()
+    jit = partial(numba.njit, pipeline_class=LeanCompiler)
+    dispatcher = jit(nogil=True, **SEMANTICS)(Specialisation(parts, tag, jit).copy(loop))
+    folder = usable_folder()
     if folder is None:
+        _announce(what, None)
         _compile(dispatcher, signature, what)
         return dispatcher
-    dispatcher._cache = DiskCache(copy, folder, tag)
-    if dispatcher._cache.holds(signature):
-        _compile(dispatcher, signature, what, quiet=True)
+    dispatcher._cache = disk = DiskCache(folder, tag, signature)
+    if disk.ready():
+        _compile(dispatcher, signature, what)
         return dispatcher
-    with _lock(folder / f"{tag}.lock"):
-        kept = dispatcher._cache.holds(signature)  # another process may have been first
-        _compile(dispatcher, signature, what, quiet=kept)
+    with locked(folder / f"{tag}.lock"):
+        if not disk.ready():  # another process may have been first
+            _announce(what, folder)
+        _compile(dispatcher, signature, what)
     return dispatcher
 
 
@@ -88,12 +84,10 @@ def plain_python() -> bool:
     return bool(numba.config.DISABLE_JIT)
 
 
-def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) -> None:
-    import numba
-
-    if not quiet:
-        _announce(what)
+def _compile(dispatcher: Any, signature: str, what: str) -> None:
+    """Compile, or take from the cache."""
     from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.errors import NumbaError
 
     from shipgym.engine.lean_numba import lean
 
@@ -101,7 +95,7 @@ def _compile(dispatcher: Any, signature: str, what: str, quiet: bool = False) ->
     try:
         with global_compiler_lock, lean(name.rpartition("_")[2], name):
             dispatcher.compile(signature)
-    except (numba.core.errors.NumbaError, TypeError) as error:  # TypeError: a record of other fields
+    except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
 
 
@@ -122,41 +116,8 @@ def explanation(error: Exception, what: str) -> str:
     return f"{what}: cannot be compiled{where}: {reason}"
 
 
-def _announce(what: str) -> None:
+def _announce(what: str, folder: Path | None) -> None:
     """Tell a person who waits what is going on; programs and log files are told nothing."""
-    notebook = "ipykernel" in sys.modules
-    if notebook or sys.stderr.isatty():
-        print(
-            f"shipgym: compiling {what}, once, about {SECONDS} s; kept in {_home()} "
-            "(beforehand: shipgym warm)",
-            file=sys.stderr,
-            flush=True,
-        )
-
-
-def _home() -> Path:
-    return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
-
-
-@cache
-def _folder() -> Path | None:
-    """The folder of the cache; None where there is none and none can be made."""
-    home = _home()
-    try:
-        home.mkdir(parents=True, exist_ok=True)
-        next(home.iterdir(), None)
-    except OSError as error:
-        warnings.warn(
-            f"{home}: cannot be written ({error.strerror}), so ships are compiled anew in each process. "
-            f"Set {CACHE_VARIABLE} to a folder that can.",
-            stacklevel=2,
-        )
-        return None
-    return home
-
-
-def _lock(path: Path) -> AbstractContextManager[Any]:
-    """One process compiles, the others wait; the lock of a process that was killed is free."""
-    from filelock import FileLock
-
-    return FileLock(path) if os.access(path.parent, os.W_OK) else nullcontext()
+    if "ipykernel" in sys.modules or sys.stderr.isatty():
+        kept = f"kept in {folder} (beforehand: shipgym warm)" if folder else "kept in memory only"
+        print(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}", file=sys.stderr, flush=True)

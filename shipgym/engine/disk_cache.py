@@ -1,85 +1,73 @@
-"""Numba's on-disk cache under names that hash their contents, so that nothing in it is ever stale."""
+"""Machine code of a loop in a file: named by all it depends on, so never stale, and checked when read."""
 
 from __future__ import annotations
 
-import warnings
+import hashlib
+import os
+import pickle
+import tempfile
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache, IndexDataCacheFile
-from numba.core.sigutils import normalize_signature
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+from shipgym.engine.cache_folder import warn_of
+
+SUFFIX = ".loop"
+DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 
 
-class _Place:
-    """What Numba asks of a place: here a folder, under a name that hashes all that is in the file."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder = str(folder)
-
-    def ensure_cache_path(self) -> None:
-        """The folder is there; it need not be writable."""
-
-    def get_cache_path(self) -> str:
-        """The folder."""
-        return self._folder
-
-    def get_source_stamp(self) -> str:
-        """A constant: other sources have other names."""
-        return "content"
-
-    def get_disambiguator(self) -> str:
-        """Empty: names differ already."""
-        return ""
-
-
-class _Results(CompileResultCacheImpl):  # type: ignore[misc]
-    """Compiled functions as bytes, in files of a given name."""
-
-    def __init__(self, folder: Path, tag: str) -> None:
-        self._lineno = 0
-        self._filename_base = tag
-        self._locator = _Place(folder)
-
-
-class DiskCache(FunctionCache):  # type: ignore[misc]
-    """The cache of one loop.
+class DiskCache(NullCache):  # type: ignore[misc]
+    """What Numba asks of a cache, for one loop.
 
     Parameters
     ----------
-    function : function
-        The loop.
     folder : Path
-        Of the cache.
+        Of the cache; it need not be writable.
     tag : str
         Hash of everything that the loop depends on.
+    signature : str
+        Of its arguments.
     """
 
-    def __init__(self, function: Any, folder: Path, tag: str) -> None:
-        self._name = repr(function)
-        self._py_func = function
-        self._impl = _Results(folder, tag)
-        self._cache_path = str(folder)
-        self._cache_file = IndexDataCacheFile(
-            cache_path=self._cache_path,
-            filename_base=self._impl.filename_base,
-            source_stamp=self._impl.locator.get_source_stamp(),
-        )
-        self._folder, self._tag = folder, tag
-        self.enable()
+    def __init__(self, folder: Path, tag: str, signature: str) -> None:
+        short = hashlib.sha256(signature.encode()).hexdigest()[:8]
+        self.path = folder / f"{tag}-{short}{SUFFIX}"
+        self._content: bytes | None = None
 
-    def holds(self, signature: str) -> bool:
-        """Whether machine code for the signature is on disk."""
-        return (self._folder / f"{self._tag}.nbi").is_file()
+    def ready(self) -> bool:
+        """Whether machine code is on disk, and whole."""
+        try:
+            content = self.path.read_bytes()
+        except OSError:
+            return False
+        whole = hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]
+        self._content = content[DIGEST:] if whole else None
+        return whole
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The compiled loop, if it was found ready; None: it is to be compiled."""
+        if self._content is None:
+            return None
+        content, self._content = self._content, None
+        target_context.refresh()
+        return CompileResult._rebuild(target_context, *pickle.loads(content))
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep machine code, where the folder may be written."""
+        """Keep machine code, where the folder may be written; a file is there whole or not at all."""
+        if data.library.has_dynamic_globals:  # addresses of this process
+            return
+        content = dumps(data._reduce())
         try:
-            super().save_overload(sig, data)
+            number, name = tempfile.mkstemp(dir=self.path.parent, suffix=".new")
+            try:
+                with os.fdopen(number, "wb") as file:
+                    file.write(hashlib.sha256(content).digest() + content)
+                Path(name).chmod(0o644)  # others may use it
+                Path(name).replace(self.path)
+            finally:
+                Path(name).unlink(missing_ok=True)
         except OSError as error:
-            warnings.warn(
-                f"{self._folder}: cannot be written ({error.strerror}), so ships are compiled anew each time",
-                stacklevel=2,
-            )
-
-
-__all__ = ["DiskCache", "normalize_signature"]
+            warn_of(self.path.parent, error)

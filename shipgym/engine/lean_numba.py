@@ -1,9 +1,9 @@
-"""Compiling a loop once: Numba optimises and emits each function on its own, though the loop holds them all.
+"""Compiling a loop once: Numba optimises each function on its own, though the loop holds them all.
 
-Numba makes machine code of every function that a loop calls, nested ones again in each that calls them, and then
-of the loop, into which their code is inlined. Here the functions with the loop's tag are translated only as far
-as LLVM's intermediate code and linked once, into the loop; and passes over them that find nothing in functions
-on numbers and records are left out. The loop's code is the same.
+It makes machine code of every function that a loop calls, nested ones again in each that calls them, and then
+of the loop, into which their code is inlined. Here the functions with the loop's tag are translated only as
+far as LLVM's intermediate code and linked once, into the loop; and passes over them that find nothing in
+functions on numbers and records are left out. The loop's code is the same.
 """
 
 from __future__ import annotations
@@ -23,10 +23,10 @@ from numba.core.typing import context as typing
 
 Replace = Callable[[Any, str, Any], None]
 
-# Passes, by Numba's names, for `with`, array expressions, `literally`, parallel loops and functions within functions
+# Passes, by Numba's names, for `with`, array expressions, `literally`, parallel loops and nested functions
 IDLE = (
-    "with_lifting", "nopython_rewrites", "Rewrite dynamic raises", "find_literally", "literal_unroll", "annotate_types",
-    "dump_parfor_diagnostics", "nopython_supported_feature_validation",
+    "with_lifting", "nopython_rewrites", "Rewrite dynamic raises", "find_literally", "literal_unroll",
+    "annotate_types", "dump_parfor_diagnostics", "nopython_supported_feature_validation",
 )  # fmt: skip
 CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
@@ -122,7 +122,7 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
 
 
 def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, None]) -> dict[Any, None]:
-    """Libraries that one calls, and those beneath them that have not been linked, each behind what it calls."""
+    """Libraries that one calls and those beneath them, not linked yet, each behind what it calls."""
     for other in library._linking_libraries:
         if other not in found:
             if is_inner(other.name):
@@ -132,7 +132,7 @@ def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, Non
 
 
 def _refresh_seldom(replace: Replace) -> None:
-    """Numba looks a thousand times for new declarations, most often in vain; the lengths of its lists tell."""
+    """Numba looks a thousand times for new declarations, mostly in vain; the lengths of its lists tell."""
 
     def seldom(refresh: Callable[[Any], None]) -> Callable[[Any], None]:
         seen: dict[int, int] = {}

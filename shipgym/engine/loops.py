@@ -12,6 +12,7 @@ from shipgym.engine.compiling import compiled
 from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES
 from shipgym.engine.vessel import Vessel
+from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, sea_parts
 
 SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parameters
 
@@ -81,14 +82,10 @@ LOOPS = {
 
 
 @cache
-def ship_loop(vessel: Vessel, name: str) -> Any:
-    """A loop of `LOOPS` for a ship in calm water; see `compiled`."""
-    return compile_loop(vessel, name, {})
-
-
-def compile_loop(vessel: Vessel, name: str, sea_parts: Mapping[str, Any]) -> Any:
-    """A loop of `LOOPS` for a ship and a sea, whose parts are vectors (`shipgym.sea.open_sea`)."""
+def ship_loop(vessel: Vessel, name: str, windy: bool = False) -> Any:
+    """A loop of `LOOPS` for a ship in calm water or in the open sea; see `compiled`."""
     loop = LOOPS[name]
-    parts = {**vessel.parts(loop.lanes, loop.shared), **sea_parts, **loop.parts}
-    where = "in the open sea" if sea_parts else "in calm water"
+    sea = {**sea_parts(windy, loop.lanes), "BEGIN_WORDS": BEGIN_WORDS, "EVOLVE_WORDS": EVOLVE_WORDS}
+    parts = {**vessel.parts(loop.lanes, loop.shared), **sea, **loop.parts}
+    where = "in the open sea" if windy else "in calm water"
     return compiled(loop.function, loop.signature, parts, f"{vessel.name} {where}: {name}")

@@ -11,7 +11,10 @@ from math import atan2
 from typing import Any
 
 from shipgym.engine.motion import HAS_SEA, Motion, Push, Ship, sail
-from shipgym.engine.vessel import load_coefficients, load_ship
+from shipgym.engine.places import (
+    begin_sea, evolve, load_coefficients, load_motion, load_sea, load_sea_parameters, load_ship, push,
+    store_motion, store_sea,
+)  # fmt: skip
 
 #: What is recorded of the sea beside the state: first-order motion, current, wind.
 SEA_CHANNELS = (
@@ -19,38 +22,6 @@ SEA_CHANNELS = (
 )  # fmt: skip
 NO_LIMIT = 1e300
 BEGIN_WORDS = EVOLVE_WORDS = 0  # parts: steps of the random numbers' state
-
-
-def load_motion(states: Any, lane: int) -> Any:
-    """A part: a state in a vector or in a lane of a tile."""
-
-
-def store_motion(states: Any, lane: int, motion: Motion) -> None:
-    """A part: write a state."""
-
-
-def load_sea(sea: Any, lane: int) -> Any:
-    """A part: the state of the sea."""
-
-
-def store_sea(vector: Any, lane: int, sea: Any) -> None:
-    """A part: write the state of the sea."""
-
-
-def load_sea_parameters(parameters: Any, lane: int) -> Any:
-    """A part: the parameters of the sea."""
-
-
-def push(motion: Motion, sea: Any, parameters: Any) -> Any:
-    """A part: what the sea does to the ship."""
-
-
-def evolve(motion: Motion, h: float, sea: Any, word: Any, parameters: Any) -> Any:
-    """A part: the sea after a step."""
-
-
-def begin_sea(motion: Motion, word: Any, parameters: Any) -> Any:
-    """A part: the sea as if it had always been there."""
 
 
 def ship_of(numbers: Any) -> Any:

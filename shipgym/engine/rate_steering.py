@@ -6,7 +6,8 @@ from typing import Any
 
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import lost, sail
-from shipgym.engine.passages import felt, follow, load_motion, ship_of
+from shipgym.engine.passages import felt, follow, ship_of
+from shipgym.engine.places import load_motion
 
 
 def steer_rate(

@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, get_type_hints
 
 LANES = 64
@@ -22,12 +23,14 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
+@cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields, with or without what they are annotated with."""
     namespace = vars(sys.modules[record.__module__])
     return get_type_hints(record, globalns=namespace, include_extras=notes)
 
 
+@cache
 def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
     """Paths of all numbers in a record and the records within it, in order: `u`, `steering.rudder`."""
     paths: list[str] = []

@@ -6,9 +6,9 @@ from math import fabs
 from typing import Any
 
 from shipgym.engine.motion import Push, sail
-from shipgym.engine.passages import NO_LIMIT, load_motion, replaced, store_motion, with_gear
+from shipgym.engine.passages import NO_LIMIT, replaced, with_gear
+from shipgym.engine.places import load_coefficients, load_motion, load_ship, store_motion
 from shipgym.engine.records import LANES
-from shipgym.engine.vessel import load_coefficients, load_ship
 
 
 def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any, out: Any) -> None:

@@ -48,7 +48,7 @@ class Specialisation:
         elif key not in self.made:
             copy = self.copy(part.function)
             if self.jit is not None:
-                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER)(copy)
+                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **SEMANTICS)(copy)
             self.made[key] = copy
         return self.made[key]
 

@@ -20,17 +20,8 @@ from shipgym.engine.motion import (
     rudder_velocity,
     sail,
 )
-from shipgym.engine.passages import (
-    NO_LIMIT,
-    felt,
-    follow,
-    in_depth,
-    load_motion,
-    replaced,
-    ship_of,
-    store_motion,
-    with_gear,
-)
+from shipgym.engine.passages import NO_LIMIT, felt, follow, in_depth, replaced, ship_of, with_gear
+from shipgym.engine.places import load_motion, store_motion
 
 
 def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any) -> None:

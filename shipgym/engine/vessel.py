@@ -9,6 +9,7 @@ from typing import Any
 
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
+from shipgym.engine.places import load_coefficients, load_ship
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout, Record, Rows
 
@@ -83,14 +84,6 @@ def no_accelerations(motion: Any, coefficients: Any, ship: Any) -> tuple[float, 
 def no_shaft(n: float, command: float, coefficients: Any, ship: Any) -> float:
     """A shaft without dynamics."""
     return 0.0
-
-
-def load_ship(ships: Any, lane: int) -> Any:
-    """A part: the `Ship` of a lane."""
-
-
-def load_coefficients(ships: Any, lane: int) -> Any:
-    """A part: the coefficients of a lane."""
 
 
 def read_ship(ships: Any) -> Any:

@@ -25,7 +25,7 @@ from shipgym.engine.record_code import (
     zero,
 )
 from shipgym.engine.records import LANES, Layout, leaves
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, nothing, the_common
 from shipgym.instruments import bridge, perfect
 from shipgym.sea import open_sea
 from shipgym.tasks.definition import TaskDefinition
@@ -209,16 +209,6 @@ class Voyages:
         """The loop `shipgym.engine.episodes.run`."""
         what = f"{self.task.name} for {self.vessel.name!r}"
         return compiled(episodes.run, episodes.SIGNATURE, self.parts, what)
-
-
-def nothing(ships: Any) -> int:
-    """Nothing is common to all lanes."""
-    return 0
-
-
-def the_common(common: Any, ships: Any, lane: int) -> Any:
-    """What was read before the loop."""
-    return common
 
 
 def read_sea(ships: Any) -> Any:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from shipgym.engine.motion import Motion, Push, Ship, lost
-from shipgym.engine.passages import advanced, felt, follow, load_motion, replaced, ship_of
+from shipgym.engine.passages import advanced, felt, follow, replaced, ship_of
+from shipgym.engine.places import load_motion
 
 SWITCH_ITERATIONS = 12
 

@@ -166,25 +166,12 @@ class Episode:
         return np.asarray(self.dt * np.arange(self.n_steps + 1), dtype=np.float64)
 
     def to_trial(self, name: str | None = None, use: str = "fit") -> Trial:
-        """What the ship did, as a trial that can be identified.
+        """What the ship did, as a trial to identify from; by default named by environment, seed and number.
 
-        Parameters
-        ----------
-        name : str, optional
-            Of the trial; by default environment, seed and number of the episode.
-        use : {"fit", "validate", "skip"}
-            What the trial is for.
-
-        Returns
-        -------
-        Trial
-            States that are channels of trials, the orders `delta_command` and `n_command` constant from each
-            sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
-
-        Raises
-        ------
-        InputError
-            For an episode of a single step, which is too short for a trial.
+        It has the states that are channels of trials, the orders `delta_command` and `n_command` constant
+        from each sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
+        `use` is "fit", "validate" or "skip". Raises InputError for an episode of a single step, which is too
+        short for a trial.
         """
         channels = {key: values for key, values in self.states.items() if key in CHANNELS}
         channels["psi"] = np.unwrap(channels["psi"])

@@ -74,20 +74,9 @@ def pull_out(
 def pull_out_indices(trial: Trial) -> PullOutIndices:
     """Yaw rate of the turn and the yaw rate left at the end of a measured or simulated pull-out.
 
-    Parameters
-    ----------
-    trial : Trial
-        With r and delta (or delta_command), the rudder held in a turn and then put amidships to the end.
-
-    Returns
-    -------
-    PullOutIndices
-        Means over the last tenth of the turn and of the time amidships.
-
-    Raises
-    ------
-    InputError
-        If a channel is missing, or the rudder was never put amidships.
+    Means over the last tenth of the turn and of the time amidships. The trial has r and delta (or
+    delta_command): the same rudder in a turn, then amidships to the end. Raises InputError if a channel is
+    missing, or the rudder was never put amidships.
     """
     require(trial, ("r",), "a pull-out")
     delta = np.abs(rudder(trial))

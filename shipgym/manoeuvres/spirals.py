@@ -209,17 +209,9 @@ def spiral_from_trial(
 
 
 def spiral_indices(spiral: Spiral) -> SpiralIndices:
-    """Width and height of the loop of a spiral.
+    """Width and height of the loop of a spiral, simulated or measured (`spiral_from_trial`).
 
-    Parameters
-    ----------
-    spiral : Spiral
-        Simulated, or measured (`spiral_from_trial`).
-
-    Raises
-    ------
-    InputError
-        If the yaw rate never changes its side, or a direct spiral does not come back.
+    Raises InputError if the yaw rate never changes its side, or a direct spiral does not come back.
     """
     check_choice(spiral.method, ("direct", "reverse"), "spiral method")
     if spiral.yaw_rate_deg_s.min() >= 0.0 or spiral.yaw_rate_deg_s.max() <= 0.0:

@@ -140,24 +140,12 @@ def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
 def stopping_indices(
     trial: Trial, speed_ratio: float | None = None, length: float | None = None
 ) -> StoppingIndices:
-    """Stopping distance of a measured or simulated stop, from the first sample on.
+    """Stopping distance of a measured or simulated stop, from the first sample, that of the order, on.
 
-    Parameters
-    ----------
-    trial : Trial
-        With u, v, x, y and psi, beginning with the order.
-    speed_ratio : float, optional
-        Surge speed at which the ship counts as stopped, by that at the start; by default the end of the
-        trial.
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing.
-    ManoeuvreError
-        If the speed is never reached.
+    The trial has u, v, x, y and psi. The ship counts as stopped at `speed_ratio` of the surge speed at the
+    start, by default at the end of the trial; `length` is that between perpendiculars, m, by default the
+    trial's own. Raises InputError if a channel or the length is missing, ManoeuvreError if the speed is never
+    reached.
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp, u = ship_length(trial, length), trial["u"]
@@ -226,19 +214,9 @@ def acceleration(
 def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None = None) -> AccelerationIndices:
     """Time and distance in which a ship makes a part of a change of speed.
 
-    Parameters
-    ----------
-    trial : Trial
-        With u and v, beginning with the order and ending at steady speed.
-    part : float
-        Of the change of surge speed from the first sample to the last.
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing, or the ship does not become faster.
+    The trial has u and v, beginning with the order and ending at steady speed; `part` is that of the change
+    of surge speed from the first sample to the last, `length` as in `stopping_indices`. Raises InputError if
+    a channel or the length is missing, or the ship does not become faster.
     """
     require(trial, ("u", "v"), "an acceleration")
     check_number(part, "part", above=0.0, below=1.0)

@@ -73,20 +73,9 @@ def static_drift(
 ) -> Trial:
     """Tow a ship steadily at one drift angle after the other: forces X, Y (N) and N (N m).
 
-    Parameters
-    ----------
-    model : ShipModel
-    drift_deg : sequence of float
-        Drift angles at midship, degrees, positive with the bow to starboard of the course: v = -U sin(drift).
-    hold_s : float
-        Time for which each is recorded, s; `tank.samples` rows an angle.
-    tank : Tank, optional
-        Speed, rudder, shaft, noise, ...
-
-    Raises
-    ------
-    InputError
-        For no angle, or a number out of range.
+    Drift angles at midship are in degrees, positive with the bow to starboard of the course: v = -U
+    sin(drift). Each is recorded for `hold_s` seconds, in `tank.samples` rows. Raises InputError for no angle,
+    or a number out of range.
     """
     tank = tank or Tank()
     angles = [
@@ -108,15 +97,8 @@ def pure_surge(
 ) -> Trial:
     """Oscillate a ship in surge about the speed of the carriage.
 
-    Parameters
-    ----------
-    model : ShipModel
-    amplitude : float
-        Of the surge speed, m/s, less than the speed of the carriage.
-    period_s : float, optional
-        s; by default 10 times the time to travel one ship length.
-    tank : Tank, optional
-        Speed, rudder, shaft, noise, ...
+    The amplitude of the surge speed, m/s, is less than the speed of the carriage; the period, s, is by
+    default 10 times the time to travel one ship length.
     """
     tank = tank or Tank()
     speed = tank.carriage_speed(model)

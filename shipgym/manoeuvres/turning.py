@@ -79,17 +79,8 @@ def turning_circle(
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
     """Advance, transfer, diameters and the steady turn of a measured or simulated turning circle.
 
-    Parameters
-    ----------
-    trial : Trial
-        With x, y, psi, u, v, r and delta (or delta_command).
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing.
+    The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is that between perpendiculars, m,
+    by default the trial's own. Raises InputError if a channel or the length is missing.
     """
     require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)

@@ -135,19 +135,10 @@ def zigzag_indices(
 ) -> ZigzagIndices:
     """Overshoots, initial turning and period of a measured or simulated zigzag.
 
-    Parameters
-    ----------
-    trial : Trial
-        With psi and delta (or delta_command), and u and v for the distance.
-    length : float, optional
-        Ship length between perpendiculars, m; by default the trial's own.
-    heading_deg : float, optional
-        Heading change at which the rudder had to be reversed, degrees; by default `switch_heading_deg`.
-
-    Raises
-    ------
-    InputError
-        If a channel or the length is missing.
+    The trial has psi and delta (or delta_command), and u and v for the distance; `length` is that between
+    perpendiculars, m, by default the trial's own; `heading_deg` is the heading change at which the rudder had
+    to be reversed, degrees, by default `switch_heading_deg`. Raises InputError if a channel or the length is
+    missing.
     """
     start, turns = reversals(trial)
     if not turns:

@@ -203,20 +203,9 @@ def sea_states() -> dict[str, SeaState]:
 
 @dataclass(frozen=True)
 class Weather:
-    """What the sea does to a ship; each part is optional.
+    """What the sea does to a ship: current, wind and waves, each optional, and a name for reports.
 
-    Parameters
-    ----------
-    current : Current, optional
-    wind : Wind, optional
-    waves : Waves, optional
-    name : str
-        For reports.
-
-    Raises
-    ------
-    InputError
-        For parts that are not of these types.
+    Raises InputError for parts that are not of these types.
     """
 
     current: Current | None = None
@@ -237,22 +226,11 @@ class Weather:
     def from_sea_state(
         cls, name: str | int, from_deg: float | None = 45.0, current: Current | None = None
     ) -> Weather:
-        """Wind and waves of a sea state of WMO code table 3700.
+        """Wind and waves of WMO code table 3700: "calm", "slight", "moderate", "rough", or 0, 3, 4, 5.
 
-        Parameters
-        ----------
-        name : {"calm", "slight", "moderate", "rough"} or int
-            In words, or the code number: 0, 3, 4, 5.
-        from_deg : float or None
-            Where wind and waves come from, degrees clockwise from north; by default north-east. None: drawn
-            anew for each episode of an environment.
-        current : Current, optional
-            A current beside them.
-
-        Raises
-        ------
-        InputError
-            For a sea state that is not in the table.
+        Wind and waves come from `from_deg`, degrees clockwise from north, by default north-east; None: drawn
+        anew for each episode of an environment. A current may be given beside them. Raises InputError for a
+        sea state that is not in the table.
         """
         state = _find_sea_state(name)
         if state.wind_speed == 0.0:

@@ -92,16 +92,9 @@ def list_models() -> list[str]:
 def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     """Make a ship with equations of her own known by her name, so that `load_model` finds her.
 
-    Parameters
-    ----------
-    ship : ShipEquations, str or Path
-        The ship, or the Python file that defines her as `SHIP`. The file is run. A ship that does not come
-        from a file, or from one that cannot be imported, stays in this process.
-
-    Raises
-    ------
-    InputError
-        For a file that does not define a ship, or a name that another ship or structure has.
+    Given is the ship, or the Python file that defines her as `SHIP`, which is run. A ship that does not come
+    from a file, or from one that cannot be imported, stays in this process. Raises InputError for a file that
+    does not define a ship, or a name that another ship or structure has.
     """
     found = ship if isinstance(ship, ShipEquations) else read_ship_equations(ship)
     name = found.name
@@ -119,16 +112,9 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
 def load_model(name: str | Path) -> ShipModel:
     """A model by name, or from a file.
 
-    Parameters
-    ----------
-    name : str or Path
-        A name of `list_models`, the path of a model file, or that of a Python file with the equations of a
-        ship (`register_ship_equations`), which is run.
-
-    Raises
-    ------
-    InputError
-        If there is no such model or file, or the file is not a valid model.
+    A name of `list_models`, the path of a model file, or that of a Python file with the equations of a ship
+    (`register_ship_equations`), which is run. Raises InputError if there is no such model or file, or the
+    file is not a valid model.
     """
     path = Path(name)
     if path.suffix == ".py":

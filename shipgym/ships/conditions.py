@@ -1,19 +1,17 @@
 """What a simulation happens in: depth of the water, weather, and the seed that the weather follows from."""
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.engine.loops import compile_loop, ship_loop
+from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
-from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
-from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, Sea, sea_parts
+from shipgym.sea.open_sea import Sea
 from shipgym.sea.weather_column import as_weather, weather_column
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
@@ -49,7 +47,7 @@ class Passage:
 
     def loop(self, name: str) -> Any:
         """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
-        return _windy_loop(self.vessel, name) if self.windy else ship_loop(self.vessel, name)
+        return ship_loop(self.vessel, name, self.windy)
 
     def states(self, first: Floats, n_steps: int) -> Floats:
         """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
@@ -59,12 +57,6 @@ class Passage:
         if len(first) < width:
             self.loop("meet")(states, *self.sea)
         return states
-
-
-@cache
-def _windy_loop(vessel: Vessel, name: str) -> Any:
-    words = {"BEGIN_WORDS": BEGIN_WORDS, "EVOLVE_WORDS": EVOLVE_WORDS}
-    return compile_loop(vessel, name, {**sea_parts(True, lanes=1), **words})
 
 
 def _first_word(seed: Seed) -> np.uint64:

@@ -15,7 +15,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -83,6 +83,7 @@ class ShipEquations:
     astern: bool = False
     switches: tuple[str, ...] = ()
     path: Path | None = field(default=None, repr=False)
+    normalisation: ClassVar[str] = "own"  # as a model file has it: the publication's units
 
     def __post_init__(self) -> None:
         check_text(self.name, "ship equations: name")
@@ -157,11 +158,6 @@ class ShipEquations:
         roll = ("p", "phi") if self.rolls else ()
         shaft = ("n",) if self.shaft_acceleration is not None else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
-
-    @property
-    def normalisation(self) -> str:
-        """As a model file has it: the units of its coefficients are the publication's."""
-        return "own"
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""

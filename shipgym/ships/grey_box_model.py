@@ -55,18 +55,9 @@ def converted_model(
 ) -> ShipModel:
     """The bare reference ship as a model of another ship: a grey box whose terms are all zero.
 
-    Parameters
-    ----------
-    reference : str, ShipModel or GreyBox
-        As in `grey_box`.
-    particulars : Particulars
-        Of the target, with its service speed.
-    steering : SteeringGear
-        Of the target.
-    service_shaft_speed : float
-        Of the target, 1/s; 0: not known, and the reference ship's is taken as at service speed.
-    name : str, optional
-        By default the target's.
+    The reference is as in `grey_box`, or a grey box; particulars (with the service speed), steering gear,
+    shaft speed at service speed (1/s) and name are those of the target. A shaft speed of 0 is not known: the
+    reference ship's is taken as at service speed.
     """
     box = reference
     if not isinstance(box, GreyBox):

@@ -42,21 +42,16 @@ class GreyBox(Structure):
     reference ship's accelerations back to the target. The terms are added. Water is deep. The shaft turns as
     commanded, whatever lag the reference ship's has.
 
-    Attributes
-    ----------
-    reference : ManoeuvringModel
-        The reference ship: with equations of its own or a table of terms, without heave or trim.
-    shaft : bool
-        Whether the target's shaft speed is known: then the reference ship's is that times the ratio of the
-        shaft speeds at service speed. If not, its shaft turns as at service speed.
-
     Raises
     ------
     InputError
         For a table of forces, and for a reference ship that is a grey box itself or has no rudder.
     """
 
+    # the reference ship: with equations of its own or a table of terms, without heave or trim
     reference: ManoeuvringModel | None = None
+    # whether the target's shaft speed is known: then the reference ship's is that times the ratio of the
+    # shaft speeds at service speed. If not, its shaft turns as at service speed
     shaft: bool = False
 
     def __post_init__(self) -> None:
@@ -144,20 +139,10 @@ class GreyBox(Structure):
     ) -> dict[str, Floats]:
         """Accelerations of the reference ship, evaluated at and converted back to the target.
 
-        Parameters
-        ----------
-        channels : mapping of str to array of shape (n_samples,)
-            Of the target: u, v, r, delta, and n, p, phi where known; SI units.
-        particulars : Particulars
-            The target's length and service speed.
-        shaft_speed : float
-            The target's at service speed, 1/s.
-
-        Returns
-        -------
-        dict of str to array of shape (n_samples,)
-            By equation `u`, `v`, `r`, and `q` where the reference ship has a memory of yaw: SI units of the
-            target.
+        The channels of the target are u, v, r, delta, and n, p, phi where known, each of shape (n_samples,),
+        SI units; its particulars give length and service speed, the shaft speed is that at service speed,
+        1/s. Returns arrays of shape (n_samples,) by equation `u`, `v`, `r`, and `q` where the reference ship
+        has a memory of yaw.
         """
         ship = self.ship
         fast = ship.particulars["speed"] / particulars["speed"]

@@ -115,18 +115,9 @@ class Particulars(Mapping[str, Any]):
     def from_mapping(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Particulars:
         """Make particulars from the keys of the ship file's ``[ship]``.
 
-        Parameters
-        ----------
-        mapping : mapping of str to Any
-            Values by name; added masses there or in a table ``added_mass``; ``estimated`` as
-            :meth:`to_dict` writes it. None stands for a value that is not known.
-        where : str, optional
-            Start of each message, such as ``"ship.toml: [ship]"``.
-
-        Raises
-        ------
-        InputError
-            For an unknown key, a missing length, a wrong type or a value that no ship has.
+        Added masses stand there or in a table ``added_mass``; ``estimated`` is as :meth:`to_dict` writes it;
+        None stands for a value that is not known. Raises InputError, beginning with `where`, for an unknown
+        key, a missing length, a wrong type or a value that no ship has.
         """
         table = dict(check_table(mapping, where))
         added = dict(check_table(table.pop("added_mass", None) or {}, f"{where} added_mass"))

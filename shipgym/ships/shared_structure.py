@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -56,6 +56,8 @@ class SharedStructure(Structure):
 
     # what makes up X (`u`), Y (`v`) and N (`r`)
     shares: Mapping[str, tuple[Share, ...]] = field(default_factory=dict)
+    # its added masses are among the unknowns, which only measured forces tell from the mass
+    captive: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -70,11 +72,6 @@ class SharedStructure(Structure):
                         f"{where}: '{share.acceleration}' found in the equation of '{axis}', expected 'udot' "
                         "in that of surge, 'vdot' and 'rdot' in those of sway and yaw"
                     )
-
-    @property
-    def captive(self) -> bool:
-        """Its added masses are among the unknowns, which only measured forces tell from the mass."""
-        return True
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:

@@ -93,19 +93,9 @@ class ShipModel(ManoeuvringModel):
         return simulate(self, commands, dt, state, water_depth, weather=weather, seed=seed)
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[ShipModel]:
-        """Models whose coefficients are drawn from the identified covariance.
+        """N models whose coefficients are drawn from the identified covariance; the same for the same seed.
 
-        Parameters
-        ----------
-        n : int
-            How many.
-        seed : int or Generator
-            Of the draw.
-
-        Raises
-        ------
-        InputError
-            If the model has no covariance.
+        Raises InputError if the model has no covariance.
         """
         if self.covariance is None:
             raise InputError(

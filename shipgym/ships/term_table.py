@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -48,35 +48,27 @@ class Structure:
     Yaw may have a memory q: part of its acceleration that builds up, rdot = (terms of `r`) + q and
     qdot = (terms of `q`). It is the state that makes yaw of second order without sway.
 
-    Attributes
-    ----------
-    name : str
-        Name by which `identify` and model files know it.
-    source : str
-        Where it was published.
-    equations : dict of str to tuple of Term
-        Terms of surge (`u`), sway (`v`), yaw (`r`), roll (`p`) and of the memory of yaw (`q`), in this
-        order; roll and memory of accelerations only, and not both.
-    normalisation : {"prime", "service", "si"}
-        Units of the terms and of what they make up. "prime": divided by the instantaneous speed U and the
-        length (u/U, rL/U, nL/U; force by rho L^2 U^2 / 2, acceleration by U^2 / L). "service": the same with
-        the service speed U0 in place of U, shaft speed divided by that of service. "si": as they are.
-    quantity : {"force", "acceleration"}
-        What the terms make up (those of `q` accelerations per time). Accelerations follow from forces by
-        the inertia of the particulars (mass
-        and added mass, sway and yaw coupled).
-
     Raises
     ------
     InputError
         For a table that cannot be computed, naming equation and term.
     """
 
-    name: str
-    source: str
+    name: str  # name by which `identify` and model files know it
+    source: str  # where it was published
+    # terms of surge (`u`), sway (`v`), yaw (`r`), roll (`p`) and of the memory of yaw (`q`), in this order;
+    # roll and memory of accelerations only, and not both
     equations: Mapping[str, tuple[Term, ...]]
+    # {"prime", "service", "si"}; units of the terms and of what they make up. "prime": divided by the
+    # instantaneous speed U and the length (u/U, rL/U, nL/U; force by rho L^2 U^2 / 2, acceleration by U^2 /
+    # L). "service": the same with the service speed U0 in place of U, shaft speed divided by that of service.
+    # "si": as they are
     normalisation: str = "prime"
+    # {"force", "acceleration"}; what the terms make up (those of `q` accelerations per time). Accelerations
+    # follow from forces by the inertia of the particulars (mass and added mass, sway and yaw coupled)
     quantity: str = "force"
+    captive: ClassVar[bool] = False  # whether it is identified from the forces of captive tests
+    shallow_water: ClassVar[bool] = False  # whether it knows the depth of the water
 
     def __post_init__(self) -> None:
         where = f"structure '{self.name}'"
@@ -155,11 +147,6 @@ class Structure:
         return tuple(name for name in SYMBOLS if name in channels - {"U"})
 
     @property
-    def captive(self) -> bool:
-        """Whether it is identified from the forces of captive tests, not from free-running trials."""
-        return False
-
-    @property
     def has_rudder(self) -> bool:
         """Whether the rudder stands in a term."""
         return "delta" in {CHANNEL[symbol] for symbol in self.symbols}
@@ -185,11 +172,6 @@ class Structure:
         """Names of the coefficients in the regression of one equation."""
         memory = self.names("q") if equation == "r" and "q" in self.equations else ()
         return self.names(equation) + memory
-
-    @property
-    def shallow_water(self) -> bool:
-        """Whether the depth of the water is known to it."""
-        return False
 
     @property
     def astern(self) -> bool:

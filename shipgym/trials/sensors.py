@@ -141,25 +141,12 @@ class Sensors:
         object.__setattr__(self, "by_channel", MappingProxyType(dict(self.by_channel)))
 
     def measure(self, trial: Trial, seed: int = 0) -> Trial:
-        """What the log of a trial would hold.
+        """What the log of a trial, the true motion, would hold.
 
-        Parameters
-        ----------
-        trial : Trial
-            The true motion.
-        seed : int
-            The same seed gives the same readings, channel by channel: a sensor more or less changes no other.
-
-        Returns
-        -------
-        Trial
-            Of the same channels and name; samples in gaps are left out. Heading, heel and their rates have
-            the first-order motion in waves in them; the weather itself is not measured.
-
-        Raises
-        ------
-        InputError
-            If the seed is not a whole number >= 0, or sampling and gaps leave fewer than three samples.
+        The same seed gives the same readings, channel by channel: a sensor more or less changes no other.
+        Channels and name are the trial's; samples in gaps are left out. Heading, heel and their rates have
+        the first-order motion in waves in them; the weather itself is not measured. Raises InputError if the
+        seed is not a whole number >= 0, or sampling and gaps leave fewer than three samples.
         """
         check_whole(seed, "seed", at_least=0)
         t = self._sampled(trial)

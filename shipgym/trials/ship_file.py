@@ -53,16 +53,9 @@ class ShipFile:
     def load(cls, path: str | Path) -> ShipFile:
         """Read and check a ship file; the trials' CSV files must exist and are read by :meth:`trials`.
 
-        Parameters
-        ----------
-        path : str or Path
-            The TOML file. Paths in it are relative to its folder, or absolute.
-
-        Raises
-        ------
-        InputError
-            For a missing file, broken TOML, an unknown key or word, a wrong type or value, no trials, a trial
-            listed twice or a missing CSV file, naming file, field, value and remedy.
+        Paths in the file are relative to its folder, or absolute. Raises InputError for a missing file,
+        broken TOML, an unknown key or word, a wrong type or value, no trials, a trial listed twice or a
+        missing CSV file, naming file, field, value and remedy.
         """
         path = Path(path)
         data = _read_toml(path)

@@ -198,6 +198,31 @@ def test_doctor_tells_of_a_cache_that_cannot_be_written(tmp_path, monkeypatch):
     assert "compiles its ships anew" in answer.stdout
 
 
+def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
+    (tmp_path / "it.loop").write_bytes(bytes(200_000))
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
+    assert f"{tmp_path}, 1 files, 0.2 MB" in shipgym("doctor").stdout.replace("\n", "")
+
+
+def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
+    cache, here = tmp_path / "cache", tmp_path / "here"
+    here.mkdir()
+    command = [sys.executable, "-m", "agents.cli", "warm", "shipgym/CourseKeeping-v0", "--json"]
+    environment = {**os.environ, "SHIPGYM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
+    answer = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=True)
+    told = json.loads(answer.stdout)
+    assert told["cache"] == str(cache)
+    assert [one["refused"] for one in told["ready"]] == ["", ""]
+    assert len(list(cache.glob("*.loop"))) == 2
+    assert not list(here.iterdir())
+
+
+def test_warm_knows_environments_and_models():
+    answer = shipgym("warm", "titanic")
+    assert answer.exit_code == 2
+    assert "'titanic' found, expected an environment's id or a model" in answer.stderr
+
+
 def test_doctor_tells_of_another_distribution_called_agents(monkeypatch):
     monkeypatch.setattr(
         "importlib.metadata.packages_distributions", lambda: {"agents": ["shipgym", "openai-agents"]}

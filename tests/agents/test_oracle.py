@@ -28,13 +28,13 @@ ONE_TURN = path_following_task(
 
 
 @pytest.mark.parametrize(
-    "variety", [None, Randomisation(speed_range=(0.6, 1.0))], ids=["one ship", "drawn ships"]
+    "randomisation", [None, Randomisation(speed_range=(0.6, 1.0))], ids=["one ship", "drawn ships"]
 )
 def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(
-    variety: Randomisation | None,
+    randomisation: Randomisation | None,
 ) -> None:
     task = course_keeping_task(sea="rough", noise=2.0, change_interval_steps=10)
-    ships, copies = Engine(MARINER, 3, task, variety), Engine(MARINER, 70, task, variety)
+    ships, copies = Engine(MARINER, 3, task, randomisation), Engine(MARINER, 70, task, randomisation)
     rudder = np.random.default_rng(1).uniform(-1.0, 1.0, (60, 3, 1))
     ships.reset(SEEDS)
     for action in rudder[:25]:

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym.engine import compiling, mathematics
+from shipgym.engine import mathematics
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
 from shipgym.engine.specialise import fingerprint
@@ -36,12 +36,6 @@ for name in ("mariner", "container", "tanker", "kvlcc2"):
         found += [float(trial[channel][-1]) for channel in ("x", "psi", "v", "r")]
 print(repr(found))
 """
-COMPILE = """
-import shipgym
-from shipgym.engine.loops import ship_loop
-model = shipgym.load_model("mariner")
-print(ship_loop(model.vessel, "simulate") is not None)
-"""
 
 
 def run(code: str, **environment: str) -> str:
@@ -60,16 +54,6 @@ def test_without_compiling_the_numbers_are_the_same():
     np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9, atol=1e-12)
 
 
-def test_processes_may_compile_at_once_and_one_does(tmp_path):
-    environment = {**os.environ, "SHIPGYM_CACHE": str(tmp_path)}
-    workers = [
-        subprocess.Popen([sys.executable, "-c", COMPILE], env=environment, stdout=subprocess.PIPE)
-        for _ in range(3)
-    ]
-    assert [worker.communicate()[0] for worker in workers] == [b"True\n"] * 3
-    assert len(list(tmp_path.glob("*.nbc"))) == len(list(tmp_path.glob("*.nbi"))) == 1
-
-
 def test_another_ship_or_an_edited_function_has_a_file_of_its_own():
     loop = LOOPS["simulate"].function
     ships = [shipgym.load_model(name).vessel for name in ("mariner", "container")]
@@ -86,17 +70,6 @@ def test_another_ship_or_an_edited_function_has_a_file_of_its_own():
     }
     assert len(tags) == 4
     assert fingerprint(loop, ships[0].parts(1)) in tags
-
-
-def test_a_cache_that_cannot_be_written_is_said_and_survived(tmp_path, monkeypatch):
-    (tmp_path / "file").write_text("")
-    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
-    compiling._folder.cache_clear()
-    vessel = shipgym.load_model("mariner").vessel
-    loop = LOOPS["derivatives"]
-    with pytest.warns(UserWarning, match="compiled anew in each process"):
-        assert compiling.compiled(loop.function, loop.signature, vessel.parts(1), "mariner") is not None
-    compiling._folder.cache_clear()
 
 
 def test_each_coefficient_is_read_once_and_what_terms_share_is_taken_out():

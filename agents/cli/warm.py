@@ -1,0 +1,110 @@
+"""`shipgym warm`: compile beforehand what environments and models need, so that nobody waits for it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from functools import partial
+from typing import Annotated, Any
+
+import typer
+
+from agents.cli.command import Json, answered
+
+Wanted = Annotated[
+    list[str] | None,
+    typer.Argument(metavar="[ID|MODEL]...", help="Environments' ids, names of models, model files."),
+]
+All = Annotated[
+    bool, typer.Option("--all", help="All environments, calm and in a sea, and all shipped models.")
+]
+SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
+
+
+@dataclass(frozen=True)
+class Warmed:
+    """One thing that is ready now.
+
+    Attributes
+    ----------
+    what : str
+    seconds : float
+        That it took; little if it was in the cache.
+    refused : str
+        Why it cannot be; empty as a rule.
+    """
+
+    what: str
+    seconds: float
+    refused: str = ""
+
+
+@answered
+def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json = False) -> None:
+    """Compile ships beforehand; without arguments, both tasks and the Mariner.
+
+    An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
+    simulations in calm water. Writes nothing but the cache (SHIPGYM_CACHE, else the user's cache folder).
+    """
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json
+    from shipgym.engine.cache_folder import cache_folder
+    from shipgym.errors import InputError
+
+    jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name))
+    done = []
+    for number, (what, job) in enumerate(jobs.items(), start=1):
+        begin, refused = time.perf_counter(), ""
+        try:
+            job()
+        except InputError as error:
+            if not everything:
+                raise
+            refused = str(error)  # not every ship has the particulars that a sea asks for
+        done.append(Warmed(what, round(time.perf_counter() - begin, 2), refused))
+        if not as_json:
+            console.print(
+                f"{number}/{len(jobs)}  {what}: {refused or f'{done[-1].seconds:.1f} s'}", soft_wrap=True
+            )
+    if as_json:
+        print_json({"cache": str(cache_folder()), "ready": [asdict(one) for one in done]})
+    else:
+        console.print(f"kept in {cache_folder()}", soft_wrap=True)
+
+
+def _names(wanted: list[str] | None, everything: bool) -> list[str]:
+    """Environments and models that are asked for."""
+    from shipgym.envs.registration import TASKS, VARIANTS
+    from shipgym.ships import list_models
+
+    if everything:
+        return [f"shipgym/{task}{variant}-v0" for task in TASKS for variant in VARIANTS] + list_models()
+    return wanted or [*(f"shipgym/{task}-v0" for task in TASKS), "mariner"]
+
+
+def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """What is to be compiled for an id or a model, each with words for it."""
+    import gymnasium
+
+    import shipgym
+    from shipgym.engine.loops import LOOPS, ship_loop
+    from shipgym.errors import InputError
+
+    if name in gymnasium.registry:
+        for sea in SEAS:
+            options: dict[str, Any] = {} if sea is None else {"sea": sea}
+            yield f"{name} in {'calm water' if sea is None else 'a sea'}", partial(_make, name, options)
+        return
+    try:
+        model = shipgym.load_model(name)
+    except InputError as error:
+        raise InputError(f"{name!r} found, expected an environment's id or a model: {error}") from None
+    for loop in LOOPS:
+        yield f"{model.name}: {loop}", partial(ship_loop, model.vessel, loop)
+
+
+def _make(env_id: str, options: dict[str, Any]) -> None:
+    import gymnasium
+
+    gymnasium.make(env_id, **options).close()
