@@ -95,7 +95,7 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
     try:
         with global_compiler_lock, lean(name.rpartition("_")[2], name):
             dispatcher.compile(signature)
-    except (NumbaError, TypeError) as error:  # TypeError: a record of other fields
+    except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
 
 
