@@ -25,10 +25,7 @@ class GuardedFit:
 
 
 def guarded_fit(
-    method: Method,
-    settings: Mapping[str, Any],
-    task: FitTask,
-    guarded: bool = True,
+    method: Method, settings: Mapping[str, Any], task: FitTask, guarded: bool = True
 ) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
 

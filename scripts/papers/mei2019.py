@@ -248,10 +248,7 @@ def _measured_models(target: Target | None) -> dict[str, list[ShipModel]]:
     """Their way and at best, and the bare reference beside; none where the data is not at hand."""
     if target is None:
         return {"": [], BARE: []}
-    return {
-        "": [papers_way(target).model, our_way(target, TANKER).model],
-        BARE: [target.bare(TANKER)],
-    }
+    return {"": [papers_way(target).model, our_way(target, TANKER).model], BARE: [target.bare(TANKER)]}
 
 
 def _measured_row(

@@ -13,22 +13,8 @@ from identification.pipeline import identify
 from identification.validation.guard import reasons_unstable
 from identification.validation.prediction import predict
 from real_ships.data import Data, MeasuredShip
-from real_ships.measures import (
-    MEASURES,
-    Floats,
-    error_cells,
-    mean_errors,
-    turns,
-    zigzag_errors,
-)
-from real_ships.recipe import (
-    REFERENCE,
-    STRUCTURE,
-    fitted,
-    fitted_with_table,
-    known,
-    with_fixed_pull,
-)
+from real_ships.measures import MEASURES, Floats, error_cells, mean_errors, turns, zigzag_errors
+from real_ships.recipe import REFERENCE, STRUCTURE, fitted, fitted_with_table, known, with_fixed_pull
 from real_ships.section import Section, table
 from shipgym.manoeuvres import TurningIndices
 from shipgym.ships import ShipModel

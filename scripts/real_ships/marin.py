@@ -14,23 +14,8 @@ from real_ships.data import Data, MeasuredShip
 from real_ships.hsva import OURS
 from real_ships.hsva import RUNS as HSVA_RUNS
 from real_ships.hsva import SHIP as HSVA
-from real_ships.measures import (
-    MEASURES,
-    error_cells,
-    mean_errors,
-    turn_cells,
-    turns,
-    zigzag_errors,
-)
-from real_ships.recipe import (
-    REFERENCE,
-    STRENGTHS,
-    STRUCTURE,
-    chosen_strength,
-    known,
-    pulled,
-    refined,
-)
+from real_ships.measures import MEASURES, error_cells, mean_errors, turn_cells, turns, zigzag_errors
+from real_ships.recipe import REFERENCE, STRENGTHS, STRUCTURE, chosen_strength, known, pulled, refined
 from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 from shipgym.ships.scaling import scale_model

@@ -9,15 +9,7 @@ from identification.pipeline import identify
 from identification.validation.prediction import predict, trial_metrics
 from real_ships.data import Data, MeasuredShip
 from real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
-from real_ships.measures import (
-    MEASURES,
-    Floats,
-    error_cells,
-    mean_errors,
-    turn_cells,
-    turns,
-    zigzag_errors,
-)
+from real_ships.measures import MEASURES, Floats, error_cells, mean_errors, turn_cells, turns, zigzag_errors
 from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 

@@ -50,8 +50,7 @@ LOOPS = {
     ),
     "meet": Loop(passages.meet, f"void(float64[:, ::1], {SEA})"),
     "simulate": Loop(
-        trajectories.simulate,
-        f"int64(float64[:, ::1], float64[:, ::1], float64, {SEA}, float64[::1])",
+        trajectories.simulate, f"int64(float64[:, ::1], float64[:, ::1], float64, {SEA}, float64[::1])"
     ),
     "open_loop": Loop(
         trajectories.open_loop,

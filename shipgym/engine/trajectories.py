@@ -10,16 +10,7 @@ from math import ceil, fabs
 from typing import Any
 
 from shipgym.engine.mathematics import clip, sin_cos
-from shipgym.engine.motion import (
-    HAS_SHAFT,
-    Motion,
-    Push,
-    ground_velocity,
-    lost,
-    rates,
-    rudder_velocity,
-    sail,
-)
+from shipgym.engine.motion import HAS_SHAFT, Motion, Push, ground_velocity, lost, rates, rudder_velocity, sail
 from shipgym.engine.passages import NO_LIMIT, felt, follow, in_depth, replaced, ship_of, with_gear
 from shipgym.engine.places import load_motion, store_motion
 

@@ -15,15 +15,7 @@ from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Motion
 from shipgym.engine.parts import Part
 from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
-from shipgym.engine.record_code import (
-    bounded_storer,
-    chooser,
-    loader,
-    number_storer,
-    storer,
-    summer,
-    zero,
-)
+from shipgym.engine.record_code import bounded_storer, chooser, loader, number_storer, storer, summer, zero
 from shipgym.engine.records import LANES, Layout, leaves
 from shipgym.engine.vessel import Vessel, nothing, the_common
 from shipgym.instruments import bridge, perfect

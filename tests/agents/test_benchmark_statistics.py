@@ -25,10 +25,7 @@ def test_interquartile_mean_of_eight_scores_by_hand():
 
 
 @settings(max_examples=60, deadline=None)
-@given(
-    st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=12),
-    st.integers(0, 2**32 - 1),
-)
+@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=12), st.integers(0, 2**32 - 1))
 def test_weighted_interquartile_means_are_scipys_of_the_samples(values, seed):
     array, n = np.array(values), len(values)
     weights = np.random.default_rng(seed).multinomial(3 * n, np.full(n, 1.0 / n), 4)

@@ -7,17 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from direct_search import (
-    FIRST_SEED,
-    LAWS,
-    REFUSED,
-    Setting,
-    is_sane,
-    search,
-    search_spaces,
-    tunable,
-    tune,
-)
+from direct_search import FIRST_SEED, LAWS, REFUSED, Setting, is_sane, search, search_spaces, tunable, tune
 
 from agents import PID
 from agents.controllers.designs import CLASSICAL, design, tuned

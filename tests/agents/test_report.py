@@ -195,8 +195,7 @@ def test_a_minus_is_a_minus():
 
 
 @pytest.mark.parametrize(
-    ("share", "shown"),
-    [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")],
+    ("share", "shown"), [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")]
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown

@@ -31,14 +31,7 @@ OFF_POLICY = {
     "total_steps": 144,
 }
 TINY = {
-    "ppo": {
-        "base": "none",
-        "ships": 8,
-        "n_steps": 32,
-        "batch_size": 64,
-        "n_epochs": 2,
-        "total_steps": 768,
-    },
+    "ppo": {"base": "none", "ships": 8, "n_steps": 32, "batch_size": 64, "n_epochs": 2, "total_steps": 768},
     "sac": OFF_POLICY,
     "td3": OFF_POLICY,
     "tqc": OFF_POLICY,
@@ -231,10 +224,7 @@ def test_the_command_trains_and_resumes(tmp_path):
         (["train", "ppo", "--env", "curse-keeping"], "Did you mean 'course-keeping'?"),
         (["train", "ppo", "--set", "gama=0.9"], "Did you mean 'gamma'?"),
         (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
-        (
-            ["train", "ppo", "--set", "batch_size=1000"],
-            "a divisor above 1 of ships x n_steps, 32768",
-        ),
+        (["train", "ppo", "--set", "batch_size=1000"], "a divisor above 1 of ships x n_steps, 32768"),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
         (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
         (["train", "ppo", "--set", "base=none", "--set", "authority=0.5"], "without a base"),

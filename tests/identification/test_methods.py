@@ -156,10 +156,7 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
         ({"method": "tls-svm", "rank": 0}, "rank: 0"),
         ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
         ({"method": "svr", "C": float("inf")}, "C: inf"),
-        (
-            {"method": "ls", "rank": 3, "epsilon": 0.1},
-            "settings: epsilon, rank found, which method 'ls'",
-        ),
+        ({"method": "ls", "rank": 3, "epsilon": 0.1}, "settings: epsilon, rank found, which method 'ls'"),
         ({"depth": 2}, "depth: identify has no such option"),
     ],
 )

@@ -154,8 +154,7 @@ def test_the_criterion_of_mariner_is_that_of_her_derivatives():
     """C = Y_v (N_r - m xG) - N_v (Y_r - m); Mariner's Y_r and N_r are printed with the mass in them."""
     expected = (-1160.0 * -166.0 - -264.0 * -499.0) * 1e-10
     symmetric = replace(
-        MARINER,
-        coefficients={n: 0.0 if n[2] == "0" else value for n, value in MARINER.coefficients.items()},
+        MARINER, coefficients={n: 0.0 if n[2] == "0" else value for n, value in MARINER.coefficients.items()}
     )
     found = straight_line_stability(symmetric)
     assert found.criterion == pytest.approx({"starboard": expected, "port": expected}, rel=1e-3)

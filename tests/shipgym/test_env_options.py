@@ -154,10 +154,7 @@ def test_roll_is_observed_and_priced_where_it_is_asked_for():
 
 @pytest.mark.parametrize(
     ("name", "model", "shown"),
-    [
-        (PATH, "kvlcc2", ("last_shaft_command",)),
-        (COURSE, "tanker", ("shaft_speed", "last_shaft_command")),
-    ],
+    [(PATH, "kvlcc2", ("last_shaft_command",)), (COURSE, "tanker", ("shaft_speed", "last_shaft_command"))],
 )
 def test_rudder_and_shaft_are_commanded(name, model, shown):
     env = make(name, model=model, action="rudder-shaft")

@@ -74,8 +74,7 @@ def test_a_step_that_is_far_too_long_is_suspected():
 
 
 @pytest.mark.parametrize(
-    "sail",
-    [manoeuvres.zigzag, manoeuvres.turning_circle, manoeuvres.pull_out, manoeuvres.direct_spiral],
+    "sail", [manoeuvres.zigzag, manoeuvres.turning_circle, manoeuvres.pull_out, manoeuvres.direct_spiral]
 )
 def test_a_ship_that_blows_up_is_an_error_with_time_and_state(sail):
     ship = load_model("mariner")

@@ -32,8 +32,7 @@ def derivatives(trial: Trial, force: str, velocity: str, unit: float) -> tuple[f
 
 # Chislett & Strom-Tejsen 1965, times 1e5: m' = 798, m'xG' = -18.354, Iz' = 39.2
 @pytest.mark.parametrize(
-    ("force", "by_velocity", "by_acceleration"),
-    [("Y", -1160, -(798 + 748)), ("N", -264, -(-18.354 - 4.646))],
+    ("force", "by_velocity", "by_acceleration"), [("Y", -1160, -(798 + 748)), ("N", -264, -(-18.354 - 4.646))]
 )
 def test_pure_sway_of_mariner(mariner, force, by_velocity, by_acceleration):
     """Y_v and N_v in phase with the sway speed; mass and added mass against the sway acceleration."""

@@ -4,14 +4,7 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Waves, load_model
-from shipgym.sea import (
-    encounter_frequency,
-    jonswap,
-    pierson_moskowitz,
-    sea_states,
-    wave_filter,
-    wave_motion,
-)
+from shipgym.sea import encounter_frequency, jonswap, pierson_moskowitz, sea_states, wave_filter, wave_motion
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import circle
 from shipgym.sea.motions import heading_response, roll_response
