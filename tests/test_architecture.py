@@ -31,10 +31,12 @@ def test_no_file_imports_itself_by_way_of_others(imports):
     graph = {}
     for a, b in imports:
         graph.setdefault(a, set()).add(b)
+    circle = []
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
-        pytest.fail(" -> ".join(error.args[1]))
+        circle = error.args[1]
+    assert not circle
 
 
 def test_training_and_benchmarking_do_not_know_each_other(imports):

@@ -26,6 +26,7 @@ PLACES = {
     "the sea": ("push", "evolve", "begin_sea", "encounter_frequency"),
     "the sensor set": ("measure", "readings"),
     "the task": ("task_begin", "task_step", "observe", "due", "on_event", "worst_cost"),
+    "a task and the reward of another": ("step_of_task", "reward_of_another"),
 }  # fmt: skip
 
 
@@ -39,7 +40,7 @@ def __getattr__(name: str) -> Any:
 
 def _place(name: str, giver: str) -> Any:
     def place(*arguments: Any) -> Any:
-        raise NotImplementedError(f"{name} is a place that {giver} fill when a loop is compiled")
+        raise RuntimeError(f"{name} is a place that {giver} fill when a loop is compiled")
 
     place.__name__ = name
     return place

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.checks import check_keys, did_you_mean, quoted
+from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, leaves
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen, Setting
@@ -223,16 +224,6 @@ def _check_names(definition: TaskDefinition) -> None:
             raise InputError(
                 f"{where}: {kind}: two fields named {twice[0]!r} found, expected names that differ{also}"
             )
-
-
-def step_of_task(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
-    """The step of a task whose reward is another's: a place, filled by `_with_reward`."""
-    raise NotImplementedError
-
-
-def reward_of_another(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
-    """The other's reward: a place, filled by `_with_reward`."""
-    raise NotImplementedError
 
 
 def rewarded_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
