@@ -96,7 +96,7 @@ def test_a_clean_log_gives_the_stand_in_back():
     form = response_models.Form(response_models.K, response_models.T)
     assert form.steady == pytest.approx(20.0 * response_models.K)
     assert response_models.Form(0.2, 1.0, a=2.0).steady < 4.0
-    truth = response_models.log(response_models.JUDGED, 0)
+    truth = response_models.log(response_models.ASSESSED, 0)
     noise = np.hypot(response_models.NOISE["noise"], response_models.NOISE["drift"])
     assert np.std(response_models.residuals(form, truth)) == pytest.approx(noise, rel=0.3)
 
