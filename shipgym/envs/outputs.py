@@ -70,39 +70,37 @@ class OutputPool:
         self._seen, self._flags = 8 * n_outcomes * num_envs, (8 * n_outcomes + 4 * n_observed) * num_envs
         self._size = self._flags + n_flags * num_envs
         self._shapes = (num_envs, n_observed), (n_outcomes, num_envs), (n_flags, num_envs)
-        self._free: list[tuple[NDArray[np.uint8], NDArray[np.int64]]] = []
+        self._free: list[tuple[bytearray, NDArray[np.int64]]] = []
 
     def take(self) -> Outputs:
         """Buffers that nobody else holds."""
-        memory, words = self._free.pop() if self._free else self._new()
-        block = np.asarray(_Lease(memory, words, self._free))
+        given = self._free.pop() if self._free else self._new()
+        block = _Lease(self._size, np.uint8, given[0])
+        block.given, block.free = given, self._free
         seen, outcomes, flags = self._shapes
         outputs = Outputs()
         outputs.outcomes = np.ndarray(outcomes, np.float64, block)
         outputs.observations = np.ndarray(seen, np.float32, block, self._seen)
         outputs.flags = np.ndarray(flags, np.bool_, block, self._flags)
-        outputs.words = words
+        outputs.words = given[1]
         return outputs
 
-    def _new(self) -> tuple[NDArray[np.uint8], NDArray[np.int64]]:
-        memory = np.empty(self._size, dtype=np.uint8)
-        start = memory.ctypes.data
+    def _new(self) -> tuple[bytearray, NDArray[np.int64]]:
+        memory = bytearray(self._size)
+        start = np.frombuffer(memory, np.uint8).ctypes.data
         seen, outcomes, flags = self._shapes
         words = [start + self._seen, *seen, start, *outcomes, start + self._flags, *flags]
         return memory, np.array(words, dtype=np.int64)
 
 
-class _Lease:
+class _Lease(np.ndarray[Any, Any]):
     """Memory that is lent to arrays, and goes back when the last of them, and of their views, is gone."""
 
-    __slots__ = ("__array_interface__", "_free", "_given")
-
-    def __init__(self, memory: NDArray[np.uint8], words: NDArray[np.int64], free: list[Any]) -> None:
-        self.__array_interface__ = memory.__array_interface__
-        self._given, self._free = (memory, words), free
+    given: Any
+    free: list[Any]
 
     def __del__(self) -> None:
-        self._free.append(self._given)
+        self.free.append(self.given)
 
 
 def named_rows(outcomes: Any, flags: Any, names: Sequence[str], flag_names: Sequence[str]) -> dict[str, Any]:
