@@ -28,6 +28,11 @@ IDLE = (
     "with_lifting", "nopython_rewrites", "Rewrite dynamic raises", "find_literally", "literal_unroll",
     "annotate_types", "dump_parfor_diagnostics", "nopython_supported_feature_validation",
 )  # fmt: skip
+# What is replaced of Numba's inside; of a version without it loops are compiled in Numba's own way
+INSIDE = {
+    codegen.JITCodeLibrary: ("_optimize_functions", "finalize", "_finalize_dynamic_globals"),
+    codegen.JITCPUCodegen: ("set_env",),
+}
 CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
 
@@ -43,8 +48,9 @@ def lean(tag: str, loop: str) -> Iterator[None]:
         Name of the one that is called.
     """
     with _replaced() as replace:
-        _link_once(replace, tag, loop)
-        _refresh_seldom(replace)
+        if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):
+            _link_once(replace, tag, loop)
+            _refresh_seldom(replace)
         yield
 
 
