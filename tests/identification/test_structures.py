@@ -74,7 +74,7 @@ def zigzags(ship: ShipModel) -> list[Trial]:
 
 
 def weaves(ship: ShipModel) -> list[Trial]:
-    """The rudder to both sides in turn, twenty seconds on each: excites as zigzags do, without a loop to compile."""
+    """The rudder to both sides in turn, twenty seconds on each: no loop of its own to compile."""
     sides = np.repeat([1.0, -1.0] * 15, 200)
     runs = {}
     for angle, first in ((10, 1.0), (20, -1.0), (35, 1.0)):
