@@ -23,8 +23,9 @@ from tests.agents.policies import random_policy
 CODE = 'open("RAN", "w").close()'
 TEXTS = (
     f'x"""\n{CODE}\n"""', f"x'''\n{CODE}\n'''", f"x\n{CODE}\n", f"x\r{CODE}#", f"0.0\n    {CODE}",
-    f"0); {CODE} #", f"# x\n{CODE}", f"\\\n{CODE}", f"x\0{CODE}", f"x\u2028{CODE}", f"{{{CODE}}}", f'" + {CODE} + "', 
-    f"' or {CODE}", f"[{CODE}]", f"lambda: {CODE}", f"U) or {CODE} or (U", "__import__('os').system('touch RAN')",
+    f"0); {CODE} #", f"# x\n{CODE}", f"\\\n{CODE}", f"x\0{CODE}", f"x\u2028{CODE}", f"{{{CODE}}}",
+    f'" + {CODE} + "', f"' or {CODE}", f"[{CODE}]", f"lambda: {CODE}", f"U) or {CODE} or (U",
+    "__import__('os').system('touch RAN')",
     "c.__class__", "\uff55", "\u028b", "u\u0301", "\u202eu", "d\u0435lta", "motion.u", "|u|\n", " u", "u ",
 )  # fmt: skip
 #: What a source may be, said once more than in the package: a line each, fixed words, no text.
