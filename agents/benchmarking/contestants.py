@@ -24,8 +24,7 @@ import glob
 import hashlib
 import json
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -38,6 +37,7 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
+from agents.engines.job import working_folder
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_table, check_text, did_you_mean, quoted
@@ -221,7 +221,7 @@ def _factory(text: str) -> Any:
     """The function that a text names; modules of the working folder are found."""
     module, _, function = text.rpartition(":")
     try:
-        with _working_folder():
+        with working_folder():
             found = getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InputError(
@@ -231,17 +231,6 @@ def _factory(text: str) -> Any:
         return partial(design, register_controller(found).kind)
     _check_object(found, text)
     return found
-
-
-@contextmanager
-def _working_folder() -> Iterator[None]:
-    """Modules of the working folder can be imported; afterwards the path is as before."""
-    before = list(sys.path)
-    sys.path.insert(0, str(Path.cwd()))
-    try:
-        yield
-    finally:
-        sys.path[:] = before
 
 
 def _matches(pattern: str) -> list[Path]:
@@ -276,7 +265,7 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if source.startswith(TUNED):
         return [tuned(source.removeprefix(TUNED), task, suite)]
     if names_code(source):
-        with _working_folder():
+        with working_folder():
             return [_policy(_factory(source), task)]
     paths = _files(source, task)
     if not paths:
