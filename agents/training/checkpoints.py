@@ -16,6 +16,8 @@ import torch
 from stable_baselines3.common.save_util import recursive_getattr
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
+from agents.training.safe_file import check_like
+
 Memory = dict[str, Any]
 COUNTERS = (
     "num_timesteps",
@@ -48,7 +50,13 @@ def take(agent: Any) -> Memory:
 
 
 def put_back(agent: Any, memory: Memory) -> None:
-    """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`."""
+    """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`.
+
+    Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
+    own.
+    """
+    memory = _with_own_settings(agent, memory)
+    check_like(memory, _own(agent, memory), "agent")
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
@@ -57,10 +65,77 @@ def put_back(agent: Any, memory: Memory) -> None:
     window = agent._stats_window_size
     agent.ep_info_buffer = deque(memory["episodes"], maxlen=window)
     agent.ep_success_buffer = deque(memory["successes"], maxlen=window)
-    for layer, own in zip(_layers(agent.env), memory["ships"], strict=True):
-        _put_layer_back(layer, own)
+    for layer, kept in zip(_layers(agent.env), memory["ships"], strict=True):
+        _put_layer_back(layer, kept)
     _put_replay_back(getattr(agent, "replay_buffer", None), memory["replay"])
     _put_random_back(agent, memory["random"])
+
+
+def check_record(record: Any) -> None:
+    """Raise ValueError, naming the place, unless this is what a training tells of its evaluations."""
+    row: Memory = {"steps": 0, "seconds": 0.0, "cost": 0.0}
+    curve = [row | {"mean_return": _number(one, "mean_return")} for one in _list(record, "curve")]
+    own = {"best_cost": _number(record, "best_cost"), "best_steps": 0, "curve": curve, "seconds": 0.0}
+    check_like(record, own, "run")
+
+
+def _with_own_settings(agent: Any, memory: Any) -> Any:
+    """A memory with an agent's own settings of optimisers; of the memory's only learning rates are taken."""
+    if not isinstance(parameters := _at(memory, "parameters"), dict):
+        return memory
+    taken = dict(parameters)
+    for name, own in agent.get_parameters().items():
+        if "param_groups" in own and isinstance(found := parameters.get(name), dict):
+            rates = [_at(group, "lr") for group in _list(found, "param_groups")]
+            pairs = zip(own["param_groups"], rates, strict=False)
+            taken[name] = {**found, "param_groups": [group | {"lr": rate} for group, rate in pairs]}
+    return {**memory, "parameters": taken}
+
+
+def _own(agent: Any, memory: Any) -> Memory:
+    """What a memory of this agent is like, its lists as long as those of one; ships begin an episode."""
+    agent._last_obs = agent._last_original_obs = agent.env.reset()
+    agent._last_episode_starts = np.zeros(agent.n_envs, np.bool_)
+    agent.ep_info_buffer = [{"r": 0.0, "l": 0, "t": 0.0} for _ in _list(memory, "episodes")]
+    agent.ep_success_buffer = [0.0 for _ in _list(memory, "successes")]
+    own = take(agent)
+    for name, one in own["parameters"].items():
+        if "param_groups" in one:  # an optimiser: Adam keeps this of each weight that had a step
+            groups, known = (
+                recursive_getattr(agent, name).param_groups,
+                _at(memory, "parameters", name, "state"),
+            )
+            moments = enumerate(weight.data for group in groups for weight in group["params"])
+            one["state"] = {
+                number: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
+                for number, weight in moments
+                if not isinstance(known, dict) or number in known
+            }
+    for name in STORED if own["replay"] else ():
+        own["replay"][name] = getattr(agent.replay_buffer, name)[: len(_list(memory, "replay", name))]
+    own["random"]["python"] = (*own["random"]["python"][:2], _number(memory, "random", "python", 2))
+    return own
+
+
+def _at(value: Any, *path: Any) -> Any:
+    """What stands in a place within a value of any kind; None if there is no such place."""
+    for key in path:
+        try:
+            value = value[key]
+        except (LookupError, TypeError):
+            return None
+    return value
+
+
+def _list(value: Any, *path: Any) -> Any:
+    """A list, or an array of rows, in such a place; an empty one for anything else."""
+    found = _at(value, *path)
+    return found if getattr(found, "ndim", isinstance(found, list)) else []
+
+
+def _number(value: Any, *path: Any) -> float | None:
+    """What is expected where a number or none may stand."""
+    return None if _at(value, *path) is None else 0.0
 
 
 def _layers(env: Any) -> list[Any]:
@@ -102,6 +177,9 @@ def _replay_memory(buffer: Any) -> Memory | None:
 def _put_replay_back(buffer: Any, memory: Memory | None) -> None:
     if buffer is None or memory is None:
         return
+    filled = buffer.buffer_size if memory["full"] else memory["pos"]
+    if memory["pos"] >= buffer.buffer_size or any(len(memory[name]) != filled for name in STORED):
+        raise ValueError(f"agent.replay: not the {filled} steps that its position {memory['pos']} says")
     buffer.pos, buffer.full = memory["pos"], memory["full"]
     for name in STORED:
         getattr(buffer, name)[: len(memory[name])] = memory[name]
@@ -117,7 +195,13 @@ def _random_memory(agent: Any) -> Memory:
 
 
 def _put_random_back(agent: Any, memory: Memory) -> None:
-    random.setstate(memory["python"])
-    np.random.set_state(memory["numpy"])
-    torch.set_rng_state(memory["torch"])
-    agent.action_space.np_random.bit_generator.state = memory["actions"]
+    _, key, position, *_ = memory["numpy"]
+    if position > len(key):  # NumPy would read what lies behind
+        raise ValueError(f"agent.random.numpy: position {position} found, expected at most {len(key)}")
+    try:
+        random.setstate(memory["python"])
+        np.random.set_state(memory["numpy"])
+        torch.set_rng_state(memory["torch"])
+        agent.action_space.np_random.bit_generator.state = memory["actions"]
+    except (OverflowError, RuntimeError) as error:
+        raise ValueError(f"agent.random: {error}") from None

@@ -204,6 +204,20 @@ def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
     assert f"{tmp_path}, 1 files, 0.2 MB" in shipgym("doctor").stdout.replace("\n", "")
 
 
+def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(tmp_path, monkeypatch):
+    (tmp_path / "it.loop").write_bytes(bytes(200))
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
+    answer = shipgym("doctor", "--json")
+    (cache,) = (one for one in json.loads(answer.stdout)["findings"] if one["what"] == "cache")
+    assert (answer.exit_code, cache["state"]) == (1, "wrong")
+    assert "1 of them not usable: it.loop is damaged" in cache["detail"]
+    if os.name != "nt":
+        tmp_path.chmod(0o777)
+        answer = shipgym("doctor", "--json")
+        assert answer.exit_code == 1
+        assert f"{tmp_path} may be written by other users; chmod go-w {tmp_path}, or set" in answer.stdout
+
+
 def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     cache, here = tmp_path / "cache", tmp_path / "here"
     here.mkdir()
@@ -215,6 +229,19 @@ def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     assert [one["refused"] for one in told["ready"]] == ["", ""]
     assert len(list(cache.glob("*.loop"))) == 2
     assert not list(here.iterdir())
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
+def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
+    tmp_path.chmod(0o777)
+    answer = subprocess.run(
+        [sys.executable, "-m", "agents.cli", "warm"], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "SHIPGYM_CACHE": str(tmp_path)},
+    )  # fmt: skip
+    assert answer.returncode == 2
+    assert "may be written by other users" in answer.stderr
+    assert "there is no cache to fill" in answer.stderr
+    assert not list(tmp_path.iterdir())
 
 
 def test_warm_knows_environments_and_models():
