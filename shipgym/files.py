@@ -99,7 +99,8 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
         near = did_you_mean(path.name, _names_beside(path))
         raise InputError(f"{path}: there is no such {what}.{near}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}), expected a {what}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}), expected a {what}") from None
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
@@ -159,8 +160,8 @@ def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1
     """Refuse what no file of this project holds, before its fields are looked at.
 
     In a list or table from JSON or TOML these are: lists and tables more than `DEEPEST` deep, whole numbers
-    of more than 64 bits, numbers that are not a number or exceed `LARGEST_NUMBER` (but for an infinite one,
-    where `infinite` ones may stand), dates, keys longer than `LONGEST_KEY`, and texts with null bytes or
+    of more than 64 bits (a `seed` may have 128), numbers that are nan or exceed `LARGEST_NUMBER` (unless
+    `infinite` ones may stand there), dates, keys longer than `LONGEST_KEY`, and texts with null bytes or
     halves of characters. Raises InputError, which begins with `where`, "model.json:", and names the place.
     """
     if depth > DEEPEST:
@@ -170,7 +171,7 @@ def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1
             raise InputError(
                 f"{where}: key {shown(key)} found, expected a text of at most {LONGEST_KEY} characters"
             )
-        if not (nested := isinstance(item, dict | list)) and not (fault := _fault(item, infinite)):
+        if not (nested := isinstance(item, dict | list)) and not (fault := _fault(key, item, infinite)):
             continue
         place = f"{where}[{key}]" if isinstance(key, int) else f"{where}{' ' if depth == 1 else '.'}{key}"
         if not nested:
@@ -178,13 +179,14 @@ def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1
         check_content(item, place, infinite, depth + 1)
 
 
-def _fault(value: Any, infinite: bool) -> str:
+def _fault(key: str | int, value: Any, infinite: bool) -> str:
     """What is expected in the place of a single value; empty where nothing is wrong with it."""
     if isinstance(value, float):
         fine = abs(value) <= LARGEST_NUMBER or (infinite and math.isinf(value))
         return "" if fine else f"a number of magnitude {LARGEST_NUMBER:g} at most"
     if isinstance(value, int):
-        return "" if -(2**63) <= value < 2**64 else "a whole number of at most 64 bits"
+        bits = 128 if key == "seed" else 64  # NumPy draws seeds of 128 bits
+        return "" if value.bit_length() <= bits else f"a whole number of at most {bits} bits"
     if isinstance(value, str):
         return "a text without null bytes and halves of characters" if _UNWRITABLE.search(value) else ""
     return "" if value is None else "a text, a number, true or false"
