@@ -2,6 +2,7 @@
 
 import difflib
 import math
+import reprlib
 from collections.abc import Collection, Iterable, Mapping
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
@@ -11,6 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 200
+
+
+def shown(value: Any) -> str:
+    """A value as Python writes it, for a message; of a long text or list only what begins and ends it."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        return f"a {type(value).__name__}"
 
 
 def quoted(words: Iterable[str]) -> str:
@@ -39,14 +51,14 @@ def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str)
 def check_table(value: Any, where: str) -> Mapping[str, Any]:
     """Return `value`, which must be a table (a mapping with text as keys)."""
     if not isinstance(value, Mapping):
-        raise InputError(f"{where}: {value!r} found, expected a table of keys and values")
+        raise InputError(f"{where}: {shown(value)} found, expected a table of keys and values")
     return value
 
 
 def check_text(value: Any, where: str) -> str:
     """Return `value`, which must be text that is not empty."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError(f"{where}: {value!r} found, expected a text that is not empty")
+        raise InputError(f"{where}: {shown(value)} found, expected a text that is not empty")
     return value
 
 
@@ -54,7 +66,7 @@ def check_choice(value: Any, options: Collection[str], where: str) -> str:
     """Return `value`, which must be one of the words in `options`."""
     if not isinstance(value, str) or value not in options:
         hint = did_you_mean(value, options) if isinstance(value, str) else ""
-        raise InputError(f"{where}: {value!r} found, expected one of {quoted(options)}.{hint}")
+        raise InputError(f"{where}: {shown(value)} found, expected one of {quoted(options)}.{hint}")
     return value
 
 
@@ -79,7 +91,7 @@ def check_number(
     expected = f"expected a number {stated}".rstrip() + (f"; {hint}" if hint else "")
     if isinstance(value, bool) or not isinstance(value, Real):
         quotes = " (a text; write the number without quotes)" if isinstance(value, str) else ""
-        raise InputError(f"{where}: {value!r}{quotes} found, {expected}")
+        raise InputError(f"{where}: {shown(value)}{quotes} found, {expected}")
     try:
         number = float(value)
     except OverflowError:
@@ -93,14 +105,14 @@ def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int
     """Return `value`, which must be a whole number of at least `at_least`."""
     if isinstance(value, bool) or not isinstance(value, Integral) or value < at_least:
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
-        raise InputError(f"{where}: {value!r} found, expected {expected}")
+        raise InputError(f"{where}: {shown(value)} found, expected {expected}")
     return int(value)
 
 
 def check_flag(value: Any, where: str) -> bool:
     """Return `value`, which must be true or false."""
     if not isinstance(value, bool):
-        raise InputError(f"{where}: {value!r} found, expected true or false")
+        raise InputError(f"{where}: {shown(value)} found, expected true or false")
     return value
 
 
@@ -108,7 +120,7 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
     """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: expected an array of numbers") from None
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
@@ -118,3 +130,24 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
         raise InputError(f"{where}: {array[place]} found at sample {sample}, expected finite numbers{remedy}")
     array.setflags(write=False)
     return array
+
+
+def check_array(value: Any, shape: tuple[int | None, ...], where: str) -> NDArray[np.float64]:
+    """Return the numbers of a list, or of lists within it, as an array of this shape; None is any length.
+
+    Texts, truth values, numbers that are not finite and rows that differ in length are refused.
+    """
+    size = shape[0]
+    if not isinstance(value, list) or len(value) != (len(value) if size is None else size):
+        found = f"{len(value)} entries" if isinstance(value, list) else shown(value)
+        what = "lists" if len(shape) > 1 else "numbers"
+        raise InputError(
+            f"{where}: {found} found, expected a list of {'' if size is None else f'{size} '}{what}"
+        )
+    if len(shape) == 1:
+        for i, number in enumerate(value):
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                raise InputError(f"{where}[{i}]: {shown(number)} found, expected a number")
+        return check_finite(value, where)
+    width = len(value[0]) if shape[1] is None and value and isinstance(value[0], list) else shape[1]
+    return np.array([check_array(row, (width, *shape[2:]), f"{where}[{i}]") for i, row in enumerate(value)])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.files import read_bytes
+from shipgym.files import LARGEST_CSV, read_bytes
 
 #: Cells that stand for "no value".
 MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
@@ -134,7 +134,7 @@ def _split(path: Path, line: str, delimiter: str) -> list[str]:
 
 
 def _read_lines(path: Path) -> list[str]:
-    data = read_bytes(path, "CSV file")
+    data = read_bytes(path, "CSV file", LARGEST_CSV)
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise InputError(f"{path}: the file is in UTF-16, expected UTF-8; {_REMEDY_TEXT}")
     if b"\x00" in data:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text
 from shipgym.errors import InputError
-from shipgym.files import check_readable, read_bytes
+from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
@@ -58,7 +57,7 @@ class ShipFile:
         missing CSV file, naming file, field, value and remedy.
         """
         path = Path(path)
-        data = _read_toml(path)
+        data = read_toml(path, "ship file")
         check_keys(data, _SECTIONS, str(path))
         if "ship" not in data:
             raise InputError(
@@ -109,19 +108,6 @@ class ShipFile:
             raise InputError(f"{entry.where}: {error}") from None
         check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
         return trial
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    data = read_bytes(path, "ship file (TOML)")
-    try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, expected TOML text in UTF-8"
-        ) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not valid TOML: {error}; correct that line") from None
 
 
 def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> tuple[TrialEntry, ...]:

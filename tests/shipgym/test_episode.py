@@ -103,7 +103,7 @@ def test_an_episode_cannot_be_changed():
         (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
         (("actions",), [[0.1], [0.2, 0.3], [0.1], [0.1]], "actions: expected an array of numbers"),
         (("rewards",), [], "rewards: no step found"),
-        (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards: nan found at sample 1, expected finite"),
+        (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards[1]: nan found, expected a number"),
         (("outcome", "success"), "yes", "success: 'yes' found, expected true or false"),
         (("states",), {"x": [0.0] * 5}, "states: 'y', 'psi', 'delta' missing"),
         (("note",), "", "unknown key 'note'"),
