@@ -40,7 +40,9 @@ def main(
     kind: Annotated[list[str] | None, typer.Option(help="Kinds of files; by default all.")] = None,
     inputs: Annotated[int, typer.Option(min=1, help="Of each kind; of slow kinds fewer.")] = 100_000,
     seed: Annotated[int, typer.Option(help="What the changes follow from.")] = 0,
-    minutes: Annotated[float, typer.Option("--time", help="Seconds after which no more are begun.")] = math.inf,
+    minutes: Annotated[
+        float, typer.Option("--time", help="Seconds after which no more are begun.")
+    ] = math.inf,
     workers: Annotated[int, typer.Option(min=1, help="Processes.")] = os.cpu_count() or 1,
     keep: Annotated[Path | None, typer.Option(help="Folder for the files at fault.")] = None,
 ) -> None:
@@ -54,7 +56,12 @@ def main(
     with Progress(console=console, disable=not console.is_terminal) as progress:
         bar = progress.add_task("inputs", total=total)
         reports = run(
-            chosen, work, seed, workers, time.monotonic() + minutes, lambda one: progress.advance(bar, one.inputs)
+            chosen,
+            work,
+            seed,
+            workers,
+            time.monotonic() + minutes,
+            lambda one: progress.advance(bar, one.inputs),
         )
     console.print(_table(reports))
     for report in reports.values():

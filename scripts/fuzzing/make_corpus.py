@@ -40,7 +40,7 @@ def trials(folder: Path) -> None:
     """The example's ship file with the beginning of two of its trials."""
     ship = folder / "ship-file" / "mariner"
     ship.mkdir(parents=True)
-    text = (EXAMPLE / "ship.toml").read_text().partition("[[trials]]\nfile = \"zigzag_15_15.csv\"")[0]
+    text = (EXAMPLE / "ship.toml").read_text().partition('[[trials]]\nfile = "zigzag_15_15.csv"')[0]
     (ship / "ship.toml").write_text(text)
     for name in ("zigzag_20_20.csv", "zigzag_35_30_port.csv"):
         lines = (EXAMPLE / name).read_text().splitlines(keepends=True)
@@ -90,11 +90,21 @@ def policies(folder: Path) -> None:
     }
     learned = LearnedPolicy(network(8, 4, 1), **common)
     residual = LearnedPolicy(
-        network(17, 4, 1), base=agents.PID.from_model(SHIP), authority=0.5, frame_stack=2, action_repeat=2, **common
+        network(17, 4, 1),
+        base=agents.PID.from_model(SHIP),
+        authority=0.5,
+        frame_stack=2,
+        action_repeat=2,
+        **common,
     )
     discrete = LearnedPolicy(network(8, 4, 9), action="rudder-discrete", **common)
     shielded = Shielded.from_model(shipgym.load_model("mariner-nomoto"), learned)
-    for name, policy in {"learned": learned, "residual": residual, "discrete": discrete, "shielded": shielded}.items():
+    for name, policy in {
+        "learned": learned,
+        "residual": residual,
+        "discrete": discrete,
+        "shielded": shielded,
+    }.items():
         folder.joinpath("policy", name).mkdir(parents=True)
         policy.save(folder / "policy" / name / "agent.json")
 

@@ -14,7 +14,9 @@ from typing import Any
 from fuzzing.values import NUMBERS, RAW, TEXTS, float_bytes, json_text, mutated, toml_text
 
 Change = tuple[bytes, str]  # the content, and what was done to it
-SOURCES: dict[str, Callable[[Random, bytes], Change]]  # by the ending of a file's name, at the end of this file
+SOURCES: dict[
+    str, Callable[[Random, bytes], Change]
+]  # by the ending of a file's name, at the end of this file
 BYTES_SHARE = 0.12  # of mutations that know nothing of the format
 INSERTED = (
     b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",", b"\xed\xa0\x80", b"#",
@@ -42,7 +44,9 @@ def spoilt(random: Random, content: bytes) -> Change:
     """Bytes cut off, turned, put in, doubled; seldom another file altogether."""
     n = len(content)
     a, b = sorted((random.randrange(n + 1), random.randrange(n + 1)))
-    what = random.choice(("cut", "flip", "flip", "insert", "insert", "drop", "double", "digit", "swap", "whole"))
+    what = random.choice(
+        ("cut", "flip", "flip", "insert", "insert", "drop", "double", "digit", "swap", "whole")
+    )
     if what == "whole":
         k = random.randrange(len(WHOLE))
         return WHOLE[k], f"whole file: {WHOLE[k][:20]!r}..."
@@ -52,14 +56,18 @@ def spoilt(random: Random, content: bytes) -> Change:
     if what == "flip" and n:
         place = min(a, n - 1)
         bit = 1 << random.randrange(8)
-        return content[:place] + bytes([content[place] ^ bit]) + content[place + 1 :], f"bit {bit} of byte {place}"
+        return content[:place] + bytes([content[place] ^ bit]) + content[
+            place + 1 :
+        ], f"bit {bit} of byte {place}"
     if what == "insert":
         piece = random.choice(INSERTED)
         return content[:a] + piece + content[a:], f"{piece[:10]!r} put in at byte {a}"
     if what == "drop":
         return content[:a] + content[b:], f"bytes {a} to {b} dropped"
     if what == "double":
-        return content[:b] + content[a:b] * random.choice((1, 1, 30)) + content[b:], f"bytes {a} to {b} doubled"
+        return content[:b] + content[a:b] * random.choice((1, 1, 30)) + content[
+            b:
+        ], f"bytes {a} to {b} doubled"
     if what == "digit":
         digit = str(random.randrange(10)).encode()
         return content[:a] + digit + content[a + 1 :], f"byte {a} is {digit!r}"
@@ -157,7 +165,9 @@ def _columns(random: Random, rows: list[list[str]], delimiter: str) -> str:
         elif what == 1:
             row.append(row[k])
         elif j == 0:
-            row[k] = random.choice((row[k].upper(), f'"{row[k]}"', *TEXTS[:40])) if what == 2 else rows[0][k - 1]
+            row[k] = (
+                random.choice((row[k].upper(), f'"{row[k]}"', *TEXTS[:40])) if what == 2 else rows[0][k - 1]
+            )
     return _joined(rows, delimiter)
 
 
@@ -183,7 +193,9 @@ def _decimal_commas(random: Random, rows: list[list[str]], delimiter: str) -> st
 
 
 def _line_ends(random: Random, rows: list[list[str]], delimiter: str) -> str:
-    return _joined(rows, delimiter).replace("\n", random.choice(("\r\n", "\r", "\n\n", "\n\r", "\x85", "\u2028", "\x0b")))
+    return _joined(rows, delimiter).replace(
+        "\n", random.choice(("\r\n", "\r", "\n\n", "\n\r", "\x85", "\u2028", "\x0b"))
+    )
 
 
 ENCODINGS = ("utf-16", "utf-8-sig", "utf-16-le", "utf-32", "cp037")
@@ -206,13 +218,20 @@ def safetensors_changed(random: Random, content: bytes) -> Change:
     header, data = _json(content[8 : 8 + length]), content[8 + length :]
     what = random.randrange(8)
     if what == 0:
-        wrong = random.choice((0, 1, length - 1, length + 1, len(content), 2**31, 2**63, 2**64 - 1, 100_000_000))
+        wrong = random.choice(
+            (0, 1, length - 1, length + 1, len(content), 2**31, 2**63, 2**64 - 1, 100_000_000)
+        )
         return struct.pack("<Q", wrong) + content[8:], f"header of {wrong} bytes"
     if what == 1 and data:
         place = random.randrange(len(data)) // 4 * 4
-        return content[: 8 + length + place] + float_bytes(random) + data[place + 4 :], f"number at byte {place}"
+        return content[: 8 + length + place] + float_bytes(random) + data[
+            place + 4 :
+        ], f"number at byte {place}"
     if what == 2:
-        data, said = data[: random.randrange(len(data) + 1)] + b"\0" * random.choice((0, 4, 1000)), "data of other length"
+        data, said = (
+            data[: random.randrange(len(data) + 1)] + b"\0" * random.choice((0, 4, 1000)),
+            "data of other length",
+        )
     elif what <= 5:
         name = random.choice([key for key in header if key != "__metadata__"])
         field = random.choice(("dtype", "shape", "data_offsets"))
@@ -282,7 +301,9 @@ def parquet_changed(random: Random, content: bytes) -> Change:
     if what == "drop":
         table = table.remove_column(k)
     elif what == "rename":
-        table = table.rename_columns([random.choice(TEXTS[:12]) if one == name else one for one in table.column_names])
+        table = table.rename_columns(
+            [random.choice(TEXTS[:12]) if one == name else one for one in table.column_names]
+        )
     elif what == "twice":
         table = table.append_column(name, values)
     elif what in ("rows", "empty"):

@@ -239,7 +239,10 @@ class Reader:
                 edits, error = fewer, again
         files, said = _edited(one, edits)
         whole = {name: files.get(name, content) for name, content in one.files.items()}
-        kept = {name: content if isinstance(content, bytes) else content.encode() for name, content in whole.items()}
+        kept = {
+            name: content if isinstance(content, bytes) else content.encode()
+            for name, content in whole.items()
+        }
         trace = "".join(traceback.format_exception(error)[-12:])
         return Finding(self.kind.name, what, str(error)[:300], index, tuple(said), kept, trace)
 
@@ -298,7 +301,9 @@ def _site(error: BaseException) -> str:
     own = [frame for frame in frames if any(f"/{package}/" in frame.filename for package in PACKAGES)]
     frame = own[-1] if own else frames[-1]
     path = Path(frame.filename)
-    name = next((str(Path(*path.parts[k:])) for k, part in enumerate(path.parts) if part in PACKAGES), path.name)
+    name = next(
+        (str(Path(*path.parts[k:])) for k, part in enumerate(path.parts) if part in PACKAGES), path.name
+    )
     return f"{type(error).__name__} in {name}:{frame.lineno} {frame.name}"
 
 
@@ -331,7 +336,9 @@ def _guarded() -> Iterator[None]:
     """Signals of both clocks raise `HangError`."""
 
     def stop(number: int, frame: Any) -> None:
-        raise HangError(f"more than {LONGEST_S} s" if number == signal.SIGPROF else f"waits for {LONGEST_WAIT_S} s")
+        raise HangError(
+            f"more than {LONGEST_S} s" if number == signal.SIGPROF else f"waits for {LONGEST_WAIT_S} s"
+        )
 
     before = [(number, signal.signal(number, stop)) for number in (signal.SIGPROF, signal.SIGALRM)]
     try:

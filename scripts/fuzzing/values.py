@@ -111,7 +111,11 @@ def _retyped(random: Random, root: Node, path: Path) -> Node:
         if isinstance(value, dict):
             kinds += [list(value.values()), list(value), list(map(list, value.items()))]
         elif isinstance(value, list):
-            kinds += [{str(k): one for k, one in enumerate(value)}, str(value)[:200], value[0] if value else 0]
+            kinds += [
+                {str(k): one for k, one in enumerate(value)},
+                str(value)[:200],
+                value[0] if value else 0,
+            ]
         elif isinstance(value, str):
             kinds += [list(value), value.encode().hex(), len(value), value.upper(), value + " ", f" {value}"]
         elif value is not None:
@@ -143,7 +147,9 @@ def _renamed(random: Random, root: Node, path: Path) -> Node:
         if not isinstance(parent, dict) or not parent:
             return parent
         old = random.choice(list(parent))
-        new = random.choice((old.upper(), old + "s", old[:-1], random.choice(TEXTS), random.choice(list(parent))))
+        new = random.choice(
+            (old.upper(), old + "s", old[:-1], random.choice(TEXTS), random.choice(list(parent)))
+        )
         return {new if key == old else key: value for key, value in parent.items()}
 
     return changed(root, path[:-1] if path else path, rename)
@@ -168,7 +174,9 @@ def _repeated(random: Random, root: Node, path: Path) -> Node:
     def repeat(parent: Node) -> Node:
         times = random.choice((2, 2, 2, 3, 20, 1000))
         if isinstance(parent, list):
-            return [one for k, value in enumerate(parent) for one in [value] * (times if k == path[-1] else 1)]
+            return [
+                one for k, value in enumerate(parent) for one in [value] * (times if k == path[-1] else 1)
+            ]
         if isinstance(parent, dict):
             return {**parent, f"{path[-1]}{random.choice((RAW, ' ', '2', '.x'))}": parent[path[-1]]}
         return parent

@@ -27,7 +27,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, placed, quoted
 from shipgym.errors import InputError
 from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
@@ -51,11 +51,8 @@ REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steer
 def load(path: Path, make: Callable[..., Model]) -> Model:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
-    try:
+    with placed(str(path)):
         return read_model(fields, str(path), make)
-    except InputError as error:
-        message = str(error)
-        raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
