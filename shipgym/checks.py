@@ -3,7 +3,8 @@
 import difflib
 import math
 import reprlib
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from typing import Any
@@ -26,6 +27,17 @@ def shown(value: Any) -> str:
         return _SHORT.repr(value)
     except ValueError:  # a whole number of thousands of digits
         return f"a {type(value).__name__}"
+
+
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Let refusals within the block begin with `where`, the place, unless they do already."""
+    try:
+        yield
+    except InputError as error:
+        if str(error).startswith(where):
+            raise
+        raise InputError(f"{where}: {error}") from None
 
 
 def quoted(words: Iterable[str]) -> str:

@@ -18,6 +18,7 @@ from shipgym.checks import (
     check_table,
     check_text,
     check_whole,
+    placed,
     quoted,
 )
 from shipgym.envs.episode_file import from_file, to_file
@@ -199,10 +200,8 @@ class Episode:
         Raises InputError, naming the file and the field at fault.
         """
         content = read_json(Path(path), "episode file", "record the episode again or take another copy")
-        try:
+        with placed(str(path)):
             return cls(**from_file(content))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:

@@ -37,6 +37,7 @@ from shipgym.checks import (
     check_number,
     check_table,
     check_text,
+    placed,
     quoted,
     shown,
 )
@@ -64,11 +65,8 @@ REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steer
 def load(path: Path, make: Callable[..., Model]) -> Model:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
-    try:
+    with placed(str(path)):
         return read_model(fields, str(path), make)
-    except InputError as error:
-        message = str(error)
-        raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
