@@ -88,7 +88,7 @@ class WindTable:
     def __post_init__(self) -> None:
         for name in ("angles_deg", "CX", "CY", "CN", "CK"):
             row = getattr(self, name)
-            if row is not None:
+            if row is not None or name != "CK":
                 object.__setattr__(self, name, _row(row, f"wind table {name}"))
                 self._check_length(name)
         rising = all(a < b for a, b in zip(self.angles_deg, self.angles_deg[1:], strict=False))
