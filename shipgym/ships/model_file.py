@@ -52,6 +52,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
+from shipgym.ships.terms import MOST_TERMS
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
@@ -59,7 +60,6 @@ FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
     "steering", "service_shaft_speed", "envelope", "provenance", "sha256",
 )  # fmt: skip
-MOST_TERMS = 200  # of an equation; the largest of the literature have about 40
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 
 
