@@ -48,7 +48,7 @@ def trials(folder: Path) -> None:
     trial = ShipFile.load(ship / "ship.toml").trials()[0]
     (folder / "trial").mkdir()
     trial.to_csv(folder / "trial" / "own.csv")
-    rows = [f"{0.5 * k};{0.1 * k:.2f};{k % 5},5;{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
+    rows = [f"{0.5 * k};{0.1 * k:.2f};0,0{k % 5};{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
     (folder / "trial" / "semicolons.csv").write_text("\n".join(["t;psi;r;delta", *rows]))
 
 

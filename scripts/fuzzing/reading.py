@@ -11,7 +11,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -215,19 +215,15 @@ class Reader:
     def _try(self, one: Seed, files: Mapping[str, bytes | str]) -> BaseException | None:
         """Read and use; the exception, if one is raised."""
         one.put(files)
-        signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
-        signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT_S)
         try:
-            found = self.kind.read(one.folder / one.main)
-            if self.kind.use is not None:
-                self.kind.use(found)
+            with _limited():
+                found = self.kind.read(one.folder / one.main)
+                if self.kind.use is not None:
+                    self.kind.use(found)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever it is, it is what is looked for
             return error
-        finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
         return None
 
     def _minimal(self, index: int, one: Seed, edits: list[int], error: BaseException, what: str) -> Finding:
@@ -346,6 +342,19 @@ def _guarded() -> Iterator[None]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Both clocks are set within the block."""
+    signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT_S)
+    try:
+        yield
+    finally:
+        for clock in (signal.ITIMER_PROF, signal.ITIMER_REAL, signal.ITIMER_PROF):
+            with suppress(HangError):  # of the other clock, at this moment
+                signal.setitimer(clock, 0.0)
 
 
 def _status(name: str) -> int:

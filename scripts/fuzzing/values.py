@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable
 from random import Random
@@ -11,6 +12,7 @@ from typing import Any
 Node = Any
 Path = tuple[Any, ...]
 RAW = "@@raw:"  # begins a text that stands in the file without quotes, such as NaN
+_RAW_TEXT = re.compile(rf'"{RAW}([^"\\]*(?:\\.[^"\\]*)*)"')
 
 NUMBERS: tuple[Any, ...] = (
     0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255, 256,
@@ -50,13 +52,13 @@ def node(random: Random) -> Node:
     if chance < 0.9:
         return [[scalar(random) for _ in range(random.randrange(3))] for _ in range(random.randrange(3))]
     if chance < 0.94:
-        return [0.5] * random.choice((10, 100, 1000, 10_000))
+        return [0.5] * random.choice((10, 10, 10, 100, 100, 100, 1000, 1000, 10_000))
     return deep(random, scalar(random))
 
 
 def deep(random: Random, inner: Node) -> Node:
     """A value in many lists or tables."""
-    depth = random.choice((2, 5, 19, 20, 21, 50, 900, 5_000, 100_000))
+    depth = random.choice((2, 2, 5, 5, 18, 19, 20, 21, 50, 900, random.choice((900, 5_000, 100_000))))
     if depth < 60:
         for _ in range(depth):
             inner = [inner] if random.random() < 0.5 else {"a": inner}
@@ -240,24 +242,15 @@ def _short(root: Node, path: Path) -> str:
 
 
 def json_text(root: Node) -> bytes:
-    """Nested values as JSON, raw texts without quotes and keys that end in the mark twice."""
+    """Nested values as JSON, raw texts without quotes and the mark taken from keys."""
     text = json.dumps(root)
-    return (_bare(text) if RAW in text else text).encode()
+    if RAW in text:
+        text = _RAW_TEXT.sub(_unquoted, text).replace(RAW, "")
+    return text.encode()
 
 
-def _bare(text: str) -> str:
-    """Quotes taken away around raw texts, and the mark from keys."""
-    parts = text.split(f'"{RAW}')
-    found = parts[0] + "".join(_unquoted(part) for part in parts[1:])
-    return found.replace(RAW, "")
-
-
-def _unquoted(part: str) -> str:
-    """What follows the mark, without the quote that ends it."""
-    end = 0
-    while end < len(part) and part[end] != '"':
-        end += 2 if part[end] == "\\" else 1
-    return part[:end].replace('\\"', '"') + part[end + 1 :]
+def _unquoted(found: re.Match[str]) -> str:
+    return found[1].replace('\\"', '"')
 
 
 def toml_text(root: Node) -> bytes:
