@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 
+#: Most characters of a name, a source or a path.
+LONGEST_TEXT = 4096
+
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
 
@@ -68,9 +71,11 @@ def check_table(value: Any, where: str) -> Mapping[str, Any]:
 
 
 def check_text(value: Any, where: str) -> str:
-    """Return `value`, which must be text that is not empty."""
+    """Return `value`, which must be text that is not empty, of at most `LONGEST_TEXT` characters."""
     if not isinstance(value, str) or not value.strip():
         raise InputError(f"{where}: {shown(value)} found, expected a text that is not empty")
+    if len(value) > LONGEST_TEXT:
+        raise InputError(f"{where}: {len(value)} characters found, expected at most {LONGEST_TEXT}")
     return value
 
 

@@ -127,9 +127,12 @@ def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> t
         _entry(path, f"{path}: [[trials]] {k}", table, columns, conventions, particulars)
         for k, table in enumerate(tables, start=1)
     ]
-    for k, entry in enumerate(entries):
-        if os.path.normpath(entry.path) in {os.path.normpath(other.path) for other in entries[:k]}:
+    paths = set()
+    for entry in entries:
+        path_of_entry = os.path.normpath(entry.path)
+        if path_of_entry in paths:
             raise InputError(f"{entry.where} file: '{entry.file}' is listed twice, expected each file once")
+        paths.add(path_of_entry)
     if all(entry.use == "skip" for entry in entries):
         raise InputError(
             f'{path}: all trials have use = "skip", expected at least one to fit; set use = "fit"'

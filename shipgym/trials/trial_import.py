@@ -77,8 +77,8 @@ def import_csv(
         channel: values[:, k] * si_factor(channel, column.unit)
         for k, (channel, column) in enumerate(chosen.items())
     }
-    t = recorded.pop("t")
     check_ranges(recorded, source)
+    t = recorded.pop("t")
     if "psi" in recorded:
         raw_psi = recorded["psi"]
         recorded["psi"] = np.unwrap(raw_psi)

@@ -101,7 +101,11 @@ def test_an_episode_cannot_be_changed():
         (("info", "cross_track"), [0.0] * STEPS, "info.cross_track: shape (4,) found, expected (5,)"),
         (("commands", "delta"), 0.1, "commands.delta: 0.1 found, expected a list"),
         (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
-        (("actions",), [[0.1], [0.2, 0.3], [0.1], [0.1]], "actions: expected an array of numbers"),
+        (
+            ("actions",),
+            [[0.1], [0.2, 0.3], [0.1], [0.1]],
+            "actions[1]: 2 entries found, expected a list of 1 numbers",
+        ),
         (("rewards",), [], "rewards: no step found"),
         (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards[1]: nan found, expected a number"),
         (("outcome", "success"), "yes", "success: 'yes' found, expected true or false"),

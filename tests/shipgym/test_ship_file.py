@@ -248,7 +248,7 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
         ShipFile.load(tmp_path / "ship.toml")
 
 
-@pytest.mark.parametrize("file", ["b.csv", "x" * 300, "runs", "/dev/zero", "/proc/self/mem/"])
+@pytest.mark.parametrize("file", ["b.csv", "x" * 300, "runs", "/dev/zero"])
 def test_a_missing_trial_is_refused_on_loading(folder, file):
     assert refusal(folder, '"a.csv"', f'"{file}"').startswith(": [[trials]] 1 file: ")
     (folder / "a.csv").rename(folder / "a_.csv")

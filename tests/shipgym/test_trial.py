@@ -470,7 +470,7 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
         (b"time,speed\n0,1\n", "no column is named like a channel"),
         (b"t,speed\n0,1\n", "no column is named like a channel"),
         (b"u,v\n0,1\n", "column 't' not found"),
-        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "not CSV text"),
+        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "200003 characters found, expected at most 100000"),
     ],
 )
 def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
