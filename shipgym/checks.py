@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,29 @@ def check_choice(value: Any, options: Collection[str], where: str) -> str:
         hint = did_you_mean(value, options) if isinstance(value, str) else ""
         raise InputError(f"{where}: {shown(value)} found, expected one of {quoted(options)}.{hint}")
     return value
+
+
+def refuse_code(value: Any, where: str, own: Any = None, named: bool = False) -> None:
+    """Refuse Python files named in what a file holds: code is run at a user's own word, not at a file's.
+
+    At any depth of `value` these are paths that end in ``.py``, and all that the environments' options
+    `task`, `reward` and `sensors` name (`named`: whether `value` is one of them). `own`: what the user has
+    given in the same place, which is allowed.
+    """
+    if value == own:
+        return
+    if isinstance(value, Mapping):
+        given = own if isinstance(own, Mapping) else {}
+        for name, one in value.items():
+            refuse_code(one, f"{where}.{name}", given.get(name), name in ("task", "reward", "sensors"))
+    elif isinstance(value, list | tuple):
+        for one in value:
+            refuse_code(one, where, None, named)
+    elif isinstance(value, str) and (named or Path(value).suffix == ".py"):
+        raise InputError(
+            f"{where}: {value!r} found, which is code: no file makes shipgym run another; name it on the "
+            "command line or in your own code"
+        )
 
 
 def check_number(

@@ -13,6 +13,9 @@ A contestant is named on the command line as
     my_module:factory          your own function: given a `BenchmarkTask`, it returns a controller
     my_module:Mine             your own class, a subclass of `agents.Controller`
     name=...                   any of these under another name
+
+What a file of results names so is made again by name, or from files that have the hashes in it; code only
+where the user names it too (`remade`).
 """
 
 from __future__ import annotations
@@ -21,8 +24,9 @@ import glob
 import hashlib
 import json
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import partial
 from importlib import import_module
 from importlib.resources import files
@@ -33,9 +37,10 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
+from agents.engines.job import working_folder
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
-from shipgym.checks import did_you_mean, quoted
+from shipgym.checks import check_table, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
@@ -74,12 +79,44 @@ class Contestant:
         return {str(path): file_hash(path) for path in _files(self.source, task)}
 
 
+def remade(
+    name: str, about: Mapping[str, Any], task: BenchmarkTask, allow_code: Collection[str]
+) -> Contestant:
+    """A contestant of a file of results, to run once more in a task.
+
+    `about`: what the file says of it; `allow_code`: functions that the user names. Raises InputError for any
+    other function, for files that did not take part or have changed since, and for an object.
+    """
+    if about.get("source") is None:
+        raise InputError(f"'{name}' was given as an object, which results do not hold")
+    source = check_text(about["source"], f"'{name}': source")
+    if source in _known():
+        return Contestant(name, source)
+    if names_code(source):
+        if source not in allow_code:
+            raise InputError(f"'{source}' is code, run only if you name it: --allow-code {source}")
+        return Contestant(name, source)
+    files = check_table(about.get("files"), f"'{name}': files")
+    patterns = [Path(one.replace("{task}", task.name)).parts for one in source.split("+")]
+    found = [path for pattern in patterns for path in sorted(files) if _is_like(Path(path).parts, pattern)]
+    for path in found:
+        if not Path(path).is_file() or file_hash(path) != files[path]:
+            raise InputError(f"'{path}' is not the file that took part")
+    if not found:
+        raise InputError(f"'{source}': no such file took part")
+    return Contestant(name, "+".join(map(glob.escape, found)))
+
+
+def _is_like(path: Sequence[str], pattern: Sequence[str]) -> bool:
+    return len(path) == len(pattern) and all(map(fnmatchcase, path, pattern))
+
+
 def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     """Refuse, before anything is run, files of agents that cannot be read, or fit none of the tasks.
 
     Raises InputError naming the file and what is wrong with it.
     """
-    if not one.is_text or _is_factory(one.source):
+    if not one.is_text or names_code(one.source):
         return
     pairs = [(path, task) for task in tasks for path in _files(one.source, task)]
     agents = {path: load_agent(path) for path in {path for path, _ in pairs}}
@@ -148,10 +185,15 @@ def _check_object(source: Any, name: str) -> None:
         )
 
 
+def _known() -> tuple[str, ...]:
+    """Names of contestants."""
+    return (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+
+
 def _check_text(text: str) -> None:
     """Refuse what is neither a name, nor a file, nor a function."""
-    known = (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
-    if _is_factory(text):
+    known = _known()
+    if names_code(text):
         _factory(text)
     elif text not in known and "{task}" not in text and not all(map(_matches, text.split("+"))):
         raise InputError(
@@ -161,7 +203,7 @@ def _check_text(text: str) -> None:
 
 
 def _short_name(text: str) -> str:
-    if _is_factory(text):
+    if names_code(text):
         return text.rpartition(":")[2]
     if text.endswith(".json"):
         stem = Path(text.split("+")[0]).stem.replace("{task}", "").replace("*", "").strip("-_.")
@@ -169,7 +211,8 @@ def _short_name(text: str) -> str:
     return text
 
 
-def _is_factory(text: str) -> bool:
+def names_code(text: str) -> bool:
+    """Whether a text names a function, `module:function`."""
     module, colon, function = text.rpartition(":")
     return bool(colon) and function.isidentifier() and all(part.isidentifier() for part in module.split("."))
 
@@ -177,11 +220,9 @@ def _is_factory(text: str) -> bool:
 def _factory(text: str) -> Any:
     """The function that a text names; modules of the working folder are found."""
     module, _, function = text.rpartition(":")
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.insert(0, here)
     try:
-        found = getattr(import_module(module), function)
+        with working_folder():
+            found = getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InputError(
             f"controllers: '{text}' cannot be imported ({error}); expected module:function"
@@ -200,7 +241,7 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a contestant is made for a task."""
     if text in LEARNED:
         return pretrained(task.name, text)
-    if _is_factory(text):
+    if names_code(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
     if text in controller_kinds() or text == ORACLE or text.startswith(TUNED):
@@ -223,8 +264,9 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
         return [design("lq" if led else source, task)]
     if source.startswith(TUNED):
         return [tuned(source.removeprefix(TUNED), task, suite)]
-    if _is_factory(source):
-        return [_policy(_factory(source), task)]
+    if names_code(source):
+        with working_folder():
+            return [_policy(_factory(source), task)]
     paths = _files(source, task)
     if not paths:
         what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"

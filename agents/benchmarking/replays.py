@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from agents.benchmarking.contestants import Contestant, contestants
+from agents.benchmarking.contestants import Contestant, contestants, remade
 from agents.benchmarking.results import BenchmarkResult
 from agents.engines.jobs import run_jobs
 from agents.rollouts.episodes import recorded
@@ -50,9 +50,9 @@ def rerun(
 ) -> Rerun:
     """Run episodes of a benchmark again, from their seeds.
 
-    `result`: whose contestants and tasks they are of. `controllers`: as `benchmark` was given them.
-    Contestants that were given as objects are known from here only. `workers`: processes; None for as many as
-    there are cores. Objects steer in this process. `progress`: told what is done, how many of it, and the
+    `result`: whose contestants and tasks they are of. `controllers`: as `benchmark` was given them; objects,
+    and code that a file of results names, are known from here only. `workers`: processes; None for as many
+    as there are cores. Objects steer in this process. `progress`: told what is done, how many of it, and the
     total.
     """
     given = {} if controllers is None else {one.name: one for one in contestants(controllers)}
@@ -62,14 +62,17 @@ def rerun(
     suite = result.summary["suite"]["name"]
     jobs, found = [], {}
     for (name, task), seeds in wanted.items():
-        source = result.summary["contestants"][name]["source"]
+        about, asked = result.summary["contestants"][name], load_suite(suite).task(task)
         runs = [[run, *chosen] for run, chosen in seeds.items()]
-        if source is not None:
-            jobs.append({"suite": suite, "task": task, "contestant": name, "source": source, "runs": runs})
-        elif name in given:
-            found[name, task] = _recorded(given[name], load_suite(suite).task(task), suite, runs)
-        else:
-            found[name, task] = {"refused": f"'{name}' was given as an object, which results do not hold"}
+        try:
+            one = given.get(name) or remade(name, about, asked, result.allow_code)
+        except InputError as error:
+            found[name, task] = {"refused": str(error)}
+            continue
+        if not one.is_text:
+            found[name, task] = _recorded(one, asked, suite, runs)
+            continue
+        jobs.append({"suite": suite, "task": task, "contestant": name, "source": one.source, "runs": runs})
     told = None if progress is None else lambda done, total: progress("episodes run again", done, total)
     done = run_jobs(rerun_job, jobs, workers=workers, progress=told)
     found |= {(job["contestant"], job["task"]): one for job, one in zip(jobs, done, strict=True)}

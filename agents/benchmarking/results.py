@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.contestants import Contestant, file_hash
+from agents.benchmarking.contestants import Contestant, file_hash, names_code
 from agents.benchmarking.episode_table import (
     KEYS,
     Columns,
@@ -71,10 +71,13 @@ class BenchmarkResult:
         What `results.json` holds (format in the module's docstring).
     episodes : dict of str to array
         One row an episode: contestant, task, run, seed, and figures by name (`metrics`).
+    allow_code : tuple of str
+        Functions of contestants that the user named when it was made; none of a file.
     """
 
     summary: dict[str, Any]
     episodes: Columns
+    allow_code: tuple[str, ...] = ()
 
     @property
     def ranking(self) -> list[str]:
@@ -178,7 +181,8 @@ def gathered(
     }
     found = summary_of(suite, [task.name for task in tasks], [one.name for one in who], done)
     rows = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
-    return BenchmarkResult({**about, **found, "episodes": rows}, table)
+    code = tuple(one.source for one in who if one.is_text and names_code(one.source))
+    return BenchmarkResult({**about, **found, "episodes": rows}, table, code)
 
 
 def versions() -> dict[str, str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from agents.benchmarking.contestants import Contestant, file_hash
+from agents.benchmarking.contestants import remade
 from agents.benchmarking.results import BenchmarkResult, load_results, versions
 from agents.benchmarking.run import job_of, run_job
 from agents.controllers.designs import CLASSICAL
@@ -54,15 +55,17 @@ def verify(
     seed: int = 0,
     tolerance: float | None = None,
     workers: int | None = 1,
+    allow_code: Sequence[str] = (),
 ) -> list[Check]:
     """Run a sample of a benchmark again and compare.
 
     `path`: folder of the results, or their `results.json`. `sample`: pairs of a contestant and a task; all
     their episodes are run, at most all pairs there are. `seed`: of the sample. `tolerance`: largest relative
     difference of an episode's cost. By default 0, and 1e-6 for a learned policy or where processor or
-    versions differ from those the file was written with. `workers`: as in `benchmark`. Raises InputError if
-    the files are broken, written on another suite of the name, or hold nothing that can be run again:
-    contestants that were given as objects.
+    versions differ from those the file was written with. `workers`: as in `benchmark`. `allow_code`:
+    functions, `module:function`, that may be run where the file names them; contestants of others, and of
+    files that are not those that took part, do not pass. Raises InputError if the files are broken, written
+    on another suite of the name, or hold nothing that can be run again: contestants given as objects.
     """
     result = load_results(path)
     check_whole(sample, "sample", at_least=1)
@@ -74,13 +77,18 @@ def verify(
             f"{path}: is of another suite '{suite['name']}' than that of this version of shipgym "
             f"({result.summary['versions'].get('shipgym')}): install the version it was written with"
         )
-    pairs = _sampled(result, sample, seed)
-    jobs = [_job(result, one, task) for one, task in pairs]
-    found = run_jobs(run_job, jobs, workers=workers)
-    return [
-        _compared(result, one, task, again, tolerance)
-        for (one, task), again in zip(pairs, found, strict=True)
-    ]
+    jobs: dict[tuple[str, str], dict[str, Any]] = {}
+    checks: dict[tuple[str, str], Check] = {}
+    for name, task in _sampled(result, sample, seed):
+        try:
+            jobs[name, task] = _job(result, name, task, allow_code)
+        except InputError as error:
+            size = result.figures(name, task).size
+            checks[name, task] = Check(name, task, size, np.inf, False, 0.0, str(error))
+    found = run_jobs(run_job, list(jobs.values()), workers=workers)
+    for (name, task), again in zip(jobs, found, strict=True):
+        checks[name, task] = _compared(result, name, task, again, tolerance)
+    return list(checks.values())
 
 
 def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str, str]]:
@@ -89,8 +97,8 @@ def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str,
     pairs = [
         (one, task)
         for task, by_name in result.summary["tasks"].items()
-        for one in by_name
-        if sources[one] is not None
+        for one, found in by_name.items()
+        if sources[one] is not None and found["runs"]
     ]
     if not pairs:
         raise InputError(
@@ -101,10 +109,11 @@ def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str,
     return sorted(shuffled, key=turns.__getitem__)[:sample]
 
 
-def _job(result: BenchmarkResult, name: str, task: str) -> dict[str, Any]:
+def _job(result: BenchmarkResult, name: str, task: str, allow_code: Sequence[str]) -> dict[str, Any]:
     suite = result.summary["suite"]["name"]
-    one = Contestant(name, result.summary["contestants"][name]["source"])
-    return job_of(one, load_suite(suite).task(task), suite, result.summary["seeds"]["count"])
+    asked = load_suite(suite).task(task)
+    one = remade(name, result.summary["contestants"][name], asked, allow_code)
+    return job_of(one, asked, suite, result.summary["seeds"]["count"])
 
 
 def _compared(
@@ -116,10 +125,6 @@ def _compared(
     learned = about["source"] not in CLASSICAL
     allowed = tolerance if tolerance is not None else ROUNDING if learned or other else 0.0
     note = f"{', '.join(other)} differ from those of the file" if other else ""
-    for path, sha256 in about["files"].items():
-        if not Path(path).is_file() or file_hash(path) != sha256:
-            note = f"'{path}' is not the file that took part"
-            break
     if len(again["runs"]) != len(cost):
         note = (
             again["refused"] or note or f"{len(again['runs'])} training runs found, {len(cost)} in the file"

@@ -44,6 +44,12 @@ Tolerance = Annotated[
     float | None,
     typer.Option(min=0.0, help="Relative difference of costs that --verify allows; default: see docs."),
 ]
+AllowCode = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="MODULE:FUNCTION", help="Code that --verify may run where the results name it; repeatable."
+    ),
+]
 
 
 @answered
@@ -61,6 +67,7 @@ def benchmark_command(
     verify: Results = None,
     sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
     tolerance: Tolerance = None,
+    allow_code: AllowCode = None,
     as_json: Json = False,
 ) -> None:
     """Run controllers through the tasks of a suite, in the same episodes, and rank them.
@@ -68,7 +75,7 @@ def benchmark_command(
     With --verify: exits with 1 if what is run again differs from the file.
     """
     if verify is not None:
-        _verify(verify, sample, tolerance, workers, as_json)
+        _verify(verify, sample, tolerance, workers, allow_code or [], as_json)
         return
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars
@@ -135,7 +142,10 @@ def _print_result(result: BenchmarkResult, out: Path, as_json: bool) -> None:
         warn(f"{result.summary['seeds']['count']} of 100 episodes: for a quick look, not for a ranking")
 
 
-def _verify(path: Path, sample: int, tolerance: float | None, workers: int | None, as_json: bool) -> None:
+def _verify(
+    path: Path, sample: int, tolerance: float | None, workers: int | None, allow_code: list[str],
+    as_json: bool,
+) -> None:  # fmt: skip
     """Print what was compared; fail where it differs."""
     from agents.benchmarking.verification import verify
     from agents.cli.benchmark_tables import verification_table
@@ -143,7 +153,7 @@ def _verify(path: Path, sample: int, tolerance: float | None, workers: int | Non
     from agents.cli.terminal import out as console
 
     with err.status("running a sample again"):
-        checks = verify(path, sample=sample, tolerance=tolerance, workers=workers)
+        checks = verify(path, sample=sample, tolerance=tolerance, workers=workers, allow_code=allow_code)
     if as_json:
         print_json({"checks": [check.to_dict() for check in checks]})
     else:

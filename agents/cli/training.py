@@ -85,7 +85,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_
 
     stored = None
     if resume:
-        stored = run_folder.read_plan(out)
+        stored = run_folder.read_plan(out, given)
     else:
         run_folder.check_new(out)
     plan = make_plan(given, stored)

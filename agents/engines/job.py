@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
@@ -68,9 +70,21 @@ def died_too_often(text: str, retries: int) -> WorkerDiedError:
 
 def with_modules(function: JobFunction, modules: Sequence[str], job: dict[str, Any]) -> Any:
     """Do a job after importing modules, which another process has not imported."""
-    for module in modules:
-        import_module(module)
+    with working_folder():
+        for module in modules:
+            import_module(module)
     return function(job)
+
+
+@contextmanager
+def working_folder() -> Iterator[None]:
+    """Modules of the working folder can be imported, which a user has named; then the path is as before."""
+    before = list(sys.path)
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
 
 
 @contextmanager

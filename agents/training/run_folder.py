@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import Any
 
 from agents.output import whole_folder
-from agents.training.plan import Plan, check_same
+from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import present_names
-from shipgym.checks import check_keys, check_table, check_whole
+from shipgym.checks import check_keys, check_table, check_whole, refuse_code
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 
@@ -67,14 +67,17 @@ def begin_folder(folder: Path, plan: Plan, command: str) -> None:
         write_json(content, draft / RUN)
 
 
-def read_plan(folder: Path) -> Plan:
+def read_plan(folder: Path, given: Given | None = None) -> Plan:
     """The run that a folder is of.
 
-    Raises InputError if there is none, its file is broken, or its model has changed since.
+    Raises InputError if there is none, its file is broken or names code that the user has not given, or its
+    model has changed since.
     """
     content = _content(folder)
     where = f"{folder / RUN}"
     configuration = content["configuration"]
+    named = {name: configuration.get(name) for name in ("model", "options")}
+    refuse_code(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
     try:
         plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
     except InputError as error:

@@ -34,6 +34,13 @@ class Share:
     term: Term  # of velocities, or one acceleration (`udot`, `vdot`, `rdot`)
     sign: float = 1.0  # 1 or -1
 
+    def __post_init__(self) -> None:
+        where = f"share '{self.coefficient}'"
+        if self.acceleration is None:
+            self.term.check(where)
+        elif repr(self.term.powers) != repr(((self.acceleration, 1),)):  # true is no power
+            raise InputError(f"{where}: {dict(self.term.powers)} found, expected an acceleration alone")
+
     @property
     def acceleration(self) -> str | None:
         """The acceleration it is on, None for velocities."""

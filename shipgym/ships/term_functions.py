@@ -1,11 +1,13 @@
 """The accelerations of a table of terms as a plain function, for the engine to compile.
 
 The function is written from the powers of the terms alone: fixed symbols, numbered coefficients and whole
-numbers, so that no name or text of a model file becomes part of a program.
+numbers, so that no name or text of a model file becomes part of a program. A grammar checks that before it
+is one.
 """
 
 import hashlib
 import linecache
+import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -42,6 +44,16 @@ RATES = ("u", "v", "r", "p", "q")
 #: Where a table has no equation: the speed stays, and what drift or turn there is dies out within about a
 #: ship length.
 WITHOUT = {"v": "-motion.v * (ship.speed / ship.length)", "r": "-motion.r * (ship.speed / ship.length)"}
+
+_NAMES = re.findall(r"[A-Za-z_]+(?:\.\w+)?", " ".join([*MADE, *MADE.values(), *WITHOUT.values()]))
+_WORD = "|".join(re.escape(word) for word in sorted({*_NAMES, "motion.q", *(f"{q}dot" for q in RATES)}))
+#: All that a source may be: these words, numbered coefficients and numbers, joined by arithmetic.
+GRAMMAR = re.compile(
+    r"def accelerations\(motion, c, ship\):\n"
+    rf"(?:    (?:{_WORD}) = (?:\b(?:{_WORD}|c\.c\d+|\d\.\d)\b| [-+*/] |-|\(|\))+\n)+"
+    r"    return udot, vdot, rdot(?: \+ motion\.q)?, pdot, qdot\n",
+    re.ASCII,
+)
 
 
 @dataclass(frozen=True)
@@ -83,7 +95,9 @@ def accelerations_source(sums: Mapping[str, Sum], damped: bool = True) -> str:
 
 @cache
 def accelerations_function(source: str) -> Any:
-    """The function of a source that `accelerations_source` wrote."""
+    """The function of a source that `accelerations_source` wrote; ValueError for any other text."""
+    if not GRAMMAR.fullmatch(source):
+        raise ValueError(f"accelerations: {source[:200]!r} found, expected sums of products of known symbols")
     namespace: dict[str, Any] = {"sqrt": sqrt, "fabs": fabs, "__name__": __name__}
     name = f"<accelerations {hashlib.sha256(source.encode()).hexdigest()[:12]}>"
     exec(compile(source, name, "exec"), namespace)

@@ -25,7 +25,7 @@ from shipgym.ships.term_functions import (
     accelerations_source,
     coefficients_record,
 )
-from shipgym.ships.terms import CHANNEL, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
+from shipgym.ships.terms import CHANNEL, MOST_TERMS, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
 #: As Zhu 2018 names the coefficients of surge, sway and yaw; roll, and the memory of yaw, go on from there.
@@ -361,8 +361,8 @@ def inertia(particulars: Particulars) -> Floats:
 
 
 def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> None:
-    if not terms:
-        raise InputError(f"{where}: no terms found, expected at least one")
+    if not 1 <= len(terms) <= MOST_TERMS:
+        raise InputError(f"{where}: {len(terms) or 'no'} terms found, expected 1 to {MOST_TERMS}")
     for term in terms:
         term.check(where)
         if normalisation == "prime" and term.power("U"):

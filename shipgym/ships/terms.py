@@ -19,7 +19,8 @@ SHAFT_SPEEDS = ("n", "dn", "|n|")
 SHORT = {"delta": "d", "|delta|": "|d|", "phi": "f", "|phi|": "|f|"}  # in names
 
 CHANNEL = {symbol: symbol.strip("|") for symbol in SYMBOLS} | {"du": "u", "dn": "n"}
-LARGEST_POWER = 9
+#: Limits of what a file may ask for: power of a symbol, factors of a term, terms of an equation.
+LARGEST_POWER, MOST_FACTORS, MOST_TERMS = 9, 20, 200
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,11 @@ class Term:
                     f"{where}: term '{self.name}': power {power!r} of '{symbol}' found, expected a whole "
                     f"number from 1 to {LARGEST_POWER}{below}"
                 )
+        factors = sum(abs(power) for _, power in self.powers)
+        if factors > MOST_FACTORS:
+            raise InputError(
+                f"{where}: term '{self.name}': {factors} factors found, expected at most {MOST_FACTORS}"
+            )
 
 
 def read_terms(text: str) -> tuple[Term, ...]:

@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
 from agents.benchmarking.contestants import contestants
+from agents.benchmarking.replays import EpisodeId, rerun
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
@@ -144,11 +145,12 @@ def test_functions_of_ones_own(tmp_path, monkeypatch):
         "def gentle(task):\n    return LQ.from_model(task.ship, integral_lengths=50.0)\n"
     )
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "path", list(sys.path))
+    before = list(sys.path)
     by_text = benchmark("my_autopilots:gentle", tasks=TASKS, episodes=2)
     by_function = benchmark(
         {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)}, tasks=TASKS, episodes=2
     )
+    assert sys.path == before  # the working folder is on it for this contestant only
     assert by_text.ranking == ["gentle"]
     np.testing.assert_array_equal(
         by_text.figures("gentle", "mariner-calm"), by_function.figures("gentle", "mariner-calm")
@@ -254,6 +256,65 @@ def test_a_result_that_was_touched_up_is_found_out(copy):
     answer = shipgym("--verify", copy, "--workers", 1)
     assert answer.exit_code == 1
     assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
+
+
+@pytest.fixture
+def renamed(copy, tmp_path, monkeypatch):
+    """Results whose contestant LQ is said to be made of something else; a module that says if it was run."""
+    monkeypatch.chdir(tmp_path)
+    code = "open('RAN', 'w').close()\nfrom agents import LQ\nmake = lambda task: LQ.from_model(task.ship)\n"
+    for name in ("evil_code.py", "evil_code"):
+        (tmp_path / name).write_text(code)
+
+    def rename(source, **files):
+        summary = json.loads((copy / "results.json").read_text())
+        summary["contestants"]["lq"] |= {"source": source, "files": files}
+        (copy / "results.json").write_text(json.dumps(summary))
+        return copy
+
+    yield rename
+    sys.modules.pop("evil_code", None)
+
+
+@pytest.mark.parametrize(
+    "source", ["evil_code:make", "evil_code", "evil_code.py", "*", "/dev/zero", "lq+evil_code:make"]
+)
+def test_results_run_no_code_that_they_name(renamed, source, tmp_path):
+    folder, before = renamed(source), list(sys.path)
+    checks = {check.contestant: check for check in verify(folder)}
+    assert checks["pid"].passed
+    assert not checks["lq"].passed
+    assert "run only if you name it" in checks["lq"].note or "no such file took part" in checks["lq"].note
+    answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "other:make")
+    assert answer.exit_code == 1
+    assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
+    refused = rerun(load_results(folder), [EpisodeId("lq", "mariner-calm", 0, 1_000_000)]).refused
+    assert list(refused) == [("lq", "mariner-calm")]
+    assert not (tmp_path / "RAN").exists()
+    assert sys.path == before
+
+
+def test_code_that_is_named_on_the_command_line_is_run(renamed, tmp_path):
+    folder = renamed("evil_code:make")
+    answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "evil_code:make")
+    assert answer.exit_code == 0, answer.output
+    assert (tmp_path / "RAN").exists()
+    episode = EpisodeId("lq", "mariner-calm", 0, 1_000_000)
+    given = rerun(load_results(folder), [episode], {"lq": "evil_code:make"})
+    assert list(given.episodes) == [episode]
+
+
+def test_files_are_verified_by_their_hashes(tmp_path):
+    ship = load_model("mariner")
+    for run in range(2):
+        PID.from_model(ship, frequency=0.05 + 0.01 * run).save(tmp_path / f"mariner-calm-[pid]-{run}.json")
+    out = tmp_path / "results"
+    benchmark(f"mine={tmp_path}/{{task}}-[[]pid]-*.json", tasks=TASKS, episodes=2, out=out)
+    assert [check.exact for check in verify(out)] == [True]
+    LQ.from_model(ship).save(tmp_path / "mariner-calm-[pid]-1.json")
+    (check,) = verify(out)
+    assert (check.passed, check.episodes) == (False, 4)
+    assert check.note == f"'{tmp_path}/mariner-calm-[pid]-1.json' is not the file that took part"
 
 
 @pytest.mark.parametrize(

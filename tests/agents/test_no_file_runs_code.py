@@ -1,0 +1,351 @@
+"""Files that a user may receive run no code, whatever they hold: models, ships, runs, agents, suites."""
+
+import json
+import linecache
+import random
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from agents import load_agent
+from agents.cli import app
+from agents.identifying import identification_settings
+from agents.suites.suite import parse_suite
+from agents.training.plan import Given, make_plan
+from agents.training.run_folder import RUN, begin_folder, read_plan
+from identification.regression.grey_box import chosen_box
+from shipgym import InputError, ShipFile, ShipModel, load_model
+from shipgym.ships import term_functions
+from shipgym.ships.term_functions import accelerations_function, accelerations_source
+from tests.agents.policies import random_policy
+
+CODE = 'open("RAN", "w").close()'
+TEXTS = (
+    f'x"""\n{CODE}\n"""', f"x'''\n{CODE}\n'''", f"x\n{CODE}\n", f"x\r{CODE}#", f"0.0\n    {CODE}",
+    f"0); {CODE} #", f"# x\n{CODE}", f"\\\n{CODE}", f"x\0{CODE}", f"x\u2028{CODE}", f"{{{CODE}}}",
+    f'" + {CODE} + "', f"' or {CODE}", f"[{CODE}]", f"lambda: {CODE}", f"U) or {CODE} or (U",
+    "__import__('os').system('touch RAN')",
+    "c.__class__", "\uff55", "\u028b", "u\u0301", "\u202eu", "d\u0435lta", "motion.u", "|u|\n", " u", "u ",
+)  # fmt: skip
+#: What a source may be, said once more than in the package: a line each, fixed words, no text.
+LINE = re.compile(
+    r"(    )?(def accelerations\(motion, c, ship\):|return udot, vdot, rdot( \+ motion\.q)?, pdot, qdot"
+    r"|\w+ = ([-+*/() ]|\b(motion|ship)\.[a-z]+|\bc\.c[0-9]+|\b[10]\.0\b|\b(abs_)?(u|v|r|p|n|phi|delta|du|dn"
+    r"|s|U|per_U|fabs|sqrt)_?\b)+)",
+    re.ASCII,
+)
+SMALL = {
+    "format": 1,
+    "name": "small",
+    "structure": {
+        "name": "own",
+        "source": "made up",
+        "normalisation": "service",
+        "quantity": "acceleration",
+        "equations": {
+            "v": [{"name": "v", "powers": {"v": 1}}, {"name": "d", "powers": {"delta": 1}}],
+            "r": [
+                {"name": "r/U", "powers": {"r": 2, "U": -1}},
+                {"name": "|v|r", "powers": {"|v|": 1, "r": 1}},
+            ],
+        },
+    },
+    "coefficients": {"b_v": -1.0, "b_d": -0.1, "c_r/U": -0.5, "c_|v|r": -0.2},
+    "particulars": {"name": "small", "length": 100.0, "speed": 5.0, "estimated": []},
+    "steering": {"rudder_limit_deg": 35.0},
+    "provenance": {"made by": ["hand"]},
+}
+
+
+@pytest.fixture(autouse=True)
+def elsewhere(tmp_path, monkeypatch):
+    """Code that ran would leave a file in the working folder; and what becomes code is fixed words."""
+    made = []
+
+    def execute(code, namespace):
+        made.append(code.co_filename)
+        exec(code, namespace)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(term_functions, "exec", execute, raising=False)
+    yield
+    assert not (tmp_path / "RAN").exists()
+    assert all(LINE.fullmatch(line[:-1]) for name in made for line in linecache.getlines(name))
+
+
+def places(value, path=()):
+    """Where texts and numbers stand: (containers' keys, whether it is a key)."""
+    if isinstance(value, dict):
+        for key, one in value.items():
+            yield (*path, key), True
+            yield from places(one, (*path, key))
+    elif isinstance(value, list):
+        for k, one in enumerate(value):
+            yield from places(one, (*path, k))
+    else:
+        yield path, False
+
+
+def put(content, path, is_key, new):
+    """A copy with a key or value replaced."""
+    content = json.loads(json.dumps(content))
+    *way, last = path
+    inside = content
+    for key in way:
+        inside = inside[key]
+    if is_key:
+        renamed = {new if key == last else key: value for key, value in inside.items()}
+        inside.clear()
+        inside.update(renamed)
+    else:
+        inside[last] = new
+    return content
+
+
+def added(content, path, new):
+    """A copy with an entry more, or another in place of one."""
+    content = json.loads(json.dumps(content))
+    inside = content
+    for key in path[:-1]:
+        inside = inside[key]
+    inside[path[-1]] = new
+    return content
+
+
+def source_of(content):
+    """The source that a model comes to; None if the model is refused."""
+    try:
+        model = ShipModel.from_dict(content)
+    except InputError:
+        return None
+    return accelerations_source(model.table._sums)
+
+
+def test_names_and_comments_change_no_source_and_nothing_else_is_taken():
+    innocent = source_of(SMALL)
+    assert all(LINE.fullmatch(line) for line in innocent.splitlines())
+    assert not LINE.fullmatch(f"    udot = {CODE}")
+    kept = set()
+    for path, is_key in places(SMALL):
+        for text in TEXTS:
+            found = source_of(put(SMALL, path, is_key, text))
+            assert found in (None, innocent), (path, text)
+            kept |= {path} if found else set()
+    assert ("structure", "name") in kept  # a text that is not empty is a name
+    assert ("structure", "source") in kept
+    assert not any("powers" in path for path in kept)
+
+
+def test_a_thousand_injections_of_other_texts_and_numbers():
+    draw = random.Random(20260101)
+    innocent, where = source_of(SMALL), list(places(SMALL))
+    pieces = [
+        *TEXTS,
+        CODE,
+        "\n",
+        '"""',
+        "'",
+        "\\",
+        "\0",
+        "#",
+        "u",
+        "c.c0",
+        "(",
+        ")",
+        "1e400",
+        "exec",
+        "eval(",
+        ";",
+    ]
+    numbers = [
+        True,
+        False,
+        None,
+        -1,
+        0,
+        1.5,
+        1e300,
+        10**9,
+        10**30,
+        10**400,
+        float("nan"),
+        [],
+        {},
+        [[]],
+        {"u": 1},
+    ]
+    taken = 0
+    for _ in range(1000):
+        path, is_key = draw.choice(where)
+        text = "".join(draw.choices(pieces, k=draw.randint(1, 4)))
+        found = source_of(
+            put(SMALL, path, is_key, text if is_key or draw.random() < 0.7 else draw.choice(numbers))
+        )
+        if found is not None:
+            taken += 1
+            assert found == innocent or all(LINE.fullmatch(line) for line in found.splitlines())
+    assert 50 < taken < 500  # names and numbers that may be anything; the rest is refused
+    assert innocent is not None
+
+
+@pytest.mark.parametrize(
+    "power", [10**9, 10**30, -(10**30), 10, 0, 1.5, 1e30, True, "1", None, [1], {"u": 1}]
+)
+def test_powers_are_small_whole_numbers(power):
+    path = ("structure", "equations", "v", 0, "powers", "v")
+    with pytest.raises(
+        InputError, match=r"equations\.v: term 'v': power .* of 'v' found, expected a whole number"
+    ):
+        ShipModel.from_dict(put(SMALL, path, False, power))
+    shares = load_model("mariner").to_dict() | {
+        "structure": {
+            "name": "towed",
+            "source": "x",
+            "shares": {
+                "u": [{"coefficient": "X_udot", "name": "udot", "powers": {"udot": power}, "sign": 1.0}],
+                "v": [{"coefficient": "Y_v", "name": "v", "powers": {"v": power}, "sign": 1.0}],
+                "r": [{"coefficient": "N_v", "name": "v", "powers": {"v": power}, "sign": 1.0}],
+            },
+        }
+    }  # fmt: skip
+    with pytest.raises(InputError, match=r"share 'X_udot': .* expected an acceleration alone"):
+        ShipModel.from_dict(shares)
+    shares["structure"]["shares"]["u"][0]["powers"]["udot"] = 1
+    with pytest.raises(InputError, match="share 'Y_v': term 'v': power"):
+        ShipModel.from_dict(shares)
+
+
+def test_terms_and_their_factors_are_not_without_number():
+    equations = SMALL["structure"]["equations"]
+    for listed, said in (
+        ([{"name": "v", "powers": {"v": 9, "r": 9, "u": 9}}], "27 factors found, expected at most 20"),
+        ([{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)], "201 terms found, expected 1 to 200"),
+    ):
+        with pytest.raises(InputError, match=said):
+            ShipModel.from_dict(put(SMALL, ("structure", "equations"), False, {**equations, "v": listed}))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        f"    {CODE}",
+        "    udot = c.c0.real",
+        "    udot = \uff55",
+        "    udot = motion.__class__",
+        "    import os",
+        "#",
+        "",
+    ],
+)
+def test_what_is_no_sum_of_terms_is_not_made_a_function(line):
+    source = accelerations_source(load_model("mariner-tls-svm").table._sums)
+    first, *rest = source.splitlines(keepends=True)
+    accelerations_function(source)
+    with pytest.raises(ValueError, match="expected sums of products of known symbols"):
+        accelerations_function("".join([first, f"{line}\n", *rest]))
+
+
+@pytest.fixture
+def evil(tmp_path):
+    """A model file whose texts are code, and a Python file that says whether it was run."""
+    model = load_model("mariner-tls-svm").to_dict()
+    for path in (("structure", "name"), ("structure", "source"), ("name",), ("particulars", "name")):
+        model = put(model, path, False, TEXTS[0])
+    (tmp_path / "evil.json").write_text(json.dumps(model))
+    (tmp_path / "evil.py").write_text(f"{CODE}\nSHIP = None\n")
+    (tmp_path / "evil").write_text(f"{CODE}\n")
+    return tmp_path / "evil.json"
+
+
+def test_the_command_and_the_loops_take_no_code_of_a_model(evil):
+    answer = CliRunner().invoke(app, ["trials", str(evil), "--draws", "0", "--json"])
+    assert answer.exit_code == 0, answer.output
+
+
+@pytest.mark.parametrize("option", ["reference_model", "prior", "anchor"])
+def test_a_ship_file_names_models_and_no_code(evil, option):
+    ship = evil.with_name("ship.toml")
+    text = '[ship]\nlength = 160.93\nspeed = 7.7\n[identify]\n{} = "{}"\n[[trials]]\nfile = "a.csv"\n'
+    evil.with_name("a.csv").write_text("t,u\n0,1\n")
+    ship.write_text(text.format(option, "evil.py"))
+    with pytest.raises(
+        InputError, match=rf"ship.toml: \[identify\].{option}: 'evil.py' found, which is code"
+    ):
+        ShipFile.load(ship)
+    ship.write_text(text.format(option, "evil.json"))
+    found = ShipFile.load(ship)
+    reference = identification_settings(found, {})[option]
+    box, _ = chosen_box(reference, found.particulars, [])
+    assert box.reference.structure == TEXTS[0]
+    box.vessel({}, False)
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [
+        (("model",), "evil.py"),
+        (("options", "reward"), "evil.py"),
+        (("options", "reward"), "evil"),
+        (("options", "sensors"), "evil"),
+        (("options", "task"), "evil:factory"),
+        (("options", "ensemble"), ["mariner", "evil.py/."]),
+        (("environment",), "evil:CourseKeeping-v0"),
+        (("algorithm",), "evil.py"),
+        (("settings", "base"), "evil:factory"),
+    ],
+)
+def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
+    plan = make_plan(Given("ppo", settings={"total_steps": 1}))
+    folder = evil.with_name("run")
+    begin_folder(folder, plan, "shipgym train")
+    content = json.loads((folder / RUN).read_text())
+    (folder / RUN).write_text(json.dumps(added(content, ("configuration", *place), value)))
+    with pytest.raises(InputError, match=f"{RUN}: "):
+        read_plan(folder)
+    (folder / RUN).write_text(json.dumps(added(content, ("configuration", "model"), str(evil))))
+    with pytest.raises(InputError, match="a run of another configuration: model_sha256"):
+        read_plan(folder)
+
+
+def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
+    reward = tmp_path / "reward.py"
+    reward.write_text(
+        "from typing import NamedTuple\n\nclass Reward(NamedTuple):\n    heading: float\n\n\n"
+        "def reward(motion, state, interval, ship, settings):\n    return Reward(-state.heading_error**2)\n"
+    )
+    given = Given("ppo", options={"reward": str(reward)}, settings={"total_steps": 1})
+    plan = make_plan(given)
+    begin_folder(tmp_path / "run", plan, "shipgym train")
+    assert read_plan(tmp_path / "run", given).configuration() == plan.configuration()
+    with pytest.raises(InputError, match=r"options\.reward: '.*reward.py' found, which is code"):
+        read_plan(tmp_path / "run")
+
+
+def test_an_agent_only_records_what_it_learned_with(evil):
+    path = evil.with_name("agent.json")
+    options = {"reward": "evil.py", "sensors": "evil", "task": "evil:factory", "corridor": 1.0}
+    random_policy(env_options=options, model_name=TEXTS[0]).save(path)
+    content = json.loads(path.read_text())
+    content["environment"]["id"] = "evil:CourseKeeping-v0"
+    path.write_text(json.dumps(content))
+    agent = load_agent(path, load_model("mariner"))
+    assert agent.env_options == options  # a record, which nothing is made of
+    for kind in ("evil:factory", "evil.py"):
+        path.write_text(json.dumps({**content, "kind": kind}))
+        with pytest.raises(InputError):
+            load_agent(path)
+
+
+@pytest.mark.parametrize(
+    "line", ['model = "evil.py"', 'options = { reward = "evil" }', 'options = { ensemble = ["evil.py"] }']
+)
+def test_a_suite_names_no_code(evil, line):
+    text = f'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\n{line}\n'
+    text += "" if line.startswith("model") else 'model = "mariner"\n'
+    with pytest.raises(InputError, match="found, which is code"):
+        parse_suite(text, "suite.toml")
+    suite = parse_suite(
+        f'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\nmodel = "{evil}"\n', "suite"
+    )
+    assert suite.task("one").ship.structure == TEXTS[0]
