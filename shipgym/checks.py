@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,11 @@ from shipgym.errors import InputError
 
 #: Most characters of a name, a source or a path.
 LONGEST_TEXT = 4096
+
+#: Types of a JSON value; a list of what all entries are; a table by key, or by `ANY_KEY` what all values are.
+Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
+ANY_KEY = "*"
+_WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
@@ -192,3 +198,21 @@ def check_array(value: Any, shape: tuple[int | None, ...], where: str) -> NDArra
         return check_finite(value, where)
     width = len(value[0]) if shape[1] is None and value and isinstance(value[0], list) else shape[1]
     return np.array([check_array(row, (width, *shape[2:]), f"{where}[{i}]") for i, row in enumerate(value)])
+
+
+def check_shape(value: Any, shape: Shape, where: str) -> None:
+    """Refuse nested JSON values that differ from a shape, naming the place; further keys are not looked at."""
+    if isinstance(shape, dict):
+        table = check_table(value, where)
+        for key in table if ANY_KEY in shape else shape:
+            if key not in table:
+                raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
+            check_shape(table[key], shape.get(key, shape.get(ANY_KEY, ())), f"{where}.{key}")
+    elif isinstance(shape, list):
+        if not isinstance(value, list):
+            raise InputError(f"{where}: {shown(value)} found, expected a list")
+        for i, entry in enumerate(value):
+            check_shape(entry, shape[0], f"{where}[{i}]")
+    elif type(value) not in shape:
+        words = " or ".join(dict.fromkeys(_WORDS[kind] for kind in shape))
+        raise InputError(f"{where}: {shown(value)} found, expected {words}")

@@ -47,16 +47,7 @@ from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
-from shipgym.checks import (
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    check_whole,
-    placed,
-    quoted,
-    shown,
-)
+from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, placed, quoted
 from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES

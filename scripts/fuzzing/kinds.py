@@ -6,6 +6,7 @@ that a field which nobody checked does not fail later. Small sound files of the 
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import Any
@@ -21,9 +22,12 @@ from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import Kind
+from rich.console import Console
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
+from shipgym.files import LARGEST_TOML, read_bytes
 
+SHOWN = Console(file=io.StringIO(), width=120)
 JOBS: list[dict[str, Any]] = [{"number": 1}, {"number": 2}]
 
 
@@ -59,8 +63,8 @@ def use_agent(agent: Any) -> None:
 
 def use_results(result: Any) -> None:
     """The tables that are printed, and every figure."""
-    ranking_table(result)
-    costs_table(result)
+    for table in (ranking_table(result), costs_table(result)):
+        SHOWN.print(table)
     for task, found in result.summary["tasks"].items():
         for name in found:
             result.figures(name, task)
@@ -95,7 +99,7 @@ def read_run(path: Path) -> Plan:
 
 def read_suite(path: Path) -> Any:
     """A suite from its text."""
-    return parse_suite(path.read_bytes().decode("utf-8", "replace"), path.name)
+    return parse_suite(read_bytes(path, "suite", LARGEST_TOML).decode("utf-8", "replace"), path.name)
 
 
 def read_settings(path: Path) -> Any:
