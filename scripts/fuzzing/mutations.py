@@ -13,10 +13,13 @@ from typing import Any
 
 from fuzzing.values import NUMBERS, RAW, TEXTS, float_bytes, json_text, mutated, toml_text
 
-Change = tuple[bytes, str]  # the content, and what was done to it
+Change = tuple[
+    bytes, str | Callable[[], str]
+]  # the content, and what was done to it, or a function that says so
 SOURCES: dict[
     str, Callable[[Random, bytes], Change]
 ]  # by the ending of a file's name, at the end of this file
+LARGEST_TOML = 10_000  # bytes that are parsed for a change: keys of many parts take long
 BYTES_SHARE = 0.12  # of mutations that know nothing of the format
 INSERTED = (
     b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",", b"\xed\xa0\x80", b"#",
@@ -32,7 +35,7 @@ WHOLE = (
 def mutate(random: Random, name: str, content: bytes) -> Change:
     """The content of the file of that name with one change."""
     source = SOURCES.get(name.rpartition(".")[2], spoilt)
-    if random.random() < BYTES_SHARE:
+    if random.random() < BYTES_SHARE or (source is toml_changed and len(content) > LARGEST_TOML):
         source = spoilt
     try:
         return source(random, content)
@@ -260,12 +263,12 @@ def _counts(random: Random, old: list[int]) -> Any:
     return [number + random.choice((-4, -1, 0, 1, 4)) for number in old]
 
 
-def _metadata(random: Random, header: Any) -> tuple[Any, str]:
+def _metadata(random: Random, header: Any) -> tuple[Any, Callable[[], str]]:
     """A change in the JSON text that a checkpoint keeps in its metadata."""
     name = random.choice(list(header["__metadata__"]))
     root, said = mutated(random, _json(header["__metadata__"][name].encode()))
     text = json_text(root).decode("utf-8", "surrogatepass")
-    return {**header, "__metadata__": {**header["__metadata__"], name: text}}, f"metadata: {said}"
+    return {**header, "__metadata__": {**header["__metadata__"], name: text}}, said
 
 
 def parquet_changed(random: Random, content: bytes) -> Change:

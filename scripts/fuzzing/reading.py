@@ -120,6 +120,7 @@ class Seed:
     main: str
     files: Mapping[str, bytes]
     spoilt: set[str] = field(default_factory=set)  # that are not as they should be on disk
+    odd: set[str] = field(default_factory=set)  # where something else than a file is
 
     def put(self, files: Mapping[str, bytes | str]) -> None:
         """Write what differs from the seed; a text instead of bytes names what is there in place of a file."""
@@ -131,12 +132,15 @@ class Seed:
 
     def _write(self, name: str, content: bytes | str) -> None:
         path = self.folder / name
+        if name in self.odd:
+            self.odd.discard(name)
+            _remove(path)
         if isinstance(content, bytes):
-            if path.is_symlink() or path.is_dir() or path.is_fifo():
-                _remove(path)
-            path.write_bytes(content)
+            with open(path, "wb", buffering=0) as file:
+                file.write(content)
             return
         _remove(path)
+        self.odd.add(name)
         if content == "folder":
             path.mkdir()
         elif content == "pipe":
@@ -240,7 +244,8 @@ class Reader:
             for name, content in whole.items()
         }
         trace = "".join(traceback.format_exception(error)[-12:])
-        return Finding(self.kind.name, what, str(error)[:300], index, tuple(said), kept, trace)
+        told = tuple(f"{name}: {one if isinstance(one, str) else one()}" for name, one in said)
+        return Finding(self.kind.name, what, str(error)[:300], index, told, kept, trace)
 
 
 def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
@@ -261,7 +266,7 @@ def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
         yield Seed(folder, kind.main if entry.is_dir() else entry.name, files)
 
 
-def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[str]]:
+def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[Any]]:
     """The files that differ from the seed's after some changes, and what these are."""
     files: dict[str, bytes | str] = {}
     said = []
@@ -272,11 +277,11 @@ def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[s
         content = files.get(name, one.files[name])
         if random.random() < SPECIAL_SHARE or isinstance(content, str):
             files[name] = random.choice(SPECIAL)
-            said.append(f"{name}: {files[name]} in its place")
+            said.append((name, f"{files[name]} in its place"))
             continue
         changed, what = mutate(random, name, content)
         files[name] = changed
-        said.append(f"{name}: {what}")
+        said.append((name, what))
         if name != one.main and random.random() < KEPT_HASH:
             _mend(one, files, name, content, changed)
     return files, said

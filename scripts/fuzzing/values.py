@@ -6,6 +6,7 @@ import json
 import re
 import struct
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import Any
 
@@ -224,13 +225,17 @@ CHANGES: tuple[tuple[str, Callable[[Random, Node, Path], Node]], ...] = (
 )  # fmt: skip
 
 
-def mutated(random: Random, root: Node) -> tuple[Node, str]:
-    """Nested values with one change, and what it is."""
+def mutated(random: Random, root: Node) -> tuple[Node, Callable[[], str]]:
+    """Nested values with one change, and a function that says what it is."""
     name, change = random.choice(CHANGES)
     path = somewhere(random, root)
     found = change(random, root, path)
+    return found, partial(_told, name, path, root, found)
+
+
+def _told(name: str, path: Path, root: Node, found: Node) -> str:
     place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
-    return found, f"{name} at ${place}: {_short(root, path)} -> {_short(found, path)}"
+    return f"{name} at ${place}: {_short(root, path)} -> {_short(found, path)}"
 
 
 def _short(root: Node, path: Path) -> str:
