@@ -19,7 +19,8 @@ from shipgym.errors import InputError
 #: Most characters of a name, a source or a path.
 LONGEST_TEXT = 4096
 
-#: Types of a JSON value; a list of what all entries are; a table by key, or by `ANY_KEY` what all values are.
+#: Types of a JSON value; a list of what all entries are, or of what each of several is; a table by key, or by
+#: `ANY_KEY` what all values are.
 Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
 ANY_KEY = "*"
 _WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
@@ -209,10 +210,11 @@ def check_shape(value: Any, shape: Shape, where: str) -> None:
                 raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
             check_shape(table[key], shape.get(key, shape.get(ANY_KEY, ())), f"{where}.{key}")
     elif isinstance(shape, list):
-        if not isinstance(value, list):
-            raise InputError(f"{where}: {shown(value)} found, expected a list")
+        several = len(shape) > 1
+        if not isinstance(value, list) or (several and len(value) != len(shape)):
+            raise InputError(f"{where}: {shown(value)} found, expected a list{f' of {len(shape)}' * several}")
         for i, entry in enumerate(value):
-            check_shape(entry, shape[0], f"{where}[{i}]")
+            check_shape(entry, shape[i if several else 0], f"{where}[{i}]")
     elif type(value) not in shape:
-        words = " or ".join(dict.fromkeys(_WORDS[kind] for kind in shape))
+        words = " or ".join(dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape))
         raise InputError(f"{where}: {shown(value)} found, expected {words}")

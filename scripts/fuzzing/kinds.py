@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import io
 import json
+import warnings
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +23,7 @@ from agents.suites.suite import parse_suite
 from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
-from fuzzing.reading import Kind
+from fuzzing.reading import CORPUS, Kind
 from rich.console import Console
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
@@ -124,6 +126,46 @@ def read_kept(path: Path) -> Any:
     return None if kept is None else run_jobs(squared, JOBS[:1], keep=folder)
 
 
+@cache
+def training() -> Any:
+    """A run into which checkpoints are put back, the one that the corpus's is of."""
+    import torch
+    from agents.training.training import _Training
+
+    torch.set_num_threads(1)
+    with warnings.catch_warnings(action="ignore"):  # random numbers in plain Python overflow, as they should
+        return _Training(read_plan(CORPUS / "run" / "ppo"), None, None, None)
+
+
+def restored(path: Path) -> Any:
+    """A run that goes on from a checkpoint."""
+    training().restore(path)
+    return training()
+
+
+def use_training(run: Any) -> None:
+    """What it does next, and its checkpoint."""
+    from agents.training import checkpoints
+
+    run.agent.predict(run.agent._last_obs)
+    checkpoints.take(run.agent)
+    written(run._found)
+
+
+def keep_study(folder: Path) -> None:
+    """A study before its first trial."""
+    from agents.training.tuning import _opened
+
+    _opened(folder / "ppo", read_plan(CORPUS / "run" / "ppo"), ())
+
+
+def read_study(path: Path) -> Any:
+    """The trials that a study has on record."""
+    from agents.training.tuning import _opened
+
+    return _opened(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
+
+
 KINDS = (
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=4),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship, slow=2),
@@ -134,6 +176,8 @@ KINDS = (
     Kind("results", load_results, use_results, main="results.json", slow=4),
     Kind("run", read_run, use_plan, main="run.json", slow=4),
     Kind("settings", read_settings, slow=10),
+    Kind("checkpoint", restored, use_training, slow=10),
+    Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=100),
     Kind("suite", read_suite, slow=4),
     Kind("kept-result", read_kept, prepare=keep_results),
 )
