@@ -59,7 +59,7 @@ def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
 
     Raises InputError if they are missing, broken, or those of another policy.
     """
-    content = read_bytes(path, f"weights file beside {json_path}", LARGEST_TENSORS)
+    content = read_bytes(path, f"file with the weights of {json_path}", LARGEST_TENSORS)
     found = hashlib.sha256(content).hexdigest()
     if found != sha256:
         raise InputError(

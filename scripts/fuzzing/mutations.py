@@ -5,13 +5,14 @@ from __future__ import annotations
 import io
 import json
 import struct
-import tomllib
+
 from collections.abc import Callable
 from functools import lru_cache
 from random import Random
 from typing import Any
 
 from fuzzing.values import NUMBERS, RAW, TEXTS, float_bytes, json_text, mutated, toml_text
+from shipgym.files import parse_toml
 
 Change = tuple[
     bytes, str | Callable[[], str]
@@ -84,7 +85,7 @@ def _json(content: bytes) -> Any:
 
 @lru_cache(maxsize=256)
 def _toml(content: bytes) -> Any:
-    return tomllib.loads(content.decode())
+    return parse_toml(content.decode(), "seed:")
 
 
 def json_changed(random: Random, content: bytes) -> Change:
