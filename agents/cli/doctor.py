@@ -13,7 +13,7 @@ from pathlib import Path
 from rich.markup import escape
 
 import shipgym
-from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder
+from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder, loop_fault, open_folder
 
 NEEDED = (
     "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
@@ -79,14 +79,19 @@ def _installed(what: str, names: tuple[str, ...], otherwise: str, remedy: str) -
 
 
 def cache_finding() -> Finding:
-    """Where compiled ships are kept and how much, so that a second start is fast."""
-    folder = cache_folder()
+    """Where compiled ships are kept, how much and whether it can be used, so that a second start is fast."""
+    folder, kept = cache_folder(), ""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        files = [path.stat().st_size for path in folder.iterdir() if path.is_file()]
-        kept = f"{folder}, {len(files)} files, {sum(files) / 1e6:.1f} MB"
+        folder = open_folder()
+        files = [path for path in folder.iterdir() if path.is_file()]
+        kept = f"{folder}, {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
+        if wrong := [f"{path.name} {why}" for path in files if (why := loop_fault(path))]:
+            told = f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is not, or wait until"
+            return Finding("cache", "wrong", f"{told} it is compiled anew")
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
+    except ValueError as error:
+        return Finding("cache", "wrong", str(error))
     except OSError as error:
         if folder.is_dir() and os.access(folder, os.R_OK | os.X_OK) and any(folder.iterdir()):
             return Finding("cache", "fine", f"{kept}, to be read only: what is missing is compiled in memory")

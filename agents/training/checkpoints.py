@@ -16,6 +16,8 @@ import torch
 from stable_baselines3.common.save_util import recursive_getattr
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
+from agents.training.alike import NUMBER_OR_NONE, Each, Some, check_like
+
 Memory = dict[str, Any]
 COUNTERS = (
     "num_timesteps",
@@ -48,8 +50,15 @@ def take(agent: Any) -> Memory:
 
 
 def put_back(agent: Any, memory: Memory) -> None:
-    """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`."""
-    agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
+    """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`.
+
+    Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
+    own.
+    """
+    check_like(memory, _own(agent), "agent")
+    own = agent.get_parameters()
+    found = {name: _taken(memory["parameters"][name], own[name]) for name in own}
+    agent.set_parameters(found, exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
     for name, value in memory["counters"].items():
@@ -57,10 +66,56 @@ def put_back(agent: Any, memory: Memory) -> None:
     window = agent._stats_window_size
     agent.ep_info_buffer = deque(memory["episodes"], maxlen=window)
     agent.ep_success_buffer = deque(memory["successes"], maxlen=window)
-    for layer, own in zip(_layers(agent.env), memory["ships"], strict=True):
-        _put_layer_back(layer, own)
+    for layer, kept in zip(_layers(agent.env), memory["ships"], strict=True):
+        _put_layer_back(layer, kept)
     _put_replay_back(getattr(agent, "replay_buffer", None), memory["replay"])
     _put_random_back(agent, memory["random"])
+
+
+def check_record(record: Any) -> None:
+    """Raise ValueError, naming the place, unless this is what a training tells of its evaluations."""
+    row = {"steps": 0, "seconds": 0.0, "cost": 0.0, "mean_return": NUMBER_OR_NONE}
+    own = {"best_cost": NUMBER_OR_NONE, "best_steps": 0, "curve": Each(row), "seconds": 0.0}
+    check_like(record, own, "run")
+
+
+def _own(agent: Any) -> Memory:
+    """What a memory of this agent is like; it has begun an episode then."""
+    seen = agent.env.reset()
+    starts, random_own = np.zeros(len(seen), np.bool_), _random_memory(agent)
+    buffer = getattr(agent, "replay_buffer", None)
+    return {
+        "parameters": {
+            name: _own_parameters(agent, name, own) for name, own in agent.get_parameters().items()
+        },
+        "variables": {name: recursive_getattr(agent, name) for name in agent._get_torch_save_params()[1]},
+        "counters": dict.fromkeys(COUNTERS, 0)
+        | {"_last_obs": seen, "_last_episode_starts": starts, "_last_original_obs": seen},
+        "episodes": Each({"r": 0.0, "l": 0, "t": 0.0}),
+        "successes": Each(0.0),
+        "ships": [_layer_memory(layer) for layer in _layers(agent.env)],
+        "replay": None
+        if buffer is None
+        else {"pos": 0, "full": False} | {name: Each(getattr(buffer, name)) for name in STORED},
+        "random": random_own | {"python": (*random_own["python"][:2], NUMBER_OR_NONE)},
+    }
+
+
+def _own_parameters(agent: Any, name: str, own: Memory) -> Memory:
+    """Parameters of a network as they are; of an optimiser, rates and what Adam keeps of each weight."""
+    if "param_groups" not in own:
+        return own
+    weights = [one.data for group in recursive_getattr(agent, name).param_groups for one in group["params"]]
+    state = {i: {"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for i, one in enumerate(weights)}
+    return {"state": Some(state), "param_groups": [Some({"lr": 0.0}, others=True)] * len(own["param_groups"])}
+
+
+def _taken(found: Memory, own: Memory) -> Memory:
+    """Parameters of a memory; of an optimiser's settings only the learning rate is the memory's."""
+    if "param_groups" not in own:
+        return found
+    pairs = zip(own["param_groups"], found["param_groups"], strict=True)
+    return {**found, "param_groups": [group | {"lr": given.get("lr", group["lr"])} for group, given in pairs]}
 
 
 def _layers(env: Any) -> list[Any]:
@@ -102,6 +157,9 @@ def _replay_memory(buffer: Any) -> Memory | None:
 def _put_replay_back(buffer: Any, memory: Memory | None) -> None:
     if buffer is None or memory is None:
         return
+    filled = buffer.buffer_size if memory["full"] else memory["pos"]
+    if memory["pos"] >= buffer.buffer_size or any(len(memory[name]) != filled for name in STORED):
+        raise ValueError(f"agent.replay: not the {filled} steps that its position {memory['pos']} says")
     buffer.pos, buffer.full = memory["pos"], memory["full"]
     for name in STORED:
         getattr(buffer, name)[: len(memory[name])] = memory[name]
@@ -117,7 +175,13 @@ def _random_memory(agent: Any) -> Memory:
 
 
 def _put_random_back(agent: Any, memory: Memory) -> None:
-    random.setstate(memory["python"])
-    np.random.set_state(memory["numpy"])
-    torch.set_rng_state(memory["torch"])
-    agent.action_space.np_random.bit_generator.state = memory["actions"]
+    _, key, position, *_ = memory["numpy"]
+    if position > len(key):  # NumPy would read what lies behind
+        raise ValueError(f"agent.random.numpy: position {position} found, expected at most {len(key)}")
+    try:
+        random.setstate(memory["python"])
+        np.random.set_state(memory["numpy"])
+        torch.set_rng_state(memory["torch"])
+        agent.action_space.np_random.bit_generator.state = memory["actions"]
+    except (OverflowError, RuntimeError) as error:
+        raise ValueError(f"agent.random: {error}") from None

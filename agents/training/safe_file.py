@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 from typing import Any
@@ -9,10 +10,13 @@ from typing import Any
 import numpy as np
 
 from shipgym.errors import InputError
-from shipgym.files import write_bytes
+from shipgym.files import check_readable, write_bytes
 
 Arrays = dict[str, Any]
-CONTENT = "content"  # entry of the file's metadata: what is not an array, as JSON
+#: Entries of the file's metadata: what is not an array, as JSON, and the SHA-256 of all.
+CONTENT, SHA256 = "content", "sha256"
+DEEPEST = 20  # values within values
+TYPES = ("BOOL", "U8", "U32", "U64", "I32", "I64", "F32", "F64")  # of arrays
 
 
 def write_values(value: Any, path: Path) -> None:
@@ -25,24 +29,46 @@ def write_values(value: Any, path: Path) -> None:
 
     arrays: Arrays = {}
     content = json.dumps(_packed(value, "", arrays))
-    write_bytes(save(arrays, {CONTENT: content}), path)
+    write_bytes(save(arrays, {CONTENT: content, SHA256: _hash(content, arrays)}), path)
 
 
 def read_values(path: Path, what: str) -> Any:
     """What `write_values` wrote, tensors as tensors.
 
-    Raises InputError if the file is missing, cut short or another.
+    Raises InputError if the file is missing, cut short, changed since or another.
     """
     from safetensors import SafetensorError, safe_open
 
+    check_readable(path, what)
+    arrays: Arrays = {}
     try:
         with safe_open(path, "numpy") as file:
-            arrays = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 - it is no mapping
-            return _unpacked(json.loads(file.metadata()[CONTENT]), arrays)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such {what}") from None
-    except (SafetensorError, OSError, KeyError, TypeError, ValueError) as error:
+            for name in file.keys():  # noqa: SIM118 - it is no mapping
+                if (kind := file.get_slice(name).get_dtype()) not in TYPES:
+                    raise ValueError(f"'{name}' of type {kind}, expected one of {', '.join(TYPES)}")
+                arrays[name] = file.get_tensor(name)
+            about = file.metadata()
+        if about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256:  # older files have none
+            raise ValueError("its SHA-256 is not that of its content")
+        return _unpacked(json.loads(about[CONTENT]), arrays)
+    except (
+        SafetensorError,
+        OSError,
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        RecursionError,
+    ) as error:
         raise InputError(f"{path}: not a {what}, or one that is cut short ({error})") from None
+
+
+def _hash(content: str, arrays: Arrays) -> str:
+    """SHA-256 of what is not an array, and of arrays with their names, types and shapes."""
+    digest = hashlib.sha256(content.encode())
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
+    return digest.hexdigest()
 
 
 def _packed(value: Any, name: str, arrays: Arrays) -> Any:
@@ -68,11 +94,13 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
     raise TypeError(f"{name}: {type(value).__name__} cannot be written")
 
 
-def _unpacked(content: Any, arrays: Arrays) -> Any:
-    """The value that `_packed` made this of."""
+def _unpacked(content: Any, arrays: Arrays, deeper: int = DEEPEST) -> Any:
+    """The value that `_packed` made this of; ValueError, TypeError or KeyError if it made it of none."""
     if not isinstance(content, dict):
         return content
     ((kind, inner),) = content.items()
+    if not deeper or kind not in ("array", "tensor", "dict", "list", "tuple"):
+        raise ValueError(f"{kind!r} found among its values, {DEEPEST - deeper} deep")
     if kind == "array":
         return arrays[inner]
     if kind == "tensor":
@@ -80,6 +108,6 @@ def _unpacked(content: Any, arrays: Arrays) -> Any:
 
         return torch.from_numpy(arrays[inner].copy())
     if kind == "dict":
-        return {key: _unpacked(one, arrays) for key, one in inner}
-    items = [_unpacked(one, arrays) for one in inner]
+        return {key: _unpacked(one, arrays, deeper - 1) for key, one in inner}
+    items = [_unpacked(one, arrays, deeper - 1) for one in inner]
     return tuple(items) if kind == "tuple" else items

@@ -301,6 +301,7 @@ class _Training:
         content = read_values(checkpoint, "checkpoint of a training")
         try:
             own = content["run"]
+            checkpoints.check_record(own)
             checkpoints.put_back(self.agent, content["agent"])
             self.curve, self.best_cost, self.best_steps = own["curve"], own["best_cost"], own["best_steps"]
             self.seconds_before = own["seconds"]

@@ -1,18 +1,28 @@
-"""The folder in which compiled loops are kept."""
+"""The folder in which compiled loops are kept, and whether what lies there may be run.
+
+A loop's file is code. It is run only if nobody but root and this user could have written it: files, the
+folder and all above it are theirs, and others may not write them. A folder above may be sticky, as ``/tmp``
+is, where others cannot rename what is not theirs.
+"""
 
 from __future__ import annotations
 
 import os
+import stat
+import tempfile
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from errno import ENOENT
 from functools import cache
+from hashlib import sha256
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 CACHE_VARIABLE = "SHIPGYM_CACHE"
+LOOP, DRAFT = ".loop", ".new"
+DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 
 
 def cache_folder() -> Path:
@@ -22,17 +32,113 @@ def cache_folder() -> Path:
 
 @cache
 def usable_folder() -> Path | None:
-    """The folder of the cache; None, with a warning, where there is none and none can be made."""
-    home = cache_folder()
+    """The folder of the cache; None, with a warning, where there is none that can be used."""
     try:
-        if home.parts[:1] == ("~",):
-            raise OSError(ENOENT, "the user has no home")
-        home.mkdir(parents=True, exist_ok=True)
-        next(home.iterdir(), None)
+        return open_folder()
     except OSError as error:
-        warn_of(home, error)
-        return None
+        warn_of(cache_folder(), error)
+    except ValueError as error:
+        tell(f"{error}. Until then ships are compiled anew in each process.")
+    return None
+
+
+def open_folder() -> Path:
+    """The folder of the cache, without links in its path; it is made where there is none.
+
+    Raises OSError if it cannot be made or read, ValueError if code in it might be another user's, with what
+    to do.
+    """
+    home = cache_folder()
+    if home.parts[:1] == ("~",):
+        raise OSError(ENOENT, "the user has no home")
+    for one in reversed([one for one in (home, *home.parents) if not one.is_dir()]):
+        one.mkdir(mode=0o755, exist_ok=True)
+    home = home.resolve(strict=True)
+    next(home.iterdir(), None)
+    for one in (home, *home.parents):
+        if why := _others_of(one.stat(), one != home):
+            remedy = f"set {CACHE_VARIABLE} to a folder that is yours alone"
+            remedy = remedy if "belongs" in why else f"chmod go-w {one}, or {remedy}"
+            raise ValueError(f"{home}: not used, because {one} {why}; {remedy}")
     return home
+
+
+def _others_of(found: os.stat_result, above: bool = False) -> str:
+    """Who beside root and this user could change a file or folder; `above`: it is one above the cache."""
+    if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's
+        return ""
+    if found.st_uid not in (0, os.geteuid()) and not (above and found.st_uid == _root_outside()):
+        return f"belongs to another user ({found.st_uid})"
+    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (above and found.st_mode & stat.S_ISVTX):
+        return "may be written by other users"
+    return ""
+
+
+@cache
+def _root_outside() -> int | None:
+    """In a user namespace, the one user who stands for all outside of it, the host's root among them."""
+    try:
+        whole = Path("/proc/self/uid_map").read_text().split() == ["0", "0", str(2**32 - 1)]
+        return None if whole else int(Path("/proc/sys/kernel/overflowuid").read_text())
+    except (OSError, ValueError):
+        return None
+
+
+def read_loop(path: Path) -> bytes:
+    """What a loop's file holds behind its hash.
+
+    Raises OSError if it cannot be read, ValueError, with what is wrong, if it is damaged or might be
+    another user's.
+    """
+    number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
+    with os.fdopen(number, "rb") as file:
+        if why := _others_of(os.fstat(number)):
+            raise ValueError(why)
+        content = file.read()
+    if sha256(content[DIGEST:]).digest() != content[:DIGEST]:
+        raise ValueError("is damaged")
+    return content[DIGEST:]
+
+
+def loop_fault(path: Path) -> str:
+    """What is wrong with a loop's file; empty if nothing is, or it is another file."""
+    try:
+        if path.suffix == LOOP:
+            read_loop(path)
+    except (OSError, ValueError) as error:
+        return str(error)
+    return ""
+
+
+def write_loop(content: bytes, path: Path) -> None:
+    """Write a loop's file, whole or not at all; drafts of processes that were killed are removed.
+
+    The caller holds its lock. Raises OSError if it cannot be written.
+    """
+    _remove_drafts(path)
+    number, name = tempfile.mkstemp(dir=path.parent, prefix=f"{path.stem}-", suffix=DRAFT)
+    try:
+        with os.fdopen(number, "wb") as file:
+            file.write(sha256(content).digest() + content)
+        Path(name).chmod(0o644)  # others may use it
+        Path(name).replace(path)
+    finally:
+        Path(name).unlink(missing_ok=True)
+
+
+def lock_of(path: Path) -> Path:
+    """The lock under which a loop's file, or a draft of it, is written: its name begins with a hash."""
+    return path.with_name(path.name.partition("-")[0] + ".lock")
+
+
+def _remove_drafts(path: Path) -> None:
+    """Remove drafts that nobody writes any longer: whoever does holds their lock."""
+    from filelock import FileLock
+
+    for draft in path.parent.glob(f"*{DRAFT}"):
+        own = lock_of(draft) == lock_of(path)
+        with suppress(OSError, NotImplementedError), nullcontext() if own else FileLock(lock_of(draft), 0):
+            draft.unlink()
 
 
 @contextmanager
@@ -54,8 +160,13 @@ def locked(path: Path) -> Iterator[None]:
 
 def warn_of(folder: Path, error: OSError) -> None:
     """Say that nothing can be kept, and what to do."""
-    warnings.warn(
+    tell(
         f"{folder}: cannot be written ({error.strerror}), so ships are compiled anew in each process. "
-        f"Set {CACHE_VARIABLE} to a folder that can.",
-        stacklevel=2,
+        f"Set {CACHE_VARIABLE} to a folder that can."
     )
+
+
+@cache
+def tell(message: str) -> None:
+    """Warn, once in a process."""
+    warnings.warn(message, stacklevel=3)

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from shipgym.engine.cache_folder import locked, usable_folder
+from shipgym.engine.cache_folder import lock_of, locked, usable_folder
 from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
 from shipgym.errors import InputError
 
@@ -65,7 +65,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     if disk.ready():
         _compile(dispatcher, signature, what)
         return dispatcher
-    with locked(folder / f"{tag}.lock"):
+    with locked(lock_of(disk.path)):
         if not disk.ready():  # another process may have been first
             _announce(what, folder)
         _compile(dispatcher, signature, what)

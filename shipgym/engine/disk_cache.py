@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import os
 import pickle
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +11,7 @@ from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
-from shipgym.engine.cache_folder import warn_of
-
-SUFFIX = ".loop"
-DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
+from shipgym.engine.cache_folder import LOOP, read_loop, tell, warn_of, write_loop
 
 
 class DiskCache(NullCache):  # type: ignore[misc]
@@ -34,18 +29,19 @@ class DiskCache(NullCache):  # type: ignore[misc]
 
     def __init__(self, folder: Path, tag: str, signature: str) -> None:
         short = hashlib.sha256(signature.encode()).hexdigest()[:8]
-        self.path = folder / f"{tag}-{short}{SUFFIX}"
+        self.path = folder / f"{tag}-{short}{LOOP}"
         self._content: bytes | None = None
 
     def ready(self) -> bool:
         """Whether machine code is on disk, and whole."""
+        self._content = None
         try:
-            content = self.path.read_bytes()
+            self._content = read_loop(self.path)
         except OSError:
-            return False
-        whole = hashlib.sha256(content[DIGEST:]).digest() == content[:DIGEST]
-        self._content = content[DIGEST:] if whole else None
-        return whole
+            pass
+        except ValueError as error:
+            tell(f"{self.path.parent}: a compiled loop {error}; it is compiled anew (see shipgym doctor)")
+        return self._content is not None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The compiled loop, if it was found ready; None: it is to be compiled."""
@@ -53,21 +49,17 @@ class DiskCache(NullCache):  # type: ignore[misc]
             return None
         content, self._content = self._content, None
         target_context.refresh()
-        return CompileResult._rebuild(target_context, *pickle.loads(content))
+        try:
+            return CompileResult._rebuild(target_context, *pickle.loads(content))
+        except Exception as error:  # whatever the inside of another Numba may raise
+            tell(f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it is compiled anew")
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Keep machine code, where the folder may be written; a file is there whole or not at all."""
+        """Keep machine code, where the folder may be written."""
         if data.library.has_dynamic_globals:  # addresses of this process
             return
-        content = dumps(data._reduce())
         try:
-            number, name = tempfile.mkstemp(dir=self.path.parent, suffix=".new")
-            try:
-                with os.fdopen(number, "wb") as file:
-                    file.write(hashlib.sha256(content).digest() + content)
-                Path(name).chmod(0o644)  # others may use it
-                Path(name).replace(self.path)
-            finally:
-                Path(name).unlink(missing_ok=True)
+            write_loop(dumps(data._reduce()), self.path)
         except OSError as error:
             warn_of(self.path.parent, error)

@@ -204,6 +204,20 @@ def test_doctor_tells_place_and_size_of_the_cache(tmp_path, monkeypatch):
     assert f"{tmp_path}, 1 files, 0.2 MB" in shipgym("doctor").stdout.replace("\n", "")
 
 
+def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(tmp_path, monkeypatch):
+    (tmp_path / "it.loop").write_bytes(bytes(200))
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
+    answer = shipgym("doctor", "--json")
+    (cache,) = (one for one in json.loads(answer.stdout)["findings"] if one["what"] == "cache")
+    assert (answer.exit_code, cache["state"]) == (1, "wrong")
+    assert "1 of them not usable: it.loop is damaged" in cache["detail"]
+    if os.name != "nt":
+        tmp_path.chmod(0o777)
+        answer = shipgym("doctor", "--json")
+        assert answer.exit_code == 1
+        assert f"{tmp_path} may be written by other users; chmod go-w {tmp_path}, or set" in answer.stdout
+
+
 def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     cache, here = tmp_path / "cache", tmp_path / "here"
     here.mkdir()

@@ -2,18 +2,23 @@
 
 import json
 import os
+import pickle
 import re
 import signal
 import stat
 import subprocess
 import sys
 import tempfile
+import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from filelock import FileLock
 
 import shipgym
 from shipgym.engine import cache_folder, compiling
+from shipgym.engine.disk_cache import DiskCache
 from shipgym.engine.voyages import Voyages, sensors_for
 from shipgym.tasks.definition import read_definition
 
@@ -73,10 +78,10 @@ print(json.dumps(found))
 """
 
 
-def start(code, *arguments, cache):
+def start(code, *arguments, cache, errors=None):
     return subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
-        env={**os.environ, "SHIPGYM_CACHE": str(cache)}, stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "SHIPGYM_CACHE": str(cache)}, stdout=subprocess.PIPE, stderr=errors, text=True,
     )  # fmt: skip
 
 
@@ -108,8 +113,10 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, damage):
     (file,) = tmp_path.glob("*.loop")
     whole = file.read_bytes()
     file.write_bytes(damage(whole))
-    assert start(code, cache=tmp_path).communicate()[0].split() == ["compiles", "done"]
-    assert start(code, cache=tmp_path).communicate()[0].split() == ["done"]
+    told, said = start(code, cache=tmp_path, errors=subprocess.PIPE).communicate()
+    assert told.split() == ["compiles", "done"]
+    assert said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled anew") == 1
+    assert start(code, cache=tmp_path, errors=subprocess.PIPE).communicate() == ("done\n", "")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
@@ -129,6 +136,149 @@ def test_a_cache_of_another_user_is_read_and_closed_folders_are_said():
         assert factor in (2.0, 3.0)
         assert compilations == 1
         assert re.search("cannot be written .* compiled anew in each process. Set SHIPGYM_CACHE", *messages)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """A cache of this user's, found anew by whoever asks."""
+    cache = tmp_path / "above" / "cache"
+    cache.mkdir(parents=True)
+    monkeypatch.setenv("SHIPGYM_CACHE", str(cache))
+    cache_folder.usable_folder.cache_clear()
+    yield cache
+    cache_folder.usable_folder.cache_clear()
+
+
+@pytest.fixture
+def give(monkeypatch):
+    """Make another user the owner of a file or folder, as far as this process can see."""
+
+    def to_another(path):
+        if os.geteuid() == 0:
+            os.chown(path, 1234, -1)
+        else:
+            monkeypatch.setattr(os, "geteuid", lambda: os.getuid() + 1)
+
+    return to_another
+
+
+posix = pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
+
+
+@posix
+@pytest.mark.parametrize("mode", [0o777, 0o775, 0o757, 0o1777])
+def test_a_folder_that_others_may_write_is_not_used(folder, mode):
+    folder.chmod(mode)
+    with pytest.warns(
+        UserWarning, match="cache may be written by other users; chmod go-w .*cache, or set"
+    ) as said:
+        assert cache_folder.usable_folder() is None
+    assert len(said) == 1
+    folder.chmod(0o755)
+    assert cache_folder.open_folder() == folder
+
+
+@posix
+def test_so_is_one_below_a_folder_that_others_may_write_but_for_sticky_ones(folder):
+    folder.parent.chmod(0o777)
+    with pytest.raises(ValueError, match=r"above may be written by other users; chmod go-w .*above, or set"):
+        cache_folder.open_folder()
+    folder.parent.chmod(0o1777)  # as /tmp: others cannot rename what is not theirs
+    assert cache_folder.open_folder() == folder
+
+
+@posix
+def test_a_folder_of_another_user_is_not_used(folder, give, monkeypatch):
+    give(folder.parent)
+    with pytest.raises(
+        ValueError, match=r"belongs to another user \(\d+\); set SHIPGYM_CACHE to a folder that"
+    ):
+        cache_folder.open_folder()
+    monkeypatch.setattr(cache_folder, "_root_outside", lambda: folder.parent.stat().st_uid)
+    if os.geteuid() == 0:  # one who stands for the root of the host may own what is above
+        assert cache_folder.open_folder() == folder
+    give(folder)
+    with pytest.raises(ValueError, match="cache belongs to another user"):
+        cache_folder.open_folder()
+
+
+@posix
+def test_folders_are_made_so_that_only_their_owner_may_write(folder, monkeypatch):
+    monkeypatch.setenv("SHIPGYM_CACHE", str(folder / "a" / "b"))
+    before = os.umask(0)
+    try:
+        assert cache_folder.open_folder() == folder / "a" / "b"
+    finally:
+        os.umask(before)
+    assert [stat.S_IMODE(one.stat().st_mode) for one in (folder / "a", folder / "a" / "b")] == [0o755, 0o755]
+
+
+@posix
+def test_links_lead_to_the_folder_that_is_looked_at(folder, tmp_path, monkeypatch):
+    (tmp_path / "link").symlink_to(folder)
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "link"))
+    assert cache_folder.open_folder() == folder
+    folder.parent.chmod(0o777)
+    with pytest.raises(ValueError, match="above may be written by other users"):
+        cache_folder.open_folder()
+
+
+class Planted:
+    def __reduce__(self):
+        return os.system, ("touch PLANTED",)
+
+
+@posix
+@pytest.mark.parametrize("change", ["owner", "group", "others", "link"])
+def test_a_file_that_another_user_could_have_written_is_not_run(folder, give, monkeypatch, change):
+    monkeypatch.chdir(folder)
+    cache = DiskCache(folder, "tag", "void()")
+    cache_folder.write_loop(pickle.dumps(Planted()), cache.path)
+    if change == "owner":
+        give(cache.path)
+    elif change == "link":
+        cache.path.rename(folder / "elsewhere")
+        cache.path.symlink_to(folder / "elsewhere")
+    else:
+        cache.path.chmod(0o664 if change == "group" else 0o646)
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        assert not cache.ready()
+        assert not cache.ready()
+    assert len(said) == (change != "link")  # a link is no file of ours
+    assert cache.load_overload(None, None) is None
+    assert not Path("PLANTED").exists()
+    monkeypatch.setattr(os, "geteuid", os.getuid)
+    cache_folder.write_loop(b"anew", cache.path)
+    assert cache_folder.read_loop(cache.path) == b"anew"
+
+
+def test_what_cannot_be_loaded_is_said_and_compiled_anew(folder):
+    cache = DiskCache(folder, "tag", "void()")
+    cache_folder.write_loop(b"no pickle", cache.path)
+    assert cache.ready()
+    with pytest.warns(UserWarning, match=r"cannot be loaded \(UnpicklingError: .*; it is compiled anew"):
+        assert cache.load_overload(None, SimpleNamespace(refresh=lambda: None)) is None
+
+
+def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
+    for name in ("tag-short-1.new", "other-short-2.new", "busy-short-3.new", "tmpold.new"):
+        (folder / name).touch()
+    with FileLock(folder / "busy.lock"):
+        cache_folder.write_loop(b"content", folder / "tag-short.loop")
+    assert {path.name for path in folder.glob("*.new")} == {"busy-short-3.new"}
+    assert cache_folder.read_loop(folder / "tag-short.loop") == b"content"
+
+
+@posix
+def test_a_full_disk_is_said_once_and_nothing_is_left(tmp_path):
+    full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
+    told, said = start(
+        full + WORKER.format(while_compiling="pass"), cache=tmp_path, errors=subprocess.PIPE
+    ).communicate()
+    assert told.split() == ["compiles", "done"]
+    assert said.count("UserWarning") == said.count("cannot be written (File too large)") == 1
+    assert not [path for path in tmp_path.iterdir() if path.suffix != ".lock"]
 
 
 def test_a_cache_that_cannot_be_made_is_said_and_survived(tmp_path, monkeypatch):

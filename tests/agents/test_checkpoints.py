@@ -1,0 +1,258 @@
+"""Checkpoints: all of it is compared with the agent's own before anything is put back; no path is opened."""
+
+import copy
+import json
+import struct
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+
+from agents.training import checkpoints
+from agents.training.algorithms import make_agent
+from agents.training.plan import Given, make_plan
+from agents.training.safe_file import CONTENT, SHA256, read_values, write_values
+from shipgym.errors import InputError
+
+SHORT = {"episode_steps": 20, "change_interval_steps": 10}
+OWN = {
+    "base": "none",
+    "ships": 4,
+    "learning_starts": 16,
+    "gradient_steps": 1,
+    "batch_size": 8,
+    "critic_arch": [8],
+    "net_arch": [8],
+    "total_steps": 40,
+    "buffer_size": 80,
+}
+PLAN = make_plan(Given("sac", options=SHORT, settings=OWN))
+
+
+@pytest.fixture(scope="module")
+def memory(tmp_path_factory):
+    """Of an agent that has learned a little, as it comes from its file."""
+    agent = make_agent(PLAN, None)
+    agent.learn(40)
+    path = tmp_path_factory.mktemp("kept") / "checkpoint.safetensors"
+    write_values(checkpoints.take(agent), path)
+    return read_values(path, "checkpoint")
+
+
+@pytest.fixture(scope="module")
+def fresh():
+    return make_agent(PLAN, None)
+
+
+def test_what_fits_is_put_back(fresh, memory):
+    checkpoints.put_back(fresh, copy.deepcopy(memory))
+    assert fresh.num_timesteps == 40
+    again = checkpoints.take(fresh)
+    assert torch.equal(
+        again["parameters"]["policy"]["actor.mu.weight"], memory["parameters"]["policy"]["actor.mu.weight"]
+    )
+    np.testing.assert_array_equal(again["ships"][1]["states"], memory["ships"][1]["states"])
+    assert again["replay"]["pos"] == memory["replay"]["pos"] == 10
+
+
+def test_of_an_optimiser_only_rates_and_moments_are_put_back(fresh, memory):
+    changed = copy.deepcopy(memory)
+    (group,) = changed["parameters"]["actor.optimizer"]["param_groups"]
+    group |= {"lr": 0.25, "eps": "evil", "params": [7], "of another version of torch": [1]}
+    checkpoints.put_back(fresh, changed)
+    (found,) = fresh.get_parameters()["actor.optimizer"]["param_groups"]
+    assert (found["lr"], found["eps"], found["params"]) == (0.25, 1e-8, [0, 1, 2, 3, 4, 5])
+
+
+RANDOM_ARRAY = np.zeros(3)
+WEIGHT = ("parameters", "policy", "actor.mu.weight")
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "said"),
+    [
+        (
+            ("parameters",),
+            "/etc/passwd",
+            "agent.parameters: '/etc/passwd' found, expected a table of 4: 'policy'",
+        ),
+        (
+            ("parameters", "policy"),
+            "/dev/zero",
+            "agent.parameters.policy: '/dev/zero' found, expected a table of",
+        ),
+        (
+            WEIGHT,
+            "/etc/passwd",
+            "actor.mu.weight: '/etc/passwd' found, expected Tensor torch.float32 of shape (1, 8)",
+        ),
+        (WEIGHT, torch.zeros(8, 1), "Tensor torch.float32 of shape (8, 1) found"),
+        (WEIGHT, torch.zeros(1, 8, dtype=torch.float64), "Tensor torch.float64 of shape (1, 8) found"),
+        (WEIGHT, np.zeros((1, 8), np.float32), "ndarray float32 of shape (1, 8) found, expected Tensor"),
+        (("parameters", "policy", "more"), torch.zeros(1), "agent.parameters.policy: a table of"),
+        (("parameters", "actor.optimizer", "state", 99), {}, "actor.optimizer.state: a table of"),
+        (("parameters", "actor.optimizer", "state", 0, "exp_avg"), torch.zeros(3), "state.0.exp_avg: Tensor"),
+        (("parameters", "actor.optimizer", "param_groups"), [], "param_groups: list of length 0 found"),
+        (("variables",), {}, "agent.variables: a table of 0"),
+        (("variables", "log_ent_coef"), 0.5, "log_ent_coef: 0.5 found, expected Tensor"),
+        (("counters", "num_timesteps"), -1, "num_timesteps: -1 found, expected one such as"),
+        (("counters", "num_timesteps"), 1.5, "num_timesteps: 1.5 found"),
+        (("counters", "num_timesteps"), True, "num_timesteps: True found"),
+        (("counters", "num_timesteps"), 10**40, "num_timesteps: 1000"),
+        (("counters", "_last_obs"), None, "_last_obs: None found, expected ndarray float32 of shape (4, 8)"),
+        (("counters", "__class__"), 1, "agent.counters: a table of 7"),
+        (
+            ("episodes",),
+            [{"r": 1.0, "l": 5}],
+            "agent.episodes[0]: a table of 2: 'r', 'l' found, expected a table of 3",
+        ),
+        (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list"),
+        (("successes",), ["x"], "agent.successes[0]: 'x' found"),
+        (("successes",), [float("inf")], "agent.successes[0]: inf found"),
+        (("ships",), [], "agent.ships: list of length 0 found, expected list of length 2"),
+        (("ships", 0, "var"), "x", "agent.ships[0].var: 'x' found"),
+        (("ships", 1, "states"), RANDOM_ARRAY, "agent.ships[1].states: ndarray float64 of shape (3,) found"),
+        (("replay",), None, "agent.replay: None found, expected a table of 8"),
+        (("replay", "pos"), 11, "agent.replay: not the 11 steps that its position 11 says"),
+        (("replay", "pos"), 10**9, "agent.replay: not the"),
+        (("replay", "full"), True, "agent.replay: not the 20 steps"),
+        (("replay", "actions"), np.zeros((10, 4, 2), np.float32), "agent.replay.actions: ndarray"),
+        (("replay", "actions"), np.zeros((99, 4, 1), np.float32), "agent.replay.actions: ndarray"),
+        (("random", "numpy"), ("MT19937", np.zeros(624, np.uint32), 10**6, 0, 0.0), "position 1000000 found"),
+        (
+            ("random", "numpy"),
+            ("PCG64", np.zeros(624, np.uint32), 0, 0, 0.0),
+            "random.numpy[0]: 'PCG64' found",
+        ),
+        (("random", "python"), (3, (1, 2), None), "agent.random.python[1]: tuple of length 2 found"),
+        (("random", "python"), (3, (2**100,) * 625, None), "agent.random: "),
+        (("random", "torch"), torch.zeros(5056, dtype=torch.uint8), "agent.random: "),
+        (("random", "torch"), torch.zeros(3, dtype=torch.uint8), "agent.random.torch: Tensor torch.uint8"),
+        (
+            ("random", "actions", "bit_generator"),
+            "os",
+            "bit_generator: 'os' found, expected one such as 'PCG64'",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
+    changed = copy.deepcopy(memory)
+    inside = changed
+    for key in path[:-1]:
+        inside = inside[key]
+    inside[path[-1]] = value
+    with pytest.raises(ValueError) as error:  # noqa: PT011 - its message is compared
+        checkpoints.put_back(fresh, changed)
+    assert said in str(error.value)
+
+
+@pytest.mark.parametrize("memory", [None, "/etc/passwd", [], {}, {"parameters": {}}])
+def test_what_is_no_memory_is_refused(fresh, memory):
+    with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8: 'parameters'"):
+        checkpoints.put_back(fresh, memory)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"curve": [{"steps": 1}]}, r"run.curve\[0\]: a table of 1"),
+        ({"curve": {}}, "run.curve: a table of 0"),
+        ({"best_cost": "low"}, "run.best_cost: 'low' found"),
+        ({"best_steps": -1}, "run.best_steps: -1 found"),
+        ({"seconds": float("nan")}, "run.seconds: nan found"),
+        ({"more": 1}, "run: a table of 5"),
+    ],
+)
+def test_so_is_another_record(change, said):
+    row = {"steps": 0, "seconds": 1.0, "cost": 2.0, "mean_return": None}
+    record = {"best_cost": 2.0, "best_steps": 0, "curve": [row, {**row, "mean_return": -1.0}], "seconds": 3.0}
+    checkpoints.check_record(record)
+    checkpoints.check_record({**record, "best_cost": None, "curve": []})
+    with pytest.raises(ValueError, match=said):
+        checkpoints.check_record({**record, **change})
+
+
+def rewritten(path, change):
+    """A file with other metadata and tensors: its header is changed and what follows stays."""
+    whole = path.read_bytes()
+    (length,) = struct.unpack("<Q", whole[:8])
+    header = json.loads(whole[8 : 8 + length])
+    change(header)
+    text = json.dumps(header).encode()
+    path.write_bytes(struct.pack("<Q", len(text)) + text + whole[8 + length :])
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "values.safetensors"
+    write_values({"a": np.arange(3.0), "b": (1, 2.5, None, "x", True), 4: [torch.ones(2)]}, path)
+    return path
+
+
+def test_values_come_back_and_older_files_without_a_hash_too(file):
+    found = read_values(file, "thing")
+    assert found["b"] == (1, 2.5, None, "x", True)
+    assert torch.equal(found[4][0], torch.ones(2))
+    rewritten(file, lambda header: header["__metadata__"].pop(SHA256))
+    np.testing.assert_array_equal(read_values(file, "thing")["a"], np.arange(3.0))
+
+
+def test_values_that_have_changed_are_refused(file):
+    whole = file.read_bytes()
+    file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
+    with pytest.raises(
+        InputError, match=r"values.safetensors: not a thing.*its SHA-256 is not that of its content"
+    ):
+        read_values(file, "thing")
+    file.write_bytes(whole)
+    rewritten(file, lambda header: header["__metadata__"].update({CONTENT: '{"array": "a"}'}))
+    with pytest.raises(InputError, match="its SHA-256 is not that of its content"):
+        read_values(file, "thing")
+    with safe_open(file, "numpy") as found:
+        assert found.metadata().keys() == {CONTENT, SHA256}
+
+
+@pytest.mark.parametrize("kind", ["F8_E4M3", "F8_E5M2", "F8_E8M0", "I8", "XX"])
+def test_tensors_of_other_types_are_refused_in_one_message(file, kind):
+    rewritten(file, lambda header: header["a"].update({"dtype": kind, "shape": [24]}))
+    with pytest.raises(InputError, match=rf"^[^\n]*not a thing, or one that is cut short [^\n]*{kind}"):
+        read_values(file, "thing")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "",
+        "[",
+        '{"array": "none"}',
+        '{"array": ["a"]}',
+        '{"tensor": 3}',
+        '{"code": "x"}',
+        '{"dict": [["a"]]}',
+        '{"dict": [[["a"], 1]]}',
+        '{"dict": 3}',
+        '{"list": 3}',
+        '{"list": [], "dict": []}',
+        "{}",
+        '{"list": [' * 21 + "]}" * 21,
+        '{"list": [' * 10**5 + "]}" * 10**5,
+    ],
+)
+def test_values_of_another_form_are_refused(file, content):
+    def change(header):
+        header["__metadata__"] = {CONTENT: content}
+
+    rewritten(file, change)
+    with pytest.raises(InputError, match="not a thing, or one that is cut short"):
+        read_values(file, "thing")
+
+
+def test_a_file_that_is_not_there_or_has_no_content(file, tmp_path):
+    with pytest.raises(InputError, match="there is no such thing"):
+        read_values(tmp_path / "none.safetensors", "thing")
+    with pytest.raises(InputError, match="this is a folder, expected a thing"):
+        read_values(tmp_path, "thing")
+    rewritten(file, lambda header: header.pop("__metadata__"))
+    with pytest.raises(InputError, match="not a thing"):
+        read_values(file, "thing")
