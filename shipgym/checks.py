@@ -202,7 +202,7 @@ def check_array(value: Any, shape: tuple[int | None, ...], where: str) -> NDArra
 
 
 def check_shape(value: Any, shape: Shape, where: str) -> None:
-    """Refuse nested JSON values that differ from a shape, naming the place; further keys are not looked at."""
+    """Refuse nested JSON values that differ from a shape, naming the place; further keys may be there."""
     if isinstance(shape, dict):
         table = check_table(value, where)
         for key in table if ANY_KEY in shape else shape:

@@ -27,7 +27,8 @@ SHAPE: dict[str, Shape] = {
     "seeds": {"first": (int,), "count": (int,)},
     "contestants": {
         ANY_KEY: {
-            "source": (str, NoneType), "files": {ANY_KEY: (str,)}, "runs": (int,), "refused": {ANY_KEY: (str,)}
+            "source": (str, NoneType), "files": {ANY_KEY: (str,)}, "runs": (int,),
+            "refused": {ANY_KEY: (str,)},
         }
     },
     "tasks": {ANY_KEY: {ANY_KEY: ENTRY}},

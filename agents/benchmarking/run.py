@@ -106,9 +106,7 @@ def _check_part(part: Any, episodes: int, where: str) -> None:
         if values.shape != (episodes,) or values.dtype != np.float64
     ]  # fmt: skip
     if wrong or any(one != names[0] or "cost" not in one for one in names):
-        raise InputError(
-            f"{where}: expected a cost and other figures of {episodes} episodes; remove '{PARTS}'"
-        )
+        raise InputError(f"{where}: expected the cost and other figures of {episodes} episodes")
 
 
 def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:

@@ -73,7 +73,7 @@ def pack(value: Any) -> Any:
 
 
 def unpack(value: Any) -> Any:
-    """The result that `pack` was given; a LookupError, TypeError, ValueError or OverflowError if it is broken."""
+    """The result that `pack` was given; Lookup-, Type-, Value- or OverflowError if it is broken."""
     if isinstance(value, list):
         return [unpack(item) for item in value]
     if not isinstance(value, dict):
