@@ -1,7 +1,7 @@
 """The kinds of files that are read, a line each in `KINDS`.
 
-A new reader joins with a line: its name, the function that reads a path, and what is done with the result, so
-that a field which nobody checked does not fail later. Small sound files of the kind go into `tests/corpus/NAME`.
+A new reader joins with a line: its name, the function that reads a path, and what is done with the result,
+so that a field which nobody checked fails here. Small sound files of the kind go into `tests/corpus/NAME`.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.console import Console
 
 from agents import load_agent, load_results
 from agents.cli.benchmark_tables import costs_table, ranking_table
@@ -24,7 +25,6 @@ from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
 from fuzzing.reading import CORPUS, Kind
-from rich.console import Console
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import struct
-
 from collections.abc import Callable
 from functools import lru_cache
 from random import Random
@@ -23,13 +22,14 @@ SOURCES: dict[
 LARGEST_TOML = 10_000  # bytes that are parsed for a change: keys of many parts take long
 BYTES_SHARE = 0.12  # of mutations that know nothing of the format
 INSERTED = (
-    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",", b"\xed\xa0\x80", b"#",
-    b"\x1b", b" " * 100, b"9" * 400, b"\\", b"=", b"e",
+    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",",
+    b"\xed\xa0\x80", b"#", b"\x1b", b" " * 100, b"9" * 400, b"\\", b"=", b"e",
 )  # fmt: skip
 WHOLE = (
-    b"", b"\0", b"null", b"[]", b"{}", b"1", b'"a"', b"\xef\xbb\xbf", b"\xff\xfea\0", b"\0" * 100_000, b"[" * 100_000, b'{"a":' * 5_000,
-    b"a.b.c" * 8_000 + b"=1", b"a." * 20_000 + b"a=1", b"," * 50_000, b"a,b\n" * 20_000, b"\n" * 100_000, b"-", b"nan", b"PAR1PAR1",
-    b"\x08\0\0\0\0\0\0\0{}      ", b"[[" + b"a" * 50_000 + b"]]", b'x="' + b"y" * 200_000 + b'"', b"'''", b"\x80\x04N.", b"PK\x03\x04",
+    b"", b"\0", b"null", b"[]", b"{}", b"1", b'"a"', b"\xef\xbb\xbf", b"\xff\xfea\0", b"\0" * 100_000,
+    b"[" * 100_000, b'{"a":' * 5_000, b"a.b.c" * 8_000 + b"=1", b"a." * 20_000 + b"a=1", b"," * 50_000,
+    b"a,b\n" * 20_000, b"\n" * 100_000, b"-", b"nan", b"PAR1PAR1", b"\x08\0\0\0\0\0\0\0{}      ",
+    b"[[" + b"a" * 50_000 + b"]]", b'x="' + b"y" * 200_000 + b'"', b"'''", b"\x80\x04N.", b"PK\x03\x04",
 )  # fmt: skip
 
 
@@ -205,14 +205,15 @@ def _line_ends(random: Random, rows: list[list[str]], delimiter: str) -> str:
 ENCODINGS = ("utf-16", "utf-8-sig", "utf-16-le", "utf-32", "cp037")
 _Rows = Callable[[Random, list[list[str]], str], str]
 CSV: tuple[tuple[str, _Rows], ...] = (
-    *(("a cell", _one_cell),) * 8, ("a column's cells", _one_column), *(("a row", _one_row),) * 3, *(("columns", _columns),) * 2,
-    ("delimiter", _delimited), *(("quote", _quoted),) * 3, ("decimal commas", _decimal_commas), ("line ends", _line_ends),
+    *(("a cell", _one_cell),) * 8, ("a column's cells", _one_column), *(("a row", _one_row),) * 3,
+    *(("columns", _columns),) * 2, ("delimiter", _delimited), *(("quote", _quoted),) * 3,
+    ("decimal commas", _decimal_commas), ("line ends", _line_ends),
     *((name, _one_cell) for name in ENCODINGS),
 )  # fmt: skip
 
 DTYPES = (
-    "F8_E4M3", "F8_E5M2", "F8_E8M0", "F4", "F6_E2M3", "BF16", "F16", "F32", "F64", "I8", "I16", "I32", "I64", "U8", "U16", "U32",
-    "U64", "BOOL", "C64", "f32", "",
+    "F8_E4M3", "F8_E5M2", "F8_E8M0", "F4", "F6_E2M3", "BF16", "F16", "F32", "F64", "I8", "I16", "I32", "I64",
+    "U8", "U16", "U32", "U64", "BOOL", "C64", "f32", "",
 )  # fmt: skip
 
 

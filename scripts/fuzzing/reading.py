@@ -40,7 +40,7 @@ class Kind:
     Attributes
     ----------
     name : str
-        Of the kind and of its folder in the corpus. Each file there is a seed, or each folder, then with `main`.
+        Of the kind and of its folder in the corpus. A file there is a seed, and so is a folder with `main`.
     read : callable
         The reader; it takes the path.
     use : callable, optional
@@ -123,7 +123,7 @@ class Seed:
     odd: set[str] = field(default_factory=set)  # where something else than a file is
 
     def put(self, files: Mapping[str, bytes | str]) -> None:
-        """Write what differs from the seed; a text instead of bytes names what is there in place of a file."""
+        """Write what differs from the seed; a text instead of bytes names what is there instead."""
         for name in self.spoilt - files.keys():
             self._write(name, self.files[name])
         self.spoilt = set(files)
@@ -136,7 +136,7 @@ class Seed:
             self.odd.discard(name)
             _remove(path)
         if isinstance(content, bytes):
-            with open(path, "wb", buffering=0) as file:
+            with path.open("wb", buffering=0) as file:
                 file.write(content)
             return
         _remove(path)

@@ -16,18 +16,19 @@ RAW = "@@raw:"  # begins a text that stands in the file without quotes, such as 
 _RAW_TEXT = re.compile(rf'"{RAW}([^"\\]*(?:\\.[^"\\]*)*)"')
 
 NUMBERS: tuple[Any, ...] = (
-    0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255, 256,
-    2**31, 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, f"{RAW}1{'0' * 399}", f"{RAW}1{'0' * 5000}",
-    f"{RAW}NaN", f"{RAW}Infinity", f"{RAW}-Infinity", f"{RAW}1e999", f"{RAW}nan", f"{RAW}inf", f"{RAW}0x10", f"{RAW}01",
-    f"{RAW}1_000",
+    0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255,
+    256, 2**31, 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, f"{RAW}1{'0' * 399}",
+    f"{RAW}1{'0' * 5000}", f"{RAW}NaN", f"{RAW}Infinity", f"{RAW}-Infinity", f"{RAW}1e999", f"{RAW}nan",
+    f"{RAW}inf", f"{RAW}0x10", f"{RAW}01", f"{RAW}1_000",
 )  # fmt: skip
 TEXTS = (
-    "", " ", "\n", "x\ny", "\t", '"', "'", '"""', "'''", '"""\nimport os\n', "\\", "\\n", "\0", "a\0b", "\ud800", "\udfff x",
-    "\x1b[31mred", "\u202e", "é", "船", "😀", "a" * 300, "b" * 20_000, "/dev/zero", "/dev/null", "/", ".", "..", "../../etc/passwd",
-    "/proc/self/mem", "C:\\x", "file:///etc/passwd", "http://127.0.0.1/", "os:system", "os", "builtins:exec", "__class__",
-    "__import__('os')", "{0}", "{name}", "%s", "%(x)s", "$(id)", "`id`", "<script>", "[bold]", "[/]", "NaN", "nan", "inf", "1e999",
-    "1", "0", "true", "null", "None", "٣", "1,5", "mariner", "lq", "pid", "auto", "calm", "rough", "grey-box", "prime", "si",
-    "2026-01-01", "2026-01-01T00:00:00Z", "=1+1", "a.b", "a[0]", "#", ";", ",",
+    "", " ", "\n", "x\ny", "\t", '"', "'", '"""', "'''", '"""\nimport os\n', "\\", "\\n", "\0", "a\0b",
+    "\ud800", "\udfff x", "\x1b[31mred", "\u202e", "é", "船", "😀", "a" * 300, "b" * 20_000, "/dev/zero",
+    "/dev/null", "/", ".", "..", "../../etc/passwd", "/proc/self/mem", "C:\\x", "file:///etc/passwd",
+    "http://127.0.0.1/", "os:system", "os", "builtins:exec", "__class__", "__import__('os')", "{0}", "{name}",
+    "%s", "%(x)s", "$(id)", "`id`", "<script>", "[bold]", "[/]", "NaN", "nan", "inf", "1e999", "1", "0",
+    "true", "null", "None", "٣", "1,5", "mariner", "lq", "pid", "auto", "calm", "rough", "grey-box", "prime",
+    "si", "2026-01-01", "2026-01-01T00:00:00Z", "=1+1", "a.b", "a[0]", "#", ";", ",",
 )  # fmt: skip
 
 
@@ -219,9 +220,9 @@ def _nested(random: Random, root: Node, path: Path) -> Node:
 
 #: By name; those that most often reach what lies behind the first check come several times.
 CHANGES: tuple[tuple[str, Callable[[Random, Node, Path], Node]], ...] = (
-    *(("number", _number),) * 6, *(("replace", _replaced),) * 5, *(("retype", _retyped),) * 2, ("delete", _without),
-    ("rename", _renamed), ("add", _added), ("repeat", _repeated), ("swap", _swapped), ("shuffle", _shuffled),
-    ("empty", _emptied), ("nest", _nested),
+    *(("number", _number),) * 6, *(("replace", _replaced),) * 5, *(("retype", _retyped),) * 2,
+    ("delete", _without), ("rename", _renamed), ("add", _added), ("repeat", _repeated), ("swap", _swapped),
+    ("shuffle", _shuffled), ("empty", _emptied), ("nest", _nested),
 )  # fmt: skip
 
 
