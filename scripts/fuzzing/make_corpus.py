@@ -118,8 +118,8 @@ def episode(folder: Path) -> None:
     made = Episode(
         environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17,
         rudder_limit=0.7, states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1),
-        rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)}, info={"cross_track": np.linspace(0.0, 1.0, n + 1)},
-        waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]), corridor=60.0,
+        rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)},
+        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]), corridor=60.0,
         arguments={"model": "mariner", "sea": {"wind": None}}, seed=7, number=3, truncated=True, success=True,
     )  # fmt: skip
     folder.joinpath("episode").mkdir()
