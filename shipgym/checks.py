@@ -62,13 +62,18 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
     return f" Did you mean '{by_lower_case[close[0]]}'?" if close else ""
 
 
-def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str) -> None:
-    """Refuse a key that is not among `allowed`, and name the nearest one that is."""
+def check_keys(
+    mapping: Mapping[str, Any], allowed: Collection[str], where: str, required: Iterable[str] = ()
+) -> None:
+    """Refuse a key that is not among `allowed`, naming the nearest one, and the lack of a required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
                 f"{where}: unknown key '{key}'.{did_you_mean(key, allowed)} Known keys: {quoted(allowed)}"
             )
+    for key in required:
+        if key not in mapping:
+            raise InputError(f"{where}: field '{key}' is missing, expected {quoted(required)}")
 
 
 def check_table(value: Any, where: str) -> Mapping[str, Any]:

@@ -103,16 +103,26 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
         raise InputError(f"{path}: cannot be read ({reason}), expected a {what}") from None
 
 
+def read_text(path: Path, what: str, largest: int) -> str:
+    """A text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text."""
+    data = read_bytes(path, what, largest)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        found = f"line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text (binary content)"
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            found = "the file is in UTF-16"
+        raise InputError(f"{path}: {found}, expected a {what}; save it as text in UTF-8") from None
+
+
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
     """The object in a JSON file; `what` is expected there, and `remedy` says what to do about a broken one.
 
-    Raises InputError as `read_bytes` does, and if the file is binary or cut short, holds no object, or
-    something that `check_content` refuses.
+    Raises InputError as `read_text` does, and if the file is cut short, holds no object, or something that
+    `check_content` refuses.
     """
-    try:
-        text = read_bytes(path, what, LARGEST_JSON).decode("utf-8")
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: binary content found, expected a {what} (JSON)") from None
+    text = read_text(path, f"{what} (JSON)", LARGEST_JSON)
     return check_table(parse_json(text, f"{path}:", remedy), f"{path}:")
 
 
@@ -125,17 +135,10 @@ def parse_json(text: str, where: str, remedy: str) -> Any:
 def read_toml(path: Path, what: str) -> dict[str, Any]:
     """The tables of a TOML file; `what` is expected there, as "ship file".
 
-    Raises InputError as `read_bytes` does, and if the file is not TOML in UTF-8 or holds something that
-    `check_content` refuses.
+    Raises InputError as `read_text` does, and if the file is not TOML or holds something that `check_content`
+    refuses.
     """
-    data = read_bytes(path, f"{what} (TOML)", LARGEST_TOML)
-    try:
-        return parse_toml(data.decode("utf-8-sig"), f"{path}:")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, expected TOML text in UTF-8"
-        ) from None
+    return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:

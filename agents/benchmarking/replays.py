@@ -57,8 +57,8 @@ def rerun(
     """
     given = {} if controllers is None else {one.name: one for one in contestants(controllers)}
     wanted: dict[tuple[str, str], dict[int, list[int]]] = {}
-    for one in episodes:
-        wanted.setdefault((one.contestant, one.task), {}).setdefault(one.run, []).append(one.seed)
+    for name, task, run, seed in episodes:
+        wanted.setdefault((name, task), {}).setdefault(run, []).append(seed)
     suite = result.summary["suite"]["name"]
     jobs, found = [], {}
     for (name, task), seeds in wanted.items():

@@ -16,7 +16,7 @@ import torch
 from stable_baselines3.common.save_util import recursive_getattr
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
-from agents.training.alike import NUMBER_OR_NONE, Each, Some, check_like
+from agents.training.safe_file import check_like
 
 Memory = dict[str, Any]
 COUNTERS = (
@@ -55,10 +55,11 @@ def put_back(agent: Any, memory: Memory) -> None:
     Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
     own.
     """
-    check_like(memory, _own(agent), "agent")
-    own = agent.get_parameters()
-    found = {name: _taken(memory["parameters"][name], own[name]) for name in own}
-    agent.set_parameters(found, exact_match=True, device="cpu")
+    check_like(memory, _own(agent, memory), "agent")
+    parameters = {
+        name: _with_rates(memory["parameters"][name], own) for name, own in agent.get_parameters().items()
+    }
+    agent.set_parameters(parameters, exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
     for name, value in memory["counters"].items():
@@ -74,48 +75,76 @@ def put_back(agent: Any, memory: Memory) -> None:
 
 def check_record(record: Any) -> None:
     """Raise ValueError, naming the place, unless this is what a training tells of its evaluations."""
-    row = {"steps": 0, "seconds": 0.0, "cost": 0.0, "mean_return": NUMBER_OR_NONE}
-    own = {"best_cost": NUMBER_OR_NONE, "best_steps": 0, "curve": Each(row), "seconds": 0.0}
+    row: Memory = {"steps": 0, "seconds": 0.0, "cost": 0.0}
+    curve = [row | {"mean_return": _number(one, "mean_return")} for one in _list(record, "curve")]
+    own = {"best_cost": _number(record, "best_cost"), "best_steps": 0, "curve": curve, "seconds": 0.0}
     check_like(record, own, "run")
 
 
-def _own(agent: Any) -> Memory:
-    """What a memory of this agent is like; it has begun an episode then."""
-    seen = agent.env.reset()
-    starts, random_own = np.zeros(len(seen), np.bool_), _random_memory(agent)
-    buffer = getattr(agent, "replay_buffer", None)
+def _own(agent: Any, memory: Any) -> Memory:
+    """What a memory of this agent is like, its lists as long as those of one; ships begin an episode."""
+    seen, drawn = agent.env.reset(), _random_memory(agent)
+    shown = {"_last_obs": seen, "_last_original_obs": seen, "_last_episode_starts": np.zeros(len(seen), bool)}
+    buffer, steps = getattr(agent, "replay_buffer", None), len(_list(memory, "replay", "dones"))
+    names = agent._get_torch_save_params()[1]
     return {
         "parameters": {
-            name: _own_parameters(agent, name, own) for name, own in agent.get_parameters().items()
+            name: _own_parameters(own, agent, name, memory) for name, own in agent.get_parameters().items()
         },
-        "variables": {name: recursive_getattr(agent, name) for name in agent._get_torch_save_params()[1]},
-        "counters": dict.fromkeys(COUNTERS, 0)
-        | {"_last_obs": seen, "_last_episode_starts": starts, "_last_original_obs": seen},
-        "episodes": Each({"r": 0.0, "l": 0, "t": 0.0}),
-        "successes": Each(0.0),
+        "variables": {name: recursive_getattr(agent, name) for name in names},
+        "counters": dict.fromkeys(COUNTERS, 0) | shown,
+        "episodes": [{"r": 0.0, "l": 0, "t": 0.0} for _ in _list(memory, "episodes")],
+        "successes": [0.0 for _ in _list(memory, "successes")],
         "ships": [_layer_memory(layer) for layer in _layers(agent.env)],
-        "replay": None
-        if buffer is None
-        else {"pos": 0, "full": False} | {name: Each(getattr(buffer, name)) for name in STORED},
-        "random": random_own | {"python": (*random_own["python"][:2], NUMBER_OR_NONE)},
+        "replay": buffer and {"pos": 0, "full": False} | {n: getattr(buffer, n)[:steps] for n in STORED},
+        "random": drawn | {"python": (*drawn["python"][:2], _number(memory, "random", "python", 2))},
     }
 
 
-def _own_parameters(agent: Any, name: str, own: Memory) -> Memory:
-    """Parameters of a network as they are; of an optimiser, rates and what Adam keeps of each weight."""
+def _own_parameters(own: Memory, agent: Any, name: str, memory: Any) -> Memory:
+    """Parameters of a network as they are; of an optimiser what Adam keeps of weights that had a step."""
     if "param_groups" not in own:
         return own
+    state, groups = (_at(memory, "parameters", name, key) for key in ("state", "param_groups"))
     weights = [one.data for group in recursive_getattr(agent, name).param_groups for one in group["params"]]
-    state = {i: {"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for i, one in enumerate(weights)}
-    return {"state": Some(state), "param_groups": [Some({"lr": 0.0}, others=True)] * len(own["param_groups"])}
+    moments = {
+        i: {"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for i, one in enumerate(weights)
+    }
+    rated = len(_list(groups)) == len(own["param_groups"]) and all(
+        type(_at(one, "lr")) is float for one in groups
+    )
+    return {
+        "state": {i: one for i, one in moments.items() if not isinstance(state, dict) or i in state},
+        "param_groups": groups if rated else own["param_groups"],  # of these only the rates are put back
+    }
 
 
-def _taken(found: Memory, own: Memory) -> Memory:
-    """Parameters of a memory; of an optimiser's settings only the learning rate is the memory's."""
+def _at(value: Any, *path: Any) -> Any:
+    """What stands in a place within a value of any kind; None if there is no such place."""
+    for key in path:
+        try:
+            value = value[key]
+        except (LookupError, TypeError):
+            return None
+    return value
+
+
+def _list(value: Any, *path: Any) -> Any:
+    found = _at(value, *path)
+    return found if isinstance(found, list | np.ndarray) else []
+
+
+def _number(value: Any, *path: Any) -> float | None:
+    """What is expected where a number or none may stand."""
+    return None if _at(value, *path) is None else 0.0
+
+
+def _with_rates(found: Memory, own: Memory) -> Memory:
+    """Parameters of a memory; of an optimiser's settings only the learning rates are the memory's."""
     if "param_groups" not in own:
         return found
     pairs = zip(own["param_groups"], found["param_groups"], strict=True)
-    return {**found, "param_groups": [group | {"lr": given.get("lr", group["lr"])} for group, given in pairs]}
+    return {**found, "param_groups": [group | {"lr": given["lr"]} for group, given in pairs]}
 
 
 def _layers(env: Any) -> list[Any]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +71,38 @@ def _hash(content: str, arrays: Arrays) -> str:
     for name, array in sorted(arrays.items()):
         digest.update(f"{name} {array.dtype} {array.shape}".encode() + array.tobytes())
     return digest.hexdigest()
+
+
+def check_like(found: Any, own: Any, where: str) -> None:
+    """Raise ValueError, naming the first place, unless one value is like another.
+
+    The same names and texts, lists of one length, arrays and tensors of the same type and shape, numbers of a
+    kind: finite, whole ones not negative.
+    """
+    has, needs = dict(_kinds(found, where)), dict(_kinds(own, where))
+    for place in (*needs, *has):
+        if has.get(place) != needs.get(place):
+            told, expected = (one.get(place, "nothing") for one in (has, needs))
+            raise ValueError(f"{place}: {told} found, expected {expected}")
+
+
+def _kinds(value: Any, where: str) -> Iterator[tuple[str, str]]:
+    """Where each value within a value stands, and what it is."""
+    if isinstance(value, dict):
+        yield where, f"a table of {len(value)}"
+        for name, one in value.items():
+            yield from _kinds(one, where + (f".{name}" if isinstance(name, str) else f"[{name}]"))
+    elif isinstance(value, list | tuple):
+        yield where, f"{type(value).__name__} of {len(value)}"
+        for number, one in enumerate(value):
+            yield from _kinds(one, f"{where}[{number}]")
+    elif np.ndim(value) or hasattr(value, "detach"):
+        yield where, f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
+    else:
+        number = value.item() if isinstance(value, np.ndarray | np.generic) else value
+        whole = isinstance(number, int) and number >= 0
+        known = whole or (isinstance(number, float) and math.isfinite(number))
+        yield where, type(number).__name__ if known else repr(number)[:80]
 
 
 def _packed(value: Any, name: str, arrays: Arrays) -> Any:

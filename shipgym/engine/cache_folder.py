@@ -67,21 +67,11 @@ def _others_of(found: os.stat_result, above: bool = False) -> str:
     """Who beside root and this user could change a file or folder; `above`: it is one above the cache."""
     if not hasattr(os, "geteuid"):  # Windows, where a user's folders are the user's
         return ""
-    if found.st_uid not in (0, os.geteuid()) and not (above and found.st_uid == _root_outside()):
+    if found.st_uid not in (0, os.geteuid()):
         return f"belongs to another user ({found.st_uid})"
     if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (above and found.st_mode & stat.S_ISVTX):
         return "may be written by other users"
     return ""
-
-
-@cache
-def _root_outside() -> int | None:
-    """In a user namespace, the one user who stands for all outside of it, the host's root among them."""
-    try:
-        whole = Path("/proc/self/uid_map").read_text().split() == ["0", "0", str(2**32 - 1)]
-        return None if whole else int(Path("/proc/sys/kernel/overflowuid").read_text())
-    except (OSError, ValueError):
-        return None
 
 
 def read_loop(path: Path) -> bytes:

@@ -33,6 +33,7 @@ import numpy as np
 from shipgym.checks import (
     check_array,
     check_choice,
+    check_flag,
     check_keys,
     check_number,
     check_table,
@@ -51,6 +52,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
+from shipgym.ships.terms import MOST_TERMS
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
@@ -58,7 +60,6 @@ FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
     "steering", "service_shaft_speed", "envelope", "provenance", "sha256",
 )  # fmt: skip
-MOST_TERMS = 200  # of an equation; the largest of the literature have about 40
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 
 
@@ -78,10 +79,7 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
         raise InputError(
             f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
-    check_keys(fields, FIELDS, where)
-    for name in REQUIRED:
-        if name not in fields:
-            raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
+    check_keys(fields, FIELDS, where, REQUIRED)
     dynamics = _dynamics(fields["structure"], f"{where}: structure", make)
     normalisation = dynamics.normalisation
     if fields.get("normalisation", normalisation) != normalisation:
@@ -151,9 +149,7 @@ def _grey_box(
 ) -> GreyBox:
     """A table of terms that is added to a reference ship, which is held whole."""
     reference = check_table(table.get("reference"), f"{where}.reference")
-    shaft = table.get("shaft", False)
-    if not isinstance(shaft, bool):
-        raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
+    shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
     return GreyBox(
         structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
         read_model(reference, f"{where}.reference", make), shaft,
@@ -233,6 +229,5 @@ def read_envelope(value: Any, where: str) -> Envelope | None:
     check_keys(table, ("channels", "low", "high", "centre", "shape"), where)
     if table.get("channels") != list(CHANNELS):
         raise InputError(f"{where}.channels: {table.get('channels')!r} found, expected {list(CHANNELS)}")
-    for name, shape in (("low", (4,)), ("high", (4,)), ("centre", (4,)), ("shape", (4, 4))):
-        check_array(table.get(name), shape, f"{where}.{name}")
-    return Envelope.from_dict(table)
+    shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
+    return Envelope(*(check_array(table.get(name), shapes[name], f"{where}.{name}") for name in shapes))

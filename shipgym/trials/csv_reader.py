@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes
+from shipgym.files import LARGEST_CSV, read_text
 
 #: Cells that stand for "no value".
 MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
@@ -132,22 +132,12 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _read_lines(path: Path) -> list[str]:
-    data = read_bytes(path, "CSV file", LARGEST_CSV)
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError(f"{path}: the file is in UTF-16, expected UTF-8; {_REMEDY_TEXT}")
-    if b"\x00" in data:
-        position = data.index(b"\x00")
+    text = read_text(path, "CSV file", LARGEST_CSV)
+    if "\0" in text:
         raise InputError(
-            f"{path}: binary content (a zero byte at byte {position}), expected CSV text; {_REMEDY_TEXT}"
+            f"{path}: binary content (a zero byte at byte {text.index(chr(0))}), expected CSV text; "
+            f"{_REMEDY_TEXT}"
         )
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text "
-            f"(binary content, or another encoding); {_REMEDY_TEXT}"
-        ) from None
     text = text.replace("\r\n", "\n").replace("\r", "\n")
     n_lines = text.count("\n") + 1
     if n_lines > MOST_LINES:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import check_choice, check_keys, check_table, check_text, refuse_code
+from shipgym.checks import check_choice, check_keys, check_table, check_text, placed, refuse_code
 from shipgym.errors import InputError
 from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
@@ -76,10 +76,8 @@ class ShipFile:
 
     def completed_particulars(self) -> Particulars:
         """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
-        try:
+        with placed(str(self.path)):
             return self.particulars.completed()
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
         """Read the trials of a use, by default all but those to skip, each named by its ``file``.
@@ -99,14 +97,12 @@ class ShipFile:
 
     def _read(self, entry: TrialEntry) -> Trial:
         c = entry.conventions
-        try:
+        with placed(entry.where):
             trial = Trial.from_csv(
                 entry.path, entry.columns, c.rudder_positive, c.velocity_frame, origin=c.origin, xg=c.xg,
                 repair=c.repair, name=entry.file, kind=entry.kind, use=entry.use,
                 length=self.particulars.length,
             )  # fmt: skip
-        except InputError as error:
-            raise InputError(f"{entry.where}: {error}") from None
         check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
         return trial
 
@@ -128,12 +124,10 @@ def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> t
         _entry(path, f"{path}: [[trials]] {k}", table, columns, conventions, particulars)
         for k, table in enumerate(tables, start=1)
     ]
-    paths = set()
+    by_path = {os.path.normpath(entry.path): entry for entry in reversed(entries)}
     for entry in entries:
-        path_of_entry = os.path.normpath(entry.path)
-        if path_of_entry in paths:
+        if by_path[os.path.normpath(entry.path)] is not entry:
             raise InputError(f"{entry.where} file: '{entry.file}' is listed twice, expected each file once")
-        paths.add(path_of_entry)
     if all(entry.use == "skip" for entry in entries):
         raise InputError(
             f'{path}: all trials have use = "skip", expected at least one to fit; set use = "fit"'
@@ -160,10 +154,8 @@ def _entry(
     own_conventions = {key: table[key] for key in _CONVENTIONS if key in table}
     csv_path = path.parent / file
     if use != "skip":
-        try:
+        with placed(f"{where} file"):
             check_readable(csv_path, "CSV file")
-        except InputError as error:
-            raise InputError(f"{where} file: {error}") from None
     return TrialEntry(
         file=file,
         path=csv_path,

@@ -72,11 +72,7 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        (
-            ("parameters",),
-            "/etc/passwd",
-            "agent.parameters: '/etc/passwd' found, expected a table of 4: 'policy'",
-        ),
+        (("parameters",), "/etc/passwd", "agent.parameters: '/etc/passwd' found, expected a table of 4"),
         (
             ("parameters", "policy"),
             "/dev/zero",
@@ -85,34 +81,33 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
         (
             WEIGHT,
             "/etc/passwd",
-            "actor.mu.weight: '/etc/passwd' found, expected Tensor torch.float32 of shape (1, 8)",
+            "actor.mu.weight: '/etc/passwd' found, expected Tensor of torch.float32, shape (1, 8)",
         ),
-        (WEIGHT, torch.zeros(8, 1), "Tensor torch.float32 of shape (8, 1) found"),
-        (WEIGHT, torch.zeros(1, 8, dtype=torch.float64), "Tensor torch.float64 of shape (1, 8) found"),
-        (WEIGHT, np.zeros((1, 8), np.float32), "ndarray float32 of shape (1, 8) found, expected Tensor"),
+        (WEIGHT, torch.zeros(8, 1), "Tensor of torch.float32, shape (8, 1) found"),
+        (WEIGHT, torch.zeros(1, 8, dtype=torch.float64), "Tensor of torch.float64, shape (1, 8) found"),
+        (WEIGHT, np.zeros((1, 8), np.float32), "ndarray of float32, shape (1, 8) found, expected Tensor"),
         (("parameters", "policy", "more"), torch.zeros(1), "agent.parameters.policy: a table of"),
         (("parameters", "actor.optimizer", "state", 99), {}, "actor.optimizer.state: a table of"),
-        (("parameters", "actor.optimizer", "state", 0, "exp_avg"), torch.zeros(3), "state.0.exp_avg: Tensor"),
-        (("parameters", "actor.optimizer", "param_groups"), [], "param_groups: list of length 0 found"),
-        (("variables",), {}, "agent.variables: a table of 0"),
-        (("variables", "log_ent_coef"), 0.5, "log_ent_coef: 0.5 found, expected Tensor"),
-        (("counters", "num_timesteps"), -1, "num_timesteps: -1 found, expected one such as"),
-        (("counters", "num_timesteps"), 1.5, "num_timesteps: 1.5 found"),
-        (("counters", "num_timesteps"), True, "num_timesteps: True found"),
-        (("counters", "num_timesteps"), 10**40, "num_timesteps: 1000"),
-        (("counters", "_last_obs"), None, "_last_obs: None found, expected ndarray float32 of shape (4, 8)"),
-        (("counters", "__class__"), 1, "agent.counters: a table of 7"),
         (
-            ("episodes",),
-            [{"r": 1.0, "l": 5}],
-            "agent.episodes[0]: a table of 2: 'r', 'l' found, expected a table of 3",
+            ("parameters", "actor.optimizer", "state", 0, "exp_avg"),
+            torch.zeros(3),
+            "state[0].exp_avg: Tensor",
         ),
+        (("parameters", "actor.optimizer", "param_groups"), [], "param_groups: list of 0 found"),
+        (("variables",), {}, "agent.variables: a table of 0"),
+        (("variables", "log_ent_coef"), 0.5, "log_ent_coef: float found, expected Tensor"),
+        (("counters", "num_timesteps"), -1, "num_timesteps: -1 found, expected int"),
+        (("counters", "num_timesteps"), 1.5, "num_timesteps: float found, expected int"),
+        (("counters", "num_timesteps"), True, "num_timesteps: bool found, expected int"),
+        (("counters", "_last_obs"), None, "_last_obs: None found, expected ndarray of float32, shape (4, 8)"),
+        (("counters", "__class__"), 1, "agent.counters: a table of 7"),
+        (("episodes",), [{"r": 1.0, "l": 5}], "agent.episodes[0]: a table of 2 found, expected a table of 3"),
         (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list"),
         (("successes",), ["x"], "agent.successes[0]: 'x' found"),
         (("successes",), [float("inf")], "agent.successes[0]: inf found"),
-        (("ships",), [], "agent.ships: list of length 0 found, expected list of length 2"),
+        (("ships",), [], "agent.ships: list of 0 found, expected list of 2"),
         (("ships", 0, "var"), "x", "agent.ships[0].var: 'x' found"),
-        (("ships", 1, "states"), RANDOM_ARRAY, "agent.ships[1].states: ndarray float64 of shape (3,) found"),
+        (("ships", 1, "states"), RANDOM_ARRAY, "agent.ships[1].states: ndarray of float64, shape (3,) found"),
         (("replay",), None, "agent.replay: None found, expected a table of 8"),
         (("replay", "pos"), 11, "agent.replay: not the 11 steps that its position 11 says"),
         (("replay", "pos"), 10**9, "agent.replay: not the"),
@@ -125,15 +120,11 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
             ("PCG64", np.zeros(624, np.uint32), 0, 0, 0.0),
             "random.numpy[0]: 'PCG64' found",
         ),
-        (("random", "python"), (3, (1, 2), None), "agent.random.python[1]: tuple of length 2 found"),
+        (("random", "python"), (3, (1, 2), None), "agent.random.python[1]: tuple of 2 found"),
         (("random", "python"), (3, (2**100,) * 625, None), "agent.random: "),
         (("random", "torch"), torch.zeros(5056, dtype=torch.uint8), "agent.random: "),
-        (("random", "torch"), torch.zeros(3, dtype=torch.uint8), "agent.random.torch: Tensor torch.uint8"),
-        (
-            ("random", "actions", "bit_generator"),
-            "os",
-            "bit_generator: 'os' found, expected one such as 'PCG64'",
-        ),
+        (("random", "torch"), torch.zeros(3, dtype=torch.uint8), "agent.random.torch: Tensor of torch.uint8"),
+        (("random", "actions", "bit_generator"), "os", "bit_generator: 'os' found, expected 'PCG64'"),
     ],
 )
 def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
@@ -149,7 +140,7 @@ def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
 
 @pytest.mark.parametrize("memory", [None, "/etc/passwd", [], {}, {"parameters": {}}])
 def test_what_is_no_memory_is_refused(fresh, memory):
-    with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8: 'parameters'"):
+    with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8"):
         checkpoints.put_back(fresh, memory)
 
 

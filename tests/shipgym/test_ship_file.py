@@ -244,7 +244,7 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
     with pytest.raises(InputError, match="this is a folder"):
         ShipFile.load(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
-    with pytest.raises(InputError, match="line 2 holds byte 0xff, expected TOML"):
+    with pytest.raises(InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"):
         ShipFile.load(tmp_path / "ship.toml")
 
 
