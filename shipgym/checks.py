@@ -100,7 +100,7 @@ def check_choice(value: Any, options: Collection[str], where: str) -> str:
     return value
 
 
-def refuse_code(value: Any, where: str, own: Any = None, named: bool = False) -> None:
+def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> None:
     """Refuse Python files named in what a file holds: code is run at a user's own word, not at a file's.
 
     At any depth of `value` these are paths that end in ``.py``, and all that the environments' options
@@ -112,10 +112,10 @@ def refuse_code(value: Any, where: str, own: Any = None, named: bool = False) ->
     if isinstance(value, Mapping):
         given = own if isinstance(own, Mapping) else {}
         for name, one in value.items():
-            refuse_code(one, f"{where}.{name}", given.get(name), name in ("task", "reward", "sensors"))
+            data_only(one, f"{where}.{name}", given.get(name), name in ("task", "reward", "sensors"))
     elif isinstance(value, list | tuple):
         for one in value:
-            refuse_code(one, where, None, named)
+            data_only(one, where, None, named)
     elif isinstance(value, str) and (named or Path(value).suffix == ".py"):
         raise InputError(
             f"{where}: {value!r} found, which is code: no file makes shipgym run another; name it on the "
