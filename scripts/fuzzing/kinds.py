@@ -134,7 +134,7 @@ def training() -> Any:
     from agents.training import training as trainings
 
     torch.set_num_threads(1)
-    trainings.N_EVALUATIONS = 1
+    vars(trainings)["N_EVALUATIONS"] = 1
     with warnings.catch_warnings(action="ignore"):  # random numbers in plain Python overflow, as they should
         return trainings._Training(read_plan(CORPUS / "run" / "ppo"), None, None, None)
 

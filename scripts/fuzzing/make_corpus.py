@@ -100,12 +100,13 @@ def policies(folder: Path) -> None:
     )
     discrete = LearnedPolicy(network(8, 4, 9), action="rudder-discrete", **common)
     shielded = Shielded.from_model(shipgym.load_model("mariner-nomoto"), learned)
-    for name, policy in {
+    made: dict[str, Any] = {
         "learned": learned,
         "residual": residual,
         "discrete": discrete,
         "shielded": shielded,
-    }.items():
+    }
+    for name, policy in made.items():
         folder.joinpath("policy", name).mkdir(parents=True)
         policy.save(folder / "policy" / name / "agent.json")
 
@@ -119,7 +120,8 @@ def episode(folder: Path) -> None:
         environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17,
         rudder_limit=0.7, states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1),
         rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)},
-        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]), corridor=60.0,
+        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, corridor=60.0,
+        waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
         arguments={"model": "mariner", "sea": {"wind": None}}, seed=7, number=3, truncated=True, success=True,
     )  # fmt: skip
     folder.joinpath("episode").mkdir()
@@ -140,7 +142,7 @@ def run(folder: Path) -> None:
         "net_arch": [4], "evaluate_every": 16,
     }  # fmt: skip
     options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
-    training.N_EVALUATIONS = 2
+    vars(training)["N_EVALUATIONS"] = 2
     target = folder / "run" / "ppo"
     target.parent.mkdir()
     train(make_plan(Given("ppo", options=options, settings=settings)), target)

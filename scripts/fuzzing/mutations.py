@@ -221,6 +221,7 @@ def safetensors_changed(random: Random, content: bytes) -> Change:
     """The header's length, a type, shape or offset in it, anything in it, or a number of the data."""
     (length,) = struct.unpack("<Q", content[:8])
     header, data = _json(content[8 : 8 + length]), content[8 + length :]
+    said: str | Callable[[], str]
     what = random.randrange(8)
     if what == 0:
         wrong = random.choice(

@@ -165,7 +165,8 @@ class Reader:
     def __init__(self, kind: Kind, scratch: Path, seed: int) -> None:
         self.kind, self.seed = kind, seed
         self.seeds = list(_seeds(kind, scratch / kind.name))
-        self.trouble = [self._warm(one) for one in self.seeds]
+        for one in self.seeds:
+            self._warm(one)
         limit = _status("VmSize") + MOST_MEMORY
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.RLIM_INFINITY))
 
@@ -269,15 +270,15 @@ def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
 def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[Any]]:
     """The files that differ from the seed's after some changes, and what these are."""
     files: dict[str, bytes | str] = {}
-    said = []
+    said: list[Any] = []
     names = [name for name in one.files if name != one.main]
     for edit in edits:
         random = Random(edit)
         name = random.choice(names) if names and random.random() < 0.45 else one.main
         content = files.get(name, one.files[name])
         if random.random() < SPECIAL_SHARE or isinstance(content, str):
-            files[name] = random.choice(SPECIAL)
-            said.append((name, f"{files[name]} in its place"))
+            files[name] = special = random.choice(SPECIAL)
+            said.append((name, f"{special} in its place"))
             continue
         changed, what = mutate(random, name, content)
         files[name] = changed
