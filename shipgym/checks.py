@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +18,12 @@ from shipgym.errors import InputError
 
 #: Most characters of a name, a source or a path.
 LONGEST_TEXT = 4096
+
+#: Types of a JSON value; a list of what all entries are, or of what each of several is; a table by key, or by
+#: `ANY_KEY` what all values are.
+Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
+ANY_KEY = "*"
+_WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 200
@@ -93,7 +100,7 @@ def check_choice(value: Any, options: Collection[str], where: str) -> str:
     return value
 
 
-def refuse_code(value: Any, where: str, own: Any = None, named: bool = False) -> None:
+def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> None:
     """Refuse Python files named in what a file holds: code is run at a user's own word, not at a file's.
 
     At any depth of `value` these are paths that end in ``.py``, and all that the environments' options
@@ -105,10 +112,10 @@ def refuse_code(value: Any, where: str, own: Any = None, named: bool = False) ->
     if isinstance(value, Mapping):
         given = own if isinstance(own, Mapping) else {}
         for name, one in value.items():
-            refuse_code(one, f"{where}.{name}", given.get(name), name in ("task", "reward", "sensors"))
+            data_only(one, f"{where}.{name}", given.get(name), name in ("task", "reward", "sensors"))
     elif isinstance(value, list | tuple):
         for one in value:
-            refuse_code(one, where, None, named)
+            data_only(one, where, None, named)
     elif isinstance(value, str) and (named or Path(value).suffix == ".py"):
         raise InputError(
             f"{where}: {value!r} found, which is code: no file makes shipgym run another; name it on the "
@@ -197,3 +204,22 @@ def check_array(value: Any, shape: tuple[int | None, ...], where: str) -> NDArra
         return check_finite(value, where)
     width = len(value[0]) if shape[1] is None and value and isinstance(value[0], list) else shape[1]
     return np.array([check_array(row, (width, *shape[2:]), f"{where}[{i}]") for i, row in enumerate(value)])
+
+
+def check_shape(value: Any, shape: Shape, where: str) -> None:
+    """Refuse nested JSON values that differ from a shape, naming the place; further keys may be there."""
+    if isinstance(shape, dict):
+        table = check_table(value, where)
+        for key in table if ANY_KEY in shape else shape:
+            if key not in table:
+                raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
+            check_shape(table[key], shape.get(key, shape.get(ANY_KEY, ())), f"{where}.{key}")
+    elif isinstance(shape, list):
+        several = len(shape) > 1
+        if not isinstance(value, list) or (several and len(value) != len(shape)):
+            raise InputError(f"{where}: {shown(value)} found, expected a list{f' of {len(shape)}' * several}")
+        for i, entry in enumerate(value):
+            check_shape(entry, shape[i if several else 0], f"{where}[{i}]")
+    elif type(value) not in shape:
+        words = " or ".join(dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape))
+        raise InputError(f"{where}: {shown(value)} found, expected {words}")

@@ -167,8 +167,9 @@ def _margins(value: Any, where: str) -> Margins:
 
 def _design(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, float]:
     """Numbers by name, all that are needed among them."""
-    table = dict(check_table(value, where))
-    for name, one in needed.items():
-        if table.setdefault(name, one.default) is None:
+    later = {name: one.default for name, one in needed.items() if one.default is not None}
+    table = later | dict(check_table(value, where))
+    for name in needed:
+        if name not in table:
             raise InputError(f"{where}: '{name}' is missing, expected {quoted(needed)}; {REMEDY}")
     return {name: _number(number, needed.get(name, ANY), f"{where}.{name}") for name, number in table.items()}

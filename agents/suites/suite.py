@@ -26,15 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_table,
-    check_text,
-    did_you_mean,
-    quoted,
-    refuse_code,
-)
+from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, did_you_mean, quoted
 from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.ship_env import read_options
@@ -171,7 +163,7 @@ def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     check_keys(table, FIELDS, where)
     for needed in ("environment", "model"):
         check_text(table.get(needed), f"{where}.{needed}")
-    refuse_code(table, where)
+    data_only(table, where)
     options = dict(check_table(table.get("options", {}), f"{where}.options"))
     if "sea" in table:
         sea = table["sea"]

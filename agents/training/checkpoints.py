@@ -55,11 +55,9 @@ def put_back(agent: Any, memory: Memory) -> None:
     Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
     own.
     """
+    memory = _with_own_settings(agent, memory)
     check_like(memory, _own(agent, memory), "agent")
-    parameters = {
-        name: _with_rates(memory["parameters"][name], own) for name, own in agent.get_parameters().items()
-    }
-    agent.set_parameters(parameters, exact_match=True, device="cpu")
+    agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
     for name, value in memory["counters"].items():
@@ -81,42 +79,42 @@ def check_record(record: Any) -> None:
     check_like(record, own, "run")
 
 
+def _with_own_settings(agent: Any, memory: Any) -> Any:
+    """A memory with an agent's own settings of optimisers; of the memory's only learning rates are taken."""
+    if not isinstance(parameters := _at(memory, "parameters"), dict):
+        return memory
+    taken = dict(parameters)
+    for name, own in agent.get_parameters().items():
+        if "param_groups" in own and isinstance(found := parameters.get(name), dict):
+            rates = [_at(group, "lr") for group in _list(found, "param_groups")]
+            pairs = zip(own["param_groups"], rates, strict=False)
+            taken[name] = {**found, "param_groups": [group | {"lr": rate} for group, rate in pairs]}
+    return {**memory, "parameters": taken}
+
+
 def _own(agent: Any, memory: Any) -> Memory:
     """What a memory of this agent is like, its lists as long as those of one; ships begin an episode."""
-    seen, drawn = agent.env.reset(), _random_memory(agent)
-    shown = {"_last_obs": seen, "_last_original_obs": seen, "_last_episode_starts": np.zeros(len(seen), bool)}
-    buffer, steps = getattr(agent, "replay_buffer", None), len(_list(memory, "replay", "dones"))
-    names = agent._get_torch_save_params()[1]
-    return {
-        "parameters": {
-            name: _own_parameters(own, agent, name, memory) for name, own in agent.get_parameters().items()
-        },
-        "variables": {name: recursive_getattr(agent, name) for name in names},
-        "counters": dict.fromkeys(COUNTERS, 0) | shown,
-        "episodes": [{"r": 0.0, "l": 0, "t": 0.0} for _ in _list(memory, "episodes")],
-        "successes": [0.0 for _ in _list(memory, "successes")],
-        "ships": [_layer_memory(layer) for layer in _layers(agent.env)],
-        "replay": buffer and {"pos": 0, "full": False} | {n: getattr(buffer, n)[:steps] for n in STORED},
-        "random": drawn | {"python": (*drawn["python"][:2], _number(memory, "random", "python", 2))},
-    }
-
-
-def _own_parameters(own: Memory, agent: Any, name: str, memory: Any) -> Memory:
-    """Parameters of a network as they are; of an optimiser what Adam keeps of weights that had a step."""
-    if "param_groups" not in own:
-        return own
-    state, groups = (_at(memory, "parameters", name, key) for key in ("state", "param_groups"))
-    weights = [one.data for group in recursive_getattr(agent, name).param_groups for one in group["params"]]
-    moments = {
-        i: {"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for i, one in enumerate(weights)
-    }
-    rated = len(_list(groups)) == len(own["param_groups"]) and all(
-        type(_at(one, "lr")) is float for one in groups
-    )
-    return {
-        "state": {i: one for i, one in moments.items() if not isinstance(state, dict) or i in state},
-        "param_groups": groups if rated else own["param_groups"],  # of these only the rates are put back
-    }
+    agent._last_obs = agent._last_original_obs = agent.env.reset()
+    agent._last_episode_starts = np.zeros(agent.n_envs, np.bool_)
+    agent.ep_info_buffer = [{"r": 0.0, "l": 0, "t": 0.0} for _ in _list(memory, "episodes")]
+    agent.ep_success_buffer = [0.0 for _ in _list(memory, "successes")]
+    own = take(agent)
+    for name, one in own["parameters"].items():
+        if "param_groups" in one:  # an optimiser: Adam keeps this of each weight that had a step
+            groups, known = (
+                recursive_getattr(agent, name).param_groups,
+                _at(memory, "parameters", name, "state"),
+            )
+            moments = enumerate(weight.data for group in groups for weight in group["params"])
+            one["state"] = {
+                number: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
+                for number, weight in moments
+                if not isinstance(known, dict) or number in known
+            }
+    for name in STORED if own["replay"] else ():
+        own["replay"][name] = getattr(agent.replay_buffer, name)[: len(_list(memory, "replay", name))]
+    own["random"]["python"] = (*own["random"]["python"][:2], _number(memory, "random", "python", 2))
+    return own
 
 
 def _at(value: Any, *path: Any) -> Any:
@@ -130,21 +128,14 @@ def _at(value: Any, *path: Any) -> Any:
 
 
 def _list(value: Any, *path: Any) -> Any:
+    """A list, or an array of rows, in such a place; an empty one for anything else."""
     found = _at(value, *path)
-    return found if isinstance(found, list | np.ndarray) else []
+    return found if getattr(found, "ndim", isinstance(found, list)) else []
 
 
 def _number(value: Any, *path: Any) -> float | None:
     """What is expected where a number or none may stand."""
     return None if _at(value, *path) is None else 0.0
-
-
-def _with_rates(found: Memory, own: Memory) -> Memory:
-    """Parameters of a memory; of an optimiser's settings only the learning rates are the memory's."""
-    if "param_groups" not in own:
-        return found
-    pairs = zip(own["param_groups"], found["param_groups"], strict=True)
-    return {**found, "param_groups": [group | {"lr": given["lr"]} for group, given in pairs]}
 
 
 def _layers(env: Any) -> list[Any]:

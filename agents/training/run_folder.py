@@ -19,7 +19,7 @@ from typing import Any
 from agents.output import whole_folder
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import present_names
-from shipgym.checks import check_keys, check_table, check_whole, refuse_code
+from shipgym.checks import check_keys, check_table, check_whole, data_only
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 
@@ -77,7 +77,7 @@ def read_plan(folder: Path, given: Given | None = None) -> Plan:
     where = f"{folder / RUN}"
     configuration = content["configuration"]
     named = {name: configuration.get(name) for name in ("model", "options")}
-    refuse_code(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
+    data_only(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
     try:
         plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
     except InputError as error:

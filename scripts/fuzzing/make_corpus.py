@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from agents.suites.suite import FOLDER
 from agents.training import training
 from agents.training.plan import Given, make_plan
 from agents.training.training import train
-from shipgym import Episode, Particulars, ShipModel, ShipFile
+from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.ships.catalogue import xu_ship
 from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
@@ -48,12 +49,12 @@ def trials(folder: Path) -> None:
     trial = ShipFile.load(ship / "ship.toml").trials()[0]
     (folder / "trial").mkdir()
     trial.to_csv(folder / "trial" / "own.csv")
-    rows = [f"{0.5 * k};{0.1 * k:.2f};{k % 5},5;{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
+    rows = [f"{0.5 * k};{0.1 * k:.2f};0,0{k % 5};{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
     (folder / "trial" / "semicolons.csv").write_text("\n".join(["t;psi;r;delta", *rows]))
 
 
 def models(folder: Path) -> None:
-    """Tables of terms with a covariance and without, a ship of her own equations, a grey box, captive tests."""
+    """Tables of terms with a covariance and without, own equations, a grey box, captive tests."""
     folder.joinpath("model").mkdir()
     for name in ("mariner-nomoto", "kvlcc2-rm-svm", "mariner"):
         shipgym.load_model(name).save(folder / "model" / f"{name}.json")
@@ -75,7 +76,7 @@ def network(*sizes: int) -> Network:
     return Network(
         tuple(
             (random.normal(0, 0.3, (b, a)).astype(np.float32), random.normal(0, 0.1, b).astype(np.float32))
-            for a, b in zip(sizes, sizes[1:])
+            for a, b in pairwise(sizes)
         )
     )
 
@@ -99,12 +100,13 @@ def policies(folder: Path) -> None:
     )
     discrete = LearnedPolicy(network(8, 4, 9), action="rudder-discrete", **common)
     shielded = Shielded.from_model(shipgym.load_model("mariner-nomoto"), learned)
-    for name, policy in {
+    made: dict[str, Any] = {
         "learned": learned,
         "residual": residual,
         "discrete": discrete,
         "shielded": shielded,
-    }.items():
+    }
+    for name, policy in made.items():
         folder.joinpath("policy", name).mkdir(parents=True)
         policy.save(folder / "policy" / name / "agent.json")
 
@@ -115,10 +117,11 @@ def episode(folder: Path) -> None:
     names = ("x", "y", "psi", "u", "v", "r", "delta")
     states = {name: np.linspace(0.1, 1.0 / 3.0, n + 1) + k for k, name in enumerate(names)}
     made = Episode(
-        environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17, rudder_limit=0.7,
-        states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1), rewards=-np.ones(n),
-        reward_parts={"reward_heading": -np.ones(n)}, info={"cross_track": np.linspace(0.0, 1.0, n + 1)},
-        waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]), corridor=60.0,
+        environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17,
+        rudder_limit=0.7, states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1),
+        rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)},
+        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, corridor=60.0,
+        waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
         arguments={"model": "mariner", "sea": {"wind": None}}, seed=7, number=3, truncated=True, success=True,
     )  # fmt: skip
     folder.joinpath("episode").mkdir()
@@ -135,11 +138,11 @@ def results(folder: Path) -> None:
 def run(folder: Path) -> None:
     """The folder of a training in the midst of it."""
     settings = {
-        "base": "none", "ships": 2, "n_steps": 8, "batch_size": 8, "n_epochs": 1, "total_steps": 32, "net_arch": [4],
-        "evaluate_every": 16,
+        "base": "none", "ships": 2, "n_steps": 8, "batch_size": 8, "n_epochs": 1, "total_steps": 32,
+        "net_arch": [4], "evaluate_every": 16,
     }  # fmt: skip
     options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
-    training.N_EVALUATIONS = 2
+    vars(training)["N_EVALUATIONS"] = 2
     target = folder / "run" / "ppo"
     target.parent.mkdir()
     train(make_plan(Given("ppo", options=options, settings=settings)), target)

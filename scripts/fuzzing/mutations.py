@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import json
 import struct
-
 from collections.abc import Callable
 from functools import lru_cache
 from random import Random
@@ -14,26 +13,30 @@ from typing import Any
 from fuzzing.values import NUMBERS, RAW, TEXTS, float_bytes, json_text, mutated, toml_text
 from shipgym.files import parse_toml
 
-Change = tuple[bytes, str]  # the content, and what was done to it
+Change = tuple[
+    bytes, str | Callable[[], str]
+]  # the content, and what was done to it, or a function that says so
 SOURCES: dict[
     str, Callable[[Random, bytes], Change]
 ]  # by the ending of a file's name, at the end of this file
+LARGEST_TOML = 10_000  # bytes that are parsed for a change: keys of many parts take long
 BYTES_SHARE = 0.12  # of mutations that know nothing of the format
 INSERTED = (
-    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",", b"\xed\xa0\x80", b"#",
-    b"\x1b", b" " * 100, b"9" * 400, b"\\", b"=", b"e",
+    b"\0", b"\xff", b"\xff\xfe", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"'", b"{", b"[", b"}", b",",
+    b"\xed\xa0\x80", b"#", b"\x1b", b" " * 100, b"9" * 400, b"\\", b"=", b"e",
 )  # fmt: skip
 WHOLE = (
-    b"", b"\0", b"null", b"[]", b"{}", b"1", b'"a"', b"\xef\xbb\xbf", b"\xff\xfea\0", b"\0" * 100_000, b"[" * 100_000, b'{"a":' * 5_000,
-    b"a.b.c" * 8_000 + b"=1", b"a." * 20_000 + b"a=1", b"," * 50_000, b"a,b\n" * 20_000, b"\n" * 100_000, b"-", b"nan", b"PAR1PAR1",
-    b"\x08\0\0\0\0\0\0\0{}      ", b"[[" + b"a" * 50_000 + b"]]", b'x="' + b"y" * 200_000 + b'"', b"'''", b"\x80\x04N.", b"PK\x03\x04",
+    b"", b"\0", b"null", b"[]", b"{}", b"1", b'"a"', b"\xef\xbb\xbf", b"\xff\xfea\0", b"\0" * 100_000,
+    b"[" * 100_000, b'{"a":' * 5_000, b"a.b.c" * 8_000 + b"=1", b"a." * 20_000 + b"a=1", b"," * 50_000,
+    b"a,b\n" * 20_000, b"\n" * 100_000, b"-", b"nan", b"PAR1PAR1", b"\x08\0\0\0\0\0\0\0{}      ",
+    b"[[" + b"a" * 50_000 + b"]]", b'x="' + b"y" * 200_000 + b'"', b"'''", b"\x80\x04N.", b"PK\x03\x04",
 )  # fmt: skip
 
 
 def mutate(random: Random, name: str, content: bytes) -> Change:
     """The content of the file of that name with one change."""
     source = SOURCES.get(name.rpartition(".")[2], spoilt)
-    if random.random() < BYTES_SHARE:
+    if random.random() < BYTES_SHARE or (source is toml_changed and len(content) > LARGEST_TOML):
         source = spoilt
     try:
         return source(random, content)
@@ -202,14 +205,15 @@ def _line_ends(random: Random, rows: list[list[str]], delimiter: str) -> str:
 ENCODINGS = ("utf-16", "utf-8-sig", "utf-16-le", "utf-32", "cp037")
 _Rows = Callable[[Random, list[list[str]], str], str]
 CSV: tuple[tuple[str, _Rows], ...] = (
-    *(("a cell", _one_cell),) * 8, ("a column's cells", _one_column), *(("a row", _one_row),) * 3, *(("columns", _columns),) * 2,
-    ("delimiter", _delimited), *(("quote", _quoted),) * 3, ("decimal commas", _decimal_commas), ("line ends", _line_ends),
+    *(("a cell", _one_cell),) * 8, ("a column's cells", _one_column), *(("a row", _one_row),) * 3,
+    *(("columns", _columns),) * 2, ("delimiter", _delimited), *(("quote", _quoted),) * 3,
+    ("decimal commas", _decimal_commas), ("line ends", _line_ends),
     *((name, _one_cell) for name in ENCODINGS),
 )  # fmt: skip
 
 DTYPES = (
-    "F8_E4M3", "F8_E5M2", "F8_E8M0", "F4", "F6_E2M3", "BF16", "F16", "F32", "F64", "I8", "I16", "I32", "I64", "U8", "U16", "U32",
-    "U64", "BOOL", "C64", "f32", "",
+    "F8_E4M3", "F8_E5M2", "F8_E8M0", "F4", "F6_E2M3", "BF16", "F16", "F32", "F64", "I8", "I16", "I32", "I64",
+    "U8", "U16", "U32", "U64", "BOOL", "C64", "f32", "",
 )  # fmt: skip
 
 
@@ -217,6 +221,7 @@ def safetensors_changed(random: Random, content: bytes) -> Change:
     """The header's length, a type, shape or offset in it, anything in it, or a number of the data."""
     (length,) = struct.unpack("<Q", content[:8])
     header, data = _json(content[8 : 8 + length]), content[8 + length :]
+    said: str | Callable[[], str]
     what = random.randrange(8)
     if what == 0:
         wrong = random.choice(
@@ -261,12 +266,12 @@ def _counts(random: Random, old: list[int]) -> Any:
     return [number + random.choice((-4, -1, 0, 1, 4)) for number in old]
 
 
-def _metadata(random: Random, header: Any) -> tuple[Any, str]:
+def _metadata(random: Random, header: Any) -> tuple[Any, Callable[[], str]]:
     """A change in the JSON text that a checkpoint keeps in its metadata."""
     name = random.choice(list(header["__metadata__"]))
     root, said = mutated(random, _json(header["__metadata__"][name].encode()))
     text = json_text(root).decode("utf-8", "surrogatepass")
-    return {**header, "__metadata__": {**header["__metadata__"], name: text}}, f"metadata: {said}"
+    return {**header, "__metadata__": {**header["__metadata__"], name: text}}, said
 
 
 def parquet_changed(random: Random, content: bytes) -> Change:

@@ -16,7 +16,7 @@ from typing import Any
 from fuzzing.reading import SCRATCH, Finding, Kind, Reader, Report, _status
 
 CHUNK = 500  # inputs
-STUCK_S = 60.0  # without a new input: code that no signal reaches
+STUCK_S = 120.0  # without a new input: code that no signal reaches
 LARGEST_MIB = 1500  # resident; a process that has grown so far is replaced
 PROCESSES = multiprocessing.get_context("fork")
 

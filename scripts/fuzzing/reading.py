@@ -11,7 +11,7 @@ import time
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from random import Random
@@ -25,7 +25,7 @@ PACKAGES = ("shipgym", "identification", "agents")
 SCRATCH = Path("/dev/shm") if Path("/dev/shm").is_dir() else None  # files in memory
 
 LONGEST_S = 2.0  # processor time of one input
-LONGEST_WAIT_S = 10.0  # by the clock: a pipe that nobody writes to
+LONGEST_WAIT_S = 30.0  # by the clock: a pipe that nobody writes to
 MOST_MEMORY = 2**30  # bytes more than the process had before
 LONGEST_MESSAGE = 5_000  # characters of a refusal
 EDITS = (1, 1, 1, 1, 1, 2, 2, 2, 3, 5)  # changes of an input
@@ -40,7 +40,7 @@ class Kind:
     Attributes
     ----------
     name : str
-        Of the kind and of its folder in the corpus. Each file there is a seed, or each folder, then with `main`.
+        Of the kind and of its folder in the corpus. A file there is a seed, and so is a folder with `main`.
     read : callable
         The reader; it takes the path.
     use : callable, optional
@@ -120,9 +120,10 @@ class Seed:
     main: str
     files: Mapping[str, bytes]
     spoilt: set[str] = field(default_factory=set)  # that are not as they should be on disk
+    odd: set[str] = field(default_factory=set)  # where something else than a file is
 
     def put(self, files: Mapping[str, bytes | str]) -> None:
-        """Write what differs from the seed; a text instead of bytes names what is there in place of a file."""
+        """Write what differs from the seed; a text instead of bytes names what is there instead."""
         for name in self.spoilt - files.keys():
             self._write(name, self.files[name])
         self.spoilt = set(files)
@@ -131,12 +132,15 @@ class Seed:
 
     def _write(self, name: str, content: bytes | str) -> None:
         path = self.folder / name
+        if name in self.odd:
+            self.odd.discard(name)
+            _remove(path)
         if isinstance(content, bytes):
-            if path.is_symlink() or path.is_dir() or path.is_fifo():
-                _remove(path)
-            path.write_bytes(content)
+            with path.open("wb", buffering=0) as file:
+                file.write(content)
             return
         _remove(path)
+        self.odd.add(name)
         if content == "folder":
             path.mkdir()
         elif content == "pipe":
@@ -161,7 +165,8 @@ class Reader:
     def __init__(self, kind: Kind, scratch: Path, seed: int) -> None:
         self.kind, self.seed = kind, seed
         self.seeds = list(_seeds(kind, scratch / kind.name))
-        self.trouble = [self._warm(one) for one in self.seeds]
+        for one in self.seeds:
+            self._warm(one)
         limit = _status("VmSize") + MOST_MEMORY
         resource.setrlimit(resource.RLIMIT_AS, (limit, resource.RLIM_INFINITY))
 
@@ -215,19 +220,15 @@ class Reader:
     def _try(self, one: Seed, files: Mapping[str, bytes | str]) -> BaseException | None:
         """Read and use; the exception, if one is raised."""
         one.put(files)
-        signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
-        signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT_S)
         try:
-            found = self.kind.read(one.folder / one.main)
-            if self.kind.use is not None:
-                self.kind.use(found)
+            with _limited():
+                found = self.kind.read(one.folder / one.main)
+                if self.kind.use is not None:
+                    self.kind.use(found)
         except KeyboardInterrupt:
             raise
         except BaseException as error:  # whatever it is, it is what is looked for
             return error
-        finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
         return None
 
     def _minimal(self, index: int, one: Seed, edits: list[int], error: BaseException, what: str) -> Finding:
@@ -244,7 +245,8 @@ class Reader:
             for name, content in whole.items()
         }
         trace = "".join(traceback.format_exception(error)[-12:])
-        return Finding(self.kind.name, what, str(error)[:300], index, tuple(said), kept, trace)
+        told = tuple(f"{name}: {one if isinstance(one, str) else one()}" for name, one in said)
+        return Finding(self.kind.name, what, str(error)[:300], index, told, kept, trace)
 
 
 def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
@@ -265,22 +267,22 @@ def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
         yield Seed(folder, kind.main if entry.is_dir() else entry.name, files)
 
 
-def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[str]]:
+def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[Any]]:
     """The files that differ from the seed's after some changes, and what these are."""
     files: dict[str, bytes | str] = {}
-    said = []
+    said: list[Any] = []
     names = [name for name in one.files if name != one.main]
     for edit in edits:
         random = Random(edit)
         name = random.choice(names) if names and random.random() < 0.45 else one.main
         content = files.get(name, one.files[name])
         if random.random() < SPECIAL_SHARE or isinstance(content, str):
-            files[name] = random.choice(SPECIAL)
-            said.append(f"{name}: {files[name]} in its place")
+            files[name] = special = random.choice(SPECIAL)
+            said.append((name, f"{special} in its place"))
             continue
         changed, what = mutate(random, name, content)
         files[name] = changed
-        said.append(f"{name}: {what}")
+        said.append((name, what))
         if name != one.main and random.random() < KEPT_HASH:
             _mend(one, files, name, content, changed)
     return files, said
@@ -346,6 +348,19 @@ def _guarded() -> Iterator[None]:
     finally:
         for number, handler in before:
             signal.signal(number, handler)
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Both clocks are set within the block."""
+    signal.setitimer(signal.ITIMER_PROF, LONGEST_S)
+    signal.setitimer(signal.ITIMER_REAL, LONGEST_WAIT_S)
+    try:
+        yield
+    finally:
+        for clock in (signal.ITIMER_PROF, signal.ITIMER_REAL, signal.ITIMER_PROF):
+            with suppress(HangError):  # of the other clock, at this moment
+                signal.setitimer(clock, 0.0)
 
 
 def _status(name: str) -> int:

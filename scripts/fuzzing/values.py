@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from collections.abc import Callable
+from functools import partial
 from random import Random
 from typing import Any
 
 Node = Any
 Path = tuple[Any, ...]
 RAW = "@@raw:"  # begins a text that stands in the file without quotes, such as NaN
+_RAW_TEXT = re.compile(rf'"{RAW}([^"\\]*(?:\\.[^"\\]*)*)"')
 
 NUMBERS: tuple[Any, ...] = (
-    0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255, 256,
-    2**31, 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, f"{RAW}1{'0' * 399}", f"{RAW}1{'0' * 5000}",
-    f"{RAW}NaN", f"{RAW}Infinity", f"{RAW}-Infinity", f"{RAW}1e999", f"{RAW}nan", f"{RAW}inf", f"{RAW}0x10", f"{RAW}01",
-    f"{RAW}1_000",
+    0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255,
+    256, 2**31, 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, f"{RAW}1{'0' * 399}",
+    f"{RAW}1{'0' * 5000}", f"{RAW}NaN", f"{RAW}Infinity", f"{RAW}-Infinity", f"{RAW}1e999", f"{RAW}nan",
+    f"{RAW}inf", f"{RAW}0x10", f"{RAW}01", f"{RAW}1_000",
 )  # fmt: skip
 TEXTS = (
-    "", " ", "\n", "x\ny", "\t", '"', "'", '"""', "'''", '"""\nimport os\n', "\\", "\\n", "\0", "a\0b", "\ud800", "\udfff x",
-    "\x1b[31mred", "\u202e", "é", "船", "😀", "a" * 300, "b" * 20_000, "/dev/zero", "/dev/null", "/", ".", "..", "../../etc/passwd",
-    "/proc/self/mem", "C:\\x", "file:///etc/passwd", "http://127.0.0.1/", "os:system", "os", "builtins:exec", "__class__",
-    "__import__('os')", "{0}", "{name}", "%s", "%(x)s", "$(id)", "`id`", "<script>", "[bold]", "[/]", "NaN", "nan", "inf", "1e999",
-    "1", "0", "true", "null", "None", "٣", "1,5", "mariner", "lq", "pid", "auto", "calm", "rough", "grey-box", "prime", "si",
-    "2026-01-01", "2026-01-01T00:00:00Z", "=1+1", "a.b", "a[0]", "#", ";", ",",
+    "", " ", "\n", "x\ny", "\t", '"', "'", '"""', "'''", '"""\nimport os\n', "\\", "\\n", "\0", "a\0b",
+    "\ud800", "\udfff x", "\x1b[31mred", "\u202e", "é", "船", "😀", "a" * 300, "b" * 20_000, "/dev/zero",
+    "/dev/null", "/", ".", "..", "../../etc/passwd", "/proc/self/mem", "C:\\x", "file:///etc/passwd",
+    "http://127.0.0.1/", "os:system", "os", "builtins:exec", "__class__", "__import__('os')", "{0}", "{name}",
+    "%s", "%(x)s", "$(id)", "`id`", "<script>", "[bold]", "[/]", "NaN", "nan", "inf", "1e999", "1", "0",
+    "true", "null", "None", "٣", "1,5", "mariner", "lq", "pid", "auto", "calm", "rough", "grey-box", "prime",
+    "si", "2026-01-01", "2026-01-01T00:00:00Z", "=1+1", "a.b", "a[0]", "#", ";", ",",
 )  # fmt: skip
 
 
@@ -50,13 +54,13 @@ def node(random: Random) -> Node:
     if chance < 0.9:
         return [[scalar(random) for _ in range(random.randrange(3))] for _ in range(random.randrange(3))]
     if chance < 0.94:
-        return [0.5] * random.choice((10, 100, 1000, 10_000))
+        return [0.5] * random.choice((10, 10, 10, 100, 100, 100, 1000, 1000, 10_000))
     return deep(random, scalar(random))
 
 
 def deep(random: Random, inner: Node) -> Node:
     """A value in many lists or tables."""
-    depth = random.choice((2, 5, 19, 20, 21, 50, 900, 5_000, 100_000))
+    depth = random.choice((2, 2, 5, 5, 18, 19, 20, 21, 50, 900, random.choice((900, 5_000, 100_000))))
     if depth < 60:
         for _ in range(depth):
             inner = [inner] if random.random() < 0.5 else {"a": inner}
@@ -216,19 +220,23 @@ def _nested(random: Random, root: Node, path: Path) -> Node:
 
 #: By name; those that most often reach what lies behind the first check come several times.
 CHANGES: tuple[tuple[str, Callable[[Random, Node, Path], Node]], ...] = (
-    *(("number", _number),) * 6, *(("replace", _replaced),) * 5, *(("retype", _retyped),) * 2, ("delete", _without),
-    ("rename", _renamed), ("add", _added), ("repeat", _repeated), ("swap", _swapped), ("shuffle", _shuffled),
-    ("empty", _emptied), ("nest", _nested),
+    *(("number", _number),) * 6, *(("replace", _replaced),) * 5, *(("retype", _retyped),) * 2,
+    ("delete", _without), ("rename", _renamed), ("add", _added), ("repeat", _repeated), ("swap", _swapped),
+    ("shuffle", _shuffled), ("empty", _emptied), ("nest", _nested),
 )  # fmt: skip
 
 
-def mutated(random: Random, root: Node) -> tuple[Node, str]:
-    """Nested values with one change, and what it is."""
+def mutated(random: Random, root: Node) -> tuple[Node, Callable[[], str]]:
+    """Nested values with one change, and a function that says what it is."""
     name, change = random.choice(CHANGES)
     path = somewhere(random, root)
     found = change(random, root, path)
+    return found, partial(_told, name, path, root, found)
+
+
+def _told(name: str, path: Path, root: Node, found: Node) -> str:
     place = "".join(f"[{key}]" if isinstance(key, int) else f".{key}" for key in path)
-    return found, f"{name} at ${place}: {_short(root, path)} -> {_short(found, path)}"
+    return f"{name} at ${place}: {_short(root, path)} -> {_short(found, path)}"
 
 
 def _short(root: Node, path: Path) -> str:
@@ -240,24 +248,15 @@ def _short(root: Node, path: Path) -> str:
 
 
 def json_text(root: Node) -> bytes:
-    """Nested values as JSON, raw texts without quotes and keys that end in the mark twice."""
+    """Nested values as JSON, raw texts without quotes and the mark taken from keys."""
     text = json.dumps(root)
-    return (_bare(text) if RAW in text else text).encode()
+    if RAW in text:
+        text = _RAW_TEXT.sub(_unquoted, text).replace(RAW, "")
+    return text.encode()
 
 
-def _bare(text: str) -> str:
-    """Quotes taken away around raw texts, and the mark from keys."""
-    parts = text.split(f'"{RAW}')
-    found = parts[0] + "".join(_unquoted(part) for part in parts[1:])
-    return found.replace(RAW, "")
-
-
-def _unquoted(part: str) -> str:
-    """What follows the mark, without the quote that ends it."""
-    end = 0
-    while end < len(part) and part[end] != '"':
-        end += 2 if part[end] == "\\" else 1
-    return part[:end].replace('\\"', '"') + part[end + 1 :]
+def _unquoted(found: re.Match[str]) -> str:
+    return found[1].replace('\\"', '"')
 
 
 def toml_text(root: Node) -> bytes:

@@ -99,7 +99,7 @@ def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tupl
 
 def changed(state: State, steps: float, settings: Settings, random: Random) -> State:
     """The next heading to keep, listed or drawn, and the step at which it changes again."""
-    number = int(state.changes)
+    number = int(max(0.0, state.changes))  # not before the first, whatever a checkpoint holds
     largest = radians(settings.course_change_deg)
     change = drawn(random, 1 + 2 * number, -largest, largest)
     wait = floor(settings.change_interval_steps * drawn(random, 2 + 2 * number, 0.5, 1.5))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import check_choice, check_keys, check_table, check_text, placed, refuse_code
+from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.errors import InputError
 from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
@@ -71,7 +71,7 @@ class ShipFile:
             SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
         )
         identify = check_options(data.get("identify", {}), f"{path}: [identify]")
-        refuse_code(identify, f"{path}: [identify]")
+        data_only(identify, f"{path}: [identify]")
         return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 
     def completed_particulars(self) -> Particulars:

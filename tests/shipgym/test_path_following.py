@@ -14,9 +14,10 @@ from shipgym import InputError
 from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
+from shipgym.tasks import path_following
 from shipgym.tasks.guidance import Path, line_of_sight, wrapped
 from shipgym.tasks.path_following import TURN_HORIZON
-from shipgym.tasks.task import path_following_task
+from shipgym.tasks.task import path_following_task, ship_of
 
 ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
@@ -301,7 +302,7 @@ def test_the_mirrored_voyage_earns_the_same():
     st.booleans(),
 )
 def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troubled):
-    options = {"sea": TROUBLED, "noise": 3.0} if troubled else {}
+    options = {"sea": ["calm", TROUBLED], "noise": 3.0} if troubled else {}
     env = make(ground=40.0, acceptance=0.0, max_turn_deg=150.0, leg_lengths=(0.5, 3.0), **options)
     env.reset(seed=seed)
     for action in actions * 10:
@@ -333,3 +334,13 @@ def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troub
 def test_wrong_arguments_are_named(options, message):
     with pytest.raises(InputError, match=message):
         make(**options)
+
+
+@pytest.mark.parametrize("leg", [-1e9, -1.0, 0.0])
+def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
+    plan = np.array([0.0, 0.0, 500.0, 0.0, 500.0, 500.0])
+    state = path_following.leg_from(0, 0.0, plan)._replace(leg=leg)
+    ship = ship_of(shipgym.load_model("mariner"))
+    motion = Motion(490.0, 0.0, *[0.0] * 9)
+    found = path_following.on_event(motion, state, None, ship, path_following.Settings(), None, plan)
+    assert (found.leg, found.north, found.east) == (1.0, 500.0, 0.0)
