@@ -2,16 +2,50 @@
 
 import difflib
 import math
-from collections.abc import Collection, Iterable, Mapping
+import reprlib
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+
+#: Most characters of a name, a source or a path.
+LONGEST_TEXT = 4096
+
+#: Types of a JSON value; a list of what all entries are, or of what each of several is; a table by key, or by
+#: `ANY_KEY` what all values are.
+Shape: TypeAlias = "tuple[type, ...] | list[Shape] | dict[str, Shape]"
+ANY_KEY = "*"
+_WORDS = {str: "a text", int: "a whole number", float: "a number", bool: "true or false", NoneType: "null"}
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 200
+
+
+def shown(value: Any) -> str:
+    """A value as Python writes it, for a message; of a long text or list only what begins and ends it."""
+    try:
+        return _SHORT.repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        return f"a {type(value).__name__}"
+
+
+@contextmanager
+def placed(where: str) -> Iterator[None]:
+    """Let refusals within the block begin with `where`, the place, unless they do already."""
+    try:
+        yield
+    except InputError as error:
+        if str(error).startswith(where):
+            raise
+        raise InputError(f"{where}: {error}") from None
 
 
 def quoted(words: Iterable[str]) -> str:
@@ -28,26 +62,33 @@ def did_you_mean(word: str, options: Iterable[str]) -> str:
     return f" Did you mean '{by_lower_case[close[0]]}'?" if close else ""
 
 
-def check_keys(mapping: Mapping[str, Any], allowed: Collection[str], where: str) -> None:
-    """Refuse a key that is not among `allowed`, and name the nearest one that is."""
+def check_keys(
+    mapping: Mapping[str, Any], allowed: Collection[str], where: str, required: Iterable[str] = ()
+) -> None:
+    """Refuse a key that is not among `allowed`, naming the nearest one, and the lack of a required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
                 f"{where}: unknown key '{key}'.{did_you_mean(key, allowed)} Known keys: {quoted(allowed)}"
             )
+    for key in required:
+        if key not in mapping:
+            raise InputError(f"{where}: field '{key}' is missing, expected {quoted(required)}")
 
 
 def check_table(value: Any, where: str) -> Mapping[str, Any]:
     """Return `value`, which must be a table (a mapping with text as keys)."""
     if not isinstance(value, Mapping):
-        raise InputError(f"{where}: {value!r} found, expected a table of keys and values")
+        raise InputError(f"{where}: {shown(value)} found, expected a table of keys and values")
     return value
 
 
 def check_text(value: Any, where: str) -> str:
-    """Return `value`, which must be text that is not empty."""
+    """Return `value`, which must be text that is not empty, of at most `LONGEST_TEXT` characters."""
     if not isinstance(value, str) or not value.strip():
-        raise InputError(f"{where}: {value!r} found, expected a text that is not empty")
+        raise InputError(f"{where}: {shown(value)} found, expected a text that is not empty")
+    if len(value) > LONGEST_TEXT:
+        raise InputError(f"{where}: {len(value)} characters found, expected at most {LONGEST_TEXT}")
     return value
 
 
@@ -55,7 +96,7 @@ def check_choice(value: Any, options: Collection[str], where: str) -> str:
     """Return `value`, which must be one of the words in `options`."""
     if not isinstance(value, str) or value not in options:
         hint = did_you_mean(value, options) if isinstance(value, str) else ""
-        raise InputError(f"{where}: {value!r} found, expected one of {quoted(options)}.{hint}")
+        raise InputError(f"{where}: {shown(value)} found, expected one of {quoted(options)}.{hint}")
     return value
 
 
@@ -103,7 +144,7 @@ def check_number(
     expected = f"expected a number {stated}".rstrip() + (f"; {hint}" if hint else "")
     if isinstance(value, bool) or not isinstance(value, Real):
         quotes = " (a text; write the number without quotes)" if isinstance(value, str) else ""
-        raise InputError(f"{where}: {value!r}{quotes} found, {expected}")
+        raise InputError(f"{where}: {shown(value)}{quotes} found, {expected}")
     try:
         number = float(value)
     except OverflowError:
@@ -113,18 +154,19 @@ def check_number(
     return number
 
 
-def check_whole(value: Any, where: str, *, at_least: int, hint: str = "") -> int:
-    """Return `value`, which must be a whole number of at least `at_least`."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or value < at_least:
+def check_whole(value: Any, where: str, *, at_least: int, at_most: float = math.inf, hint: str = "") -> int:
+    """Return `value`, which must be a whole number from `at_least` to `at_most`."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or not at_least <= value <= at_most:
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
-        raise InputError(f"{where}: {value!r} found, expected {expected}")
+        expected += f" and at most {at_most}" if at_most < math.inf else ""
+        raise InputError(f"{where}: {shown(value)} found, expected {expected}")
     return int(value)
 
 
 def check_flag(value: Any, where: str) -> bool:
     """Return `value`, which must be true or false."""
     if not isinstance(value, bool):
-        raise InputError(f"{where}: {value!r} found, expected true or false")
+        raise InputError(f"{where}: {shown(value)} found, expected true or false")
     return value
 
 
@@ -132,7 +174,7 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
     """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: expected an array of numbers") from None
     wrong = np.argwhere(~np.isfinite(array))
     if len(wrong):
@@ -142,3 +184,43 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
         raise InputError(f"{where}: {array[place]} found at sample {sample}, expected finite numbers{remedy}")
     array.setflags(write=False)
     return array
+
+
+def check_array(value: Any, shape: tuple[int | None, ...], where: str) -> NDArray[np.float64]:
+    """Return the numbers of a list, or of lists within it, as an array of this shape; None is any length.
+
+    Texts, truth values, numbers that are not finite and rows that differ in length are refused.
+    """
+    size = shape[0]
+    if not isinstance(value, list) or len(value) != (len(value) if size is None else size):
+        found = f"{len(value)} entries" if isinstance(value, list) else shown(value)
+        what = "lists" if len(shape) > 1 else "numbers"
+        raise InputError(
+            f"{where}: {found} found, expected a list of {'' if size is None else f'{size} '}{what}"
+        )
+    if len(shape) == 1:
+        for i, number in enumerate(value):
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                raise InputError(f"{where}[{i}]: {shown(number)} found, expected a number")
+        return check_finite(value, where)
+    width = len(value[0]) if shape[1] is None and value and isinstance(value[0], list) else shape[1]
+    return np.array([check_array(row, (width, *shape[2:]), f"{where}[{i}]") for i, row in enumerate(value)])
+
+
+def check_shape(value: Any, shape: Shape, where: str) -> None:
+    """Refuse nested JSON values that differ from a shape, naming the place; further keys may be there."""
+    if isinstance(shape, dict):
+        table = check_table(value, where)
+        for key in table if ANY_KEY in shape else shape:
+            if key not in table:
+                raise InputError(f"{where}: '{key}' is missing, expected {quoted(shape)}")
+            check_shape(table[key], shape.get(key, shape.get(ANY_KEY, ())), f"{where}.{key}")
+    elif isinstance(shape, list):
+        several = len(shape) > 1
+        if not isinstance(value, list) or (several and len(value) != len(shape)):
+            raise InputError(f"{where}: {shown(value)} found, expected a list{f' of {len(shape)}' * several}")
+        for i, entry in enumerate(value):
+            check_shape(entry, shape[i if several else 0], f"{where}[{i}]")
+    elif type(value) not in shape:
+        words = " or ".join(dict.fromkeys(_WORDS.get(kind, kind.__name__) for kind in shape))
+        raise InputError(f"{where}: {shown(value)} found, expected {words}")

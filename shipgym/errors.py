@@ -2,13 +2,21 @@
 
 from typing import Any
 
+LONGEST_MESSAGE = 2000  # characters
+
 
 class InputError(ValueError):
     """Something the user gave is wrong: a file, a row, a field or an argument.
 
     The message names the file, the row or field, the value found, what is expected, and the remedy.
-    The command line prints it and exits with code 2.
+    The command line prints it and exits with code 2. Of a message longer than `LONGEST_MESSAGE` the middle is
+    left out: it repeats what was found, which may be a whole file.
     """
+
+    def __init__(self, message: str) -> None:
+        half = LONGEST_MESSAGE // 2
+        long = len(message) > LONGEST_MESSAGE
+        super().__init__(f"{message[:half]} ... {message[-half:]}" if long else message)
 
 
 class UnstableModelError(RuntimeError):

@@ -1,14 +1,37 @@
-"""Files that are read with one clear error, and written whole or not at all."""
+"""Files that are read within stated limits and with one clear error, and written whole or not at all.
+
+Whatever is read is a regular file of at most so many bytes, and what JSON and TOML hold is checked in one
+place (`check_content`), before any reader looks at its fields.
+"""
 
 import json
+import math
 import os
-from collections.abc import Iterator, Mapping
+import re
+import stat
+import tomllib
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import check_table, did_you_mean
+from shipgym.checks import check_table, did_you_mean, shown
 from shipgym.errors import InputError
+
+MIB = 2**20
+#: Most bytes of a file of each kind.
+LARGEST_TOML, LARGEST_JSON, LARGEST_CSV, LARGEST_TENSORS = MIB // 4, 32 * MIB, 64 * MIB, 256 * MIB
+#: Most values in a JSON or TOML file, most levels of lists and tables within each other, longest key.
+MOST_VALUES, DEEPEST, LONGEST_KEY = 1_000_000, 20, 4096
+#: Largest magnitude of a number: products of three such numbers are still finite.
+LARGEST_NUMBER = 1e100
+
+#: A dotted key that nests deeper than allowed, on which `tomllib` spends time and memory by the square.
+_LONG_KEY = re.compile(rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{DEEPEST}}}""")
+#: What cannot be written in UTF-8, or ends a text for the operating system.
+_UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 
 
 @contextmanager
@@ -45,38 +68,162 @@ def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) ->
 
 
 def check_readable(path: Path, what: str) -> None:
-    """InputError for a file that is missing, a folder, or cannot be opened; `what` it is, as "CSV file"."""
+    """InputError for what is missing, no regular file, or cannot be read; `what` it is, as "CSV file"."""
+    read_bytes(path, what, 0)
+
+
+def read_bytes(path: Path, what: str, largest: int) -> bytes:
+    """The content of a regular file of at most `largest` bytes, none of it where that is 0.
+
+    Raises InputError for a file that is missing, too large or cannot be read, and for a folder, a device or a
+    pipe, which is not opened; `what` is expected there, as "CSV file".
+    """
     try:
-        with path.open("rb"):
-            return
+        kind = path.stat().st_mode
+        if not stat.S_ISREG(kind):
+            found = "a folder" if stat.S_ISDIR(kind) else "no regular file (a device, a pipe or a socket)"
+            raise InputError(f"{path}: this is {found}, expected a {what}")
+        with open(path, "rb", opener=_open_at_once) as file:
+            size = os.fstat(file.fileno()).st_size
+            if not largest:
+                return b""
+            if size > largest:
+                raise InputError(
+                    f"{path}: {size} bytes found, expected a {what} of at most {largest} bytes; split it, or "
+                    "leave out what is not needed"
+                )
+            return file.read(size)
+    except InputError:
+        raise
     except FileNotFoundError:
         near = did_you_mean(path.name, _names_beside(path))
         raise InputError(f"{path}: there is no such {what}.{near}") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: this is a folder, expected a {what}") from None
     except (OSError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read ({error}), expected a {what}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({reason}), expected a {what}") from None
 
 
-def read_bytes(path: Path, what: str) -> bytes:
-    """The content of a file; refused as by `check_readable`."""
-    check_readable(path, what)
-    return path.read_bytes()
+def read_text(path: Path, what: str, largest: int) -> str:
+    """A text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text."""
+    data = read_bytes(path, what, largest)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        found = f"line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text (binary content)"
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            found = "the file is in UTF-16"
+        raise InputError(f"{path}: {found}, expected a {what}; save it as text in UTF-8") from None
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
     """The object in a JSON file; `what` is expected there, and `remedy` says what to do about a broken one.
 
-    Raises InputError if the file is missing, cannot be read, is binary or cut short, or holds no object.
+    Raises InputError as `read_text` does, and if the file is cut short, holds no object, or something that
+    `check_content` refuses.
     """
-    data = read_bytes(path, what)
+    text = read_text(path, f"{what} (JSON)", LARGEST_JSON)
+    return check_table(parse_json(text, f"{path}:", remedy), f"{path}:")
+
+
+def parse_json(text: str, where: str, remedy: str) -> Any:
+    """The value of a JSON text within the limits of `check_content`; `where` begins messages: "a.json:"."""
+    loads = partial(json.loads, object_pairs_hook=_unrepeated)
+    return _parsed(loads, text, where, "broken JSON ({}); the file may be cut short: " + remedy, False)
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """The tables of a TOML file; `what` is expected there, as "ship file".
+
+    Raises InputError as `read_text` does, and if the file is not TOML or holds something that `check_content`
+    refuses.
+    """
+    return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
+
+
+def parse_toml(text: str, where: str) -> dict[str, Any]:
+    """The tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
+    if _LONG_KEY.search(text):
+        raise InputError(f"{where} a dotted key of over {DEEPEST} parts found, expected shorter keys")
+    tables: dict[str, Any] = _parsed(
+        tomllib.loads, text, where, "not valid TOML: {}; correct that line", infinite=True
+    )
+    return tables
+
+
+def toml_value(text: str) -> Any:
+    """A value as TOML has it, such as 3, true or [1, 2]; any other text is itself."""
     try:
-        content = json.loads(data.decode("utf-8"))
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: binary content found, expected a {what} (JSON)") from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: broken JSON ({error}); the file may be cut short: {remedy}") from None
-    return check_table(content, f"{path}:")
+        return parse_toml(f"value = {text}", "value:")["value"]
+    except InputError:
+        return text
+
+
+def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1) -> None:
+    """Refuse what no file of this project holds, before its fields are looked at.
+
+    In a list or table from JSON or TOML these are: lists and tables more than `DEEPEST` deep, whole numbers
+    of more than 64 bits (a `seed` may have 128), numbers that are nan or exceed `LARGEST_NUMBER` (unless
+    `infinite` ones may stand there), dates, keys longer than `LONGEST_KEY`, and texts with null bytes or
+    halves of characters. Raises InputError, which begins with `where`, "model.json:", and names the place.
+    """
+    if depth > DEEPEST:
+        raise InputError(f"{where}: lists or tables nest deeper than {DEEPEST}; take another copy")
+    for key, item in value.items() if isinstance(value, dict) else enumerate(value):
+        if isinstance(key, str) and (len(key) > LONGEST_KEY or _UNWRITABLE.search(key)):
+            raise InputError(
+                f"{where}: key {shown(key)} found, expected a text of at most {LONGEST_KEY} characters"
+            )
+        if not (nested := isinstance(item, dict | list)) and not (fault := _fault(key, item, infinite)):
+            continue
+        place = f"{where}[{key}]" if isinstance(key, int) else f"{where}{' ' if depth == 1 else '.'}{key}"
+        if not nested:
+            raise InputError(f"{place}: {shown(item)} found, expected {fault}")
+        check_content(item, place, infinite, depth + 1)
+
+
+def _fault(key: str | int, value: Any, infinite: bool) -> str:
+    """What is expected in the place of a single value; empty where nothing is wrong with it."""
+    if isinstance(value, float):
+        fine = abs(value) <= LARGEST_NUMBER or (infinite and math.isinf(value))
+        return "" if fine else f"a number of magnitude {LARGEST_NUMBER:g} at most"
+    if isinstance(value, int):
+        bits = 128 if key == "seed" else 64  # NumPy draws seeds of 128 bits
+        return "" if value.bit_length() <= bits else f"a whole number of at most {bits} bits"
+    if isinstance(value, str):
+        return "a text without null bytes and halves of characters" if _UNWRITABLE.search(value) else ""
+    return "" if value is None else "a text, a number, true or false"
+
+
+def _parsed(parse: Callable[[str], Any], text: str, where: str, broken: str, infinite: bool) -> Any:
+    """What a parser makes of a text, within the limits; `broken` says what is wrong with its syntax."""
+    if sum(map(text.count, "[{,")) > MOST_VALUES:
+        raise InputError(f"{where} more than {MOST_VALUES} values found, expected fewer; split the file")
+    try:
+        content = parse(text)
+    except RecursionError:
+        raise InputError(f"{where} lists or tables nest deeper than {DEEPEST}; take another copy") from None
+    except KeyError as error:
+        raise InputError(f"{where} key {shown(error.args[0])} stands twice, expected each once") from None
+    except (json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{where} {broken.format(error)}") from None
+    except ValueError:  # Python's limit to the digits of a whole number
+        raise InputError(f"{where} a whole number of more than 64 bits found") from None
+    check_content(content if isinstance(content, dict | list) else [content], where, infinite)
+    return content
+
+
+def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A table of pairs; KeyError for a key that stands twice."""
+    table = dict(pairs)
+    if len(table) < len(pairs):
+        raise KeyError(Counter(key for key, _ in pairs).most_common(1)[0][0])
+    return table
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    """Open a file without waiting, should it have become a pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _names_beside(path: Path) -> list[str]:

@@ -42,6 +42,7 @@ from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_table, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import LARGEST_TENSORS, read_bytes
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
@@ -290,10 +291,7 @@ def file_hash(path: str | Path) -> str:
 
     Raises InputError if it cannot be read.
     """
-    try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    return hashlib.sha256(read_bytes(Path(path), "file", LARGEST_TENSORS)).hexdigest()
 
 
 def policy_hash(policy: Policy) -> str | None:

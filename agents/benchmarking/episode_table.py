@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.files import atomic_path
+from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
 
 Columns = dict[str, NDArray[Any]]
 
@@ -19,6 +20,7 @@ KEYS = ("contestant", "task", "run", "seed")
 #: Figures that are yes or no, and numbers of events: so they are in the file; missing ones are null.
 FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 COUNTS = ("interventions",)
+MOST_NUMBERS = 20_000_000  # of a table
 
 
 def joined(
@@ -59,26 +61,40 @@ def write_episodes(columns: Columns, path: Path) -> None:
         parquet.write_table(arrow.table(arrays), draft, compression="zstd")
 
 
-def read_episodes(path: Path) -> Columns:
-    """Read what `write_episodes` wrote; figures as float64, null as NaN.
+def read_episodes(path: Path, rows: int) -> Columns:
+    """Read what `write_episodes` wrote, so many rows; figures as float64, null as NaN.
 
     Raises InputError if it is missing or no such file.
     """
     arrow, parquet = _arrow()
+    content = read_bytes(path, "file of episodes", LARGEST_TENSORS)
     try:
-        table = parquet.read_table(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such file of episodes") from None
-    except (OSError, arrow.ArrowException) as error:
+        file = parquet.ParquetFile(arrow.BufferReader(content))
+        found, names = file.metadata.num_rows, file.schema_arrow.names
+        if found != rows or rows * len(names) > MOST_NUMBERS:
+            raise InputError(f"{path}: {len(names)} columns of {found} rows found, expected {rows} rows")
+        if len(set(names)) < len(names) or not set(KEYS) <= set(names):
+            raise InputError(
+                f"{path}: columns {quoted(names)} found, expected {quoted(KEYS)} and figures, once"
+            )
+        return {name: _column(arrow, name, file.read([name]).column(0)) for name in names}
+    except InputError:
+        raise
+    except (OSError, arrow.ArrowException, ValueError, TypeError, OverflowError) as error:
         raise InputError(f"{path}: cannot be read as Parquet ({error}); it may be cut short") from None
-    columns: Columns = {}
-    for name in table.column_names:
-        values = table.column(name)
-        if name in KEYS:
-            columns[name] = np.array(values.to_pylist(), dtype=np.str_ if name in KEYS[:2] else np.int64)
-        else:
-            columns[name] = values.cast(arrow.float64()).to_numpy(zero_copy_only=False)
-    return columns
+
+
+def _column(arrow: Any, name: str, values: Any) -> NDArray[Any]:
+    """A column of the file as an array; ValueError or TypeError if it is of another type."""
+    if name in KEYS[:2]:
+        return np.array(values.cast(arrow.string()).to_pylist(), dtype=np.str_)
+    if not (arrow.types.is_integer(values.type) or arrow.types.is_floating(values.type) or name in FLAGS):
+        raise TypeError(f"column '{name}' of {values.type}")
+    kind = arrow.int64() if name in KEYS else arrow.float64()
+    numbers: NDArray[Any] = values.cast(kind).to_numpy(zero_copy_only=False)
+    if name in KEYS and numbers.dtype != np.int64:
+        raise ValueError(f"column '{name}' has rows without a value")
+    return numbers
 
 
 def _array(arrow: Any, name: str, values: NDArray[Any]) -> Any:

@@ -34,18 +34,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import Contestant, file_hash, names_code
-from agents.benchmarking.episode_table import (
-    KEYS,
-    Columns,
-    check_library,
-    joined,
-    read_episodes,
-    write_episodes,
-)
+from agents.benchmarking.episode_table import Columns, check_library, joined, read_episodes, write_episodes
+from agents.benchmarking.results_shape import check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
-from shipgym.checks import check_choice, check_keys, check_table
+from shipgym.checks import check_choice, check_keys
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
 
@@ -248,27 +242,23 @@ def load_results(path: str | Path) -> BenchmarkResult:
     for name in FIELDS:
         if name not in content:
             raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
-        if name not in ("format", "kind", "ranking"):
-            check_table(content[name], f"{where}: {name}")
+    check_summary(content, str(where))
     table = where.with_name(EPISODES)
-    if content["episodes"].get("sha256") != file_hash(table):
+    if content["episodes"]["sha256"] != file_hash(table):
         raise InputError(
             f"{table}: is not the one that {RESULTS} was written with, or is cut short; {REMEDY}"
         )
-    result = BenchmarkResult(dict(content), read_episodes(table))
+    result = BenchmarkResult(dict(content), read_episodes(table, content["episodes"]["rows"]))
     _check_agree(result, str(where))
     return result
 
 
 def _check_agree(result: BenchmarkResult, where: str) -> None:
     """The rows must be those of the contestants, tasks and seeds that the summary names."""
-    count, episodes = result.summary["seeds"].get("count"), result.episodes
-    for name in KEYS:
-        if name not in episodes:
-            raise InputError(f"{where}: column '{name}' of {EPISODES} is missing; {REMEDY}")
+    count, episodes = result.summary["seeds"]["count"], result.episodes
     rows = Counter(zip(episodes["contestant"].tolist(), episodes["task"].tolist(), strict=True))
     told = {
-        (one, task): found.get("runs", 0)
+        (one, task): found["runs"]
         for task, by_name in result.summary["tasks"].items()
         for one, found in by_name.items()
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +15,23 @@ from agents.engines.jobs import check_engine, run_jobs
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import oracle_costs
 from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
-from shipgym.checks import check_number, check_whole
+from shipgym.checks import ANY_KEY, Shape, check_number, check_shape, check_whole
 from shipgym.errors import InputError
 
 if TYPE_CHECKING:
     from agents.verification.chain import Progress
+
+
+#: What `results_of` returns.
+PART: Shape = {
+    "refused": (str,),
+    "runs": [
+        {
+            "episodes": {ANY_KEY: (np.ndarray,)}, "failure": (str,), "seconds_per_action": (int, float),
+            "policy_sha256": (str, NoneType),
+        }
+    ],
+}  # fmt: skip
 
 
 def benchmark(
@@ -76,10 +89,24 @@ def benchmark(
         keep=None if folder is None else folder / PARTS,
         progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
     )  # fmt: skip
+    for job, one in zip(jobs, found, strict=True):
+        _check_part(one, episodes, f"part of '{job['contestant']}' on '{job['task']}'")
     done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
     for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
         done[one.name, task.name] = results_of(one, task, suite, episodes)
     return gathered(suite, chosen, who, done, episodes).save(folder)
+
+
+def _check_part(part: Any, episodes: int, where: str) -> None:
+    """Refuse a result of `results_of` that is another: it may be one that was kept in a file."""
+    check_shape(part, PART, where)
+    names = [sorted(run["episodes"]) for run in part["runs"]]
+    wrong = [
+        values for run in part["runs"] for values in run["episodes"].values()
+        if values.shape != (episodes,) or values.dtype != np.float64
+    ]  # fmt: skip
+    if wrong or any(one != names[0] or "cost" not in one for one in names):
+        raise InputError(f"{where}: expected the cost and other figures of {episodes} episodes")
 
 
 def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:

@@ -97,6 +97,6 @@ def number(value: float | None, decimals: int) -> str:
 
 def between(interval: Mapping[str, Any], decimals: int) -> str:
     """An interval, a dash where there is none."""
-    if interval["low"] is None:
+    if interval["low"] is None or interval["high"] is None:
         return "-"
     return f"{interval['low']:.{decimals}f} to {interval['high']:.{decimals}f}"

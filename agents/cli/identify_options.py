@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import functools
 import inspect
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Annotated, Any, get_type_hints
@@ -12,6 +11,7 @@ from typing import Annotated, Any, get_type_hints
 import typer
 
 from shipgym.errors import InputError
+from shipgym.files import toml_value
 from shipgym.trials.identify_table import FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
 TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
@@ -92,13 +92,5 @@ def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
         name, sign, value = text.partition("=")
         if not sign or not name.strip():
             raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
-        found[name.strip()] = _value(value.strip())
+        found[name.strip()] = toml_value(value.strip())
     return check_options(found, "--set")
-
-
-def _value(text: str) -> Any:
-    """A value of TOML; anything else is a text without quotes."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text

@@ -15,6 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from agents.controllers.batched_lq import lq_rows
+from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Flags, Floats, deviations
@@ -67,9 +68,27 @@ class AdaptiveLQ(Stateful):
 
     kind: ClassVar[str] = "lq-adaptive"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {"prior": ("equations", "terms")}
+    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {"prior": (N_EQUATIONS, N_TERMS)}
+    ranges: ClassVar[Mapping[str, Range]] = {
+        **Controller.ranges,
+        "length": Range(1e-2, 1e4),
+        "speed": Range(1e-3, 1e3),
+        "sway_error": Range(1e-9, 1e6),
+        "yaw_error": Range(1e-9, 1e6),
+        "gear_lag": Range(0.0, 1e4),
+        "integral_time": Range(1e-3, 1e9),
+        "rate_weight_s2": Range(1e-9, 1e9),
+        "rudder_weight": Range(1e-9, 1e9, RUDDER_WEIGHT),
+        "restless_limit": Range(1e-9, 1e3),
+        "forgetting": Range(1e-6, 1.0),
+        "redesign_steps": Range(1.0, 1e9),
+    }
 
     prior: Floats
+
+    def __post_init__(self) -> None:
+        if self.prior[1, 2] == 0.0:
+            raise InputError("arrays.prior[1][2]: 0 found, expected the yaw acceleration per rudder")
 
     @classmethod
     def from_model(
@@ -263,7 +282,7 @@ class AdaptiveLQ(Stateful):
             self.design["dt"],
             self.design["rate_weight_s2"],
             self.design["integral_time"],
-            self.design.get("rudder_weight", RUDDER_WEIGHT),  # older files name none
+            self.design["rudder_weight"],
         )
         good = np.isfinite(rows).all(axis=1) & (np.abs(neutral[:, 0]) < LARGEST_RUDDER)
         which, neutral, rows, A, B = which[good], neutral[good], rows[good], A[good], B[good]

@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self
+from typing import Any, ClassVar, NamedTuple, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,18 @@ Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
+
+
+class Range(NamedTuple):
+    """Least and largest value of a number, and what it is where an older file lacks it."""
+
+    least: float
+    largest: float
+    default: float | None = None
+
+
+#: Of gains and other numbers that no controller says more about, and of observation scales; SI units.
+NUMBERS, SCALES = Range(-1e9, 1e9), Range(1e-9, 1e9)
 
 
 class Policy(Protocol):
@@ -105,8 +117,10 @@ class Controller:
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
-    #: Arrays that the file holds beside the gains: names of fields, and of the lengths of their axes.
-    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {}
+    #: Arrays that the file holds beside the gains: names of fields, and their axes: a length, or its name.
+    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {}
+    #: What it needs of `design`, with its range; also ranges of gains that are not any number.
+    ranges: ClassVar[Mapping[str, Range]] = {"dt": Range(1e-3, 1e4)}
 
     gains: dict[str, float]
     neutral_rudder: float

@@ -24,13 +24,24 @@ from typing import Any
 
 import numpy as np
 
-from agents.controllers.controller import FORMAT, Controller, check_names
+from agents.controllers.controller import FORMAT, NUMBERS, SCALES, Controller, Range, check_names
 from agents.controllers.linear_loop import Margins
 from agents.controllers.registry import controller_class, controller_kinds
-from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import (
+    check_array,
+    check_choice,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    placed,
+    quoted,
+    shown,
+)
 from shipgym.errors import InputError
 
 REMEDY = "design the controller again or take another copy"
+RUDDER, ANY = Range(-np.pi, np.pi), Range(-np.inf, np.inf)  # rad; any finite number
 FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
@@ -65,21 +76,26 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     _check_observations(content["observation_names"], design.observes, where)
     more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
     if design.has_autopilot:
-        more["autopilot"] = read_controller(
-            check_table(content["autopilot"], f"{where}: autopilot"), f"{where}: autopilot"
+        at = f"{where}: autopilot"
+        more["autopilot"] = read_controller(check_table(content["autopilot"], at), at)
+        if more["autopilot"].has_autopilot:
+            raise InputError(f"{at}: '{more['autopilot'].kind}' found, expected one that keeps a heading")
+    gains = dict.fromkeys(design.gain_names or tuple(design.feedback), NUMBERS)
+    needed = {name: one for name, one in design.ranges.items() if name not in gains}
+    of_gains = {name: design.ranges.get(name, one) for name, one in gains.items()}
+    with placed(where):
+        return design(
+            gains=_numbers(content["gains"], of_gains, f"{where}: gains"),
+            neutral_rudder=_number(content["neutral_rudder"], RUDDER, f"{where}: neutral_rudder"),
+            neutral_sway=_number(content["neutral_sway"], NUMBERS, f"{where}: neutral_sway"),
+            margins=_margins(content["margins"], f"{where}: margins"),
+            observation_scales=read_scales(content["observation_scales"], design.observes, where),
+            model_name=check_text(model.get("name"), f"{where}: model.name"),
+            model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
+            design=_design(content["design"], needed, f"{where}: design"),
+            observation_names=design.observes,
+            **more,
         )
-    return design(
-        gains=_numbers(content["gains"], design.gain_names or tuple(design.feedback), f"{where}: gains"),
-        neutral_rudder=check_number(content["neutral_rudder"], f"{where}: neutral_rudder"),
-        neutral_sway=check_number(content["neutral_sway"], f"{where}: neutral_sway"),
-        margins=_margins(content["margins"], f"{where}: margins"),
-        observation_scales=read_scales(content["observation_scales"], design.observes, where),
-        model_name=check_text(model.get("name"), f"{where}: model.name"),
-        model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
-        design=_design(content["design"], f"{where}: design"),
-        observation_names=design.observes,
-        **more,
-    )
 
 
 def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
@@ -88,27 +104,23 @@ def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], wher
             raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(expected)}")
 
 
-def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict[str, Any]:
-    """Arrays of finite numbers, whose axes of one name have one length."""
+def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]], where: str) -> dict[str, Any]:
+    """Arrays of numbers, whose axes of one name have one length."""
     table = check_table(value, where)
     check_keys(table, tuple(axes), where)
-    lengths: dict[str, int] = {}
+    lengths: dict[str | int, int] = {}
     arrays = {}
     for name, named in axes.items():
         if name not in table:
             raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
-        try:
-            array = np.array(table[name], dtype=np.float64)
-        except (TypeError, ValueError):
-            raise InputError(f"{where}.{name}: expected nested lists of numbers; {REMEDY}") from None
-        fits = array.ndim == len(named) and bool(np.isfinite(array).all())
-        if fits:
-            fits = all(lengths.setdefault(axis, n) == n for axis, n in zip(named, array.shape, strict=True))
-        if not fits:
+        shape = tuple(lengths.get(axis) if isinstance(axis, str) else axis for axis in named)
+        array = check_array(table[name], shape, f"{where}.{name}")
+        if array.ndim != len(named) or not array.size or np.abs(array).max() > NUMBERS.largest:
             raise InputError(
-                f"{where}.{name}: shape {array.shape} or a number that is not finite found, expected finite "
-                f"numbers of shape ({', '.join(named)}); {REMEDY}"
+                f"{where}.{name}: expected numbers of magnitude {NUMBERS.largest:g} at most, of shape "
+                f"({', '.join(map(str, named))}); {REMEDY}"
             )
+        lengths |= dict(zip(named, array.shape, strict=True))
         arrays[name] = array
     return arrays
 
@@ -116,7 +128,7 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str, ...]], where: str) -> dict
 def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> None:
     """The observations must be those of the environment, in its order."""
     if not isinstance(names, list):
-        raise InputError(f"{where}: observation_names: {names!r} found, expected a list of names")
+        raise InputError(f"{where}: observation_names: {shown(names)} found, expected a list of names")
     check_names([str(name) for name in names], expected, f"{where}: observation_names")
 
 
@@ -124,34 +136,40 @@ def read_scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, 
     """Observation scales, positive numbers, one for each name."""
     n = len(names)
     if not isinstance(value, list) or len(value) != n:
-        found = len(value) if isinstance(value, list) else repr(value)
+        found = len(value) if isinstance(value, list) else shown(value)
         raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
     return tuple(
-        check_number(scale, f"{where}: observation_scales[{i}] ('{names[i]}')", above=0.0)
+        _number(scale, SCALES, f"{where}: observation_scales[{i}] ('{names[i]}')")
         for i, scale in enumerate(value)
     )
 
 
-def _numbers(value: Any, names: tuple[str, ...], where: str) -> dict[str, float]:
-    """A finite number for each name and none besides."""
+def _number(value: Any, allowed: Range, where: str) -> float:
+    """A number within its range."""
+    return check_number(value, where, at_least=allowed.least, at_most=allowed.largest)
+
+
+def _numbers(value: Any, ranges: Mapping[str, Range], where: str) -> dict[str, float]:
+    """A number for each name and none besides."""
     table = check_table(value, where)
-    check_keys(table, names, where)
-    for name in names:
-        if name not in table:
-            raise InputError(f"{where}: '{name}' is missing, expected {quoted(names)}")
-    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+    check_keys(table, tuple(ranges), where)
+    return _design(table, ranges, where)
 
 
 def _margins(value: Any, where: str) -> Margins:
     """Margins; null is no limit."""
     names = tuple(margin.name for margin in fields(Margins))
     table = check_table(value, where)
-    finite = {name: number for name, number in table.items() if number is not None}
-    unlimited = {name: np.inf for name, number in table.items() if number is None}
-    known = _numbers({**finite, **dict.fromkeys(unlimited, 0.0)}, names, where)
-    return Margins(**{**known, **unlimited})
+    finite = {name: 0.0 if number is None else number for name, number in table.items()}
+    known = _numbers(finite, dict.fromkeys(names, ANY), where)
+    return Margins(**{name: np.inf if table[name] is None else known[name] for name in names})
 
 
-def _design(value: Any, where: str) -> dict[str, float]:
-    table = check_table(value, where)
-    return {name: check_number(number, f"{where}.{name}") for name, number in table.items()}
+def _design(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, float]:
+    """Numbers by name, all that are needed among them."""
+    later = {name: one.default for name, one in needed.items() if one.default is not None}
+    table = later | dict(check_table(value, where))
+    for name in needed:
+        if name not in table:
+            raise InputError(f"{where}: '{name}' is missing, expected {quoted(needed)}; {REMEDY}")
+    return {name: _number(number, needed.get(name, ANY), f"{where}.{name}") for name, number in table.items()}

@@ -13,6 +13,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.pid import PID
@@ -39,6 +40,13 @@ class FilteredPID(Stateful):
 
     kind: ClassVar[str] = "pid-filtered"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = PID.feedback
+    ranges: ClassVar[Mapping[str, Range]] = {
+        **Controller.ranges,
+        "reference_frequency": Range(0.0, 1e3),
+        "largest_turn_rate": Range(0.0, 1e3),
+        "tracking_rate": Range(0.0, 1e3),
+        "wave_frequency": Range(0.0, 1e3),
+    }
 
     @classmethod
     def from_model(

@@ -174,6 +174,13 @@ def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) 
     )
 
 
+def check_stable(matrix: Floats, where: str) -> None:
+    """Refuse a sampled linear system that grows by itself, with an InputError that begins with `where`."""
+    largest = float(np.abs(np.linalg.eigvals(matrix)).max())
+    if not largest < 1.0:
+        raise InputError(f"{where}: a sampled pole of size {largest:.4g} found, expected all below 1")
+
+
 def _crossing(omega: Floats, size: Floats) -> float:
     """Frequency at which a response first falls to -3 dB, between two samples; the last where it does not."""
     beyond = np.flatnonzero(size < np.sqrt(0.5))

@@ -12,13 +12,14 @@ on Control Systems Technology 31 (adaptive).
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from agents.controllers.controller import Action, Controller, Policy
+from agents.controllers.controller import NUMBERS, Action, Controller, Policy, Range
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats, begun, checked_observation
@@ -44,6 +45,12 @@ class Guided(Controller):
     observes: ClassVar[tuple[str, ...]] = (*OBSERVATION_NAMES, "cross_track")
     gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead", "integral")
     has_autopilot: ClassVar[bool] = True
+    ranges: ClassVar[Mapping[str, Range]] = {
+        **Controller.ranges,
+        "lookahead": Range(1e-6, NUMBERS.largest),
+        "task_lookahead": Range(1e-6, NUMBERS.largest),
+        "integral": Range(0.0, NUMBERS.largest),
+    }
 
     autopilot: Policy  # steers by the first eight observations, those of course keeping
 

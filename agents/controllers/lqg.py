@@ -12,6 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import (
     ERROR,
     INTEGRAL,
@@ -20,6 +21,7 @@ from agents.controllers.linear_loop import (
     YAW_RATE,
     Compensator,
     SampledShip,
+    check_stable,
     length_time,
     sample_ship,
     sampled_ships,
@@ -28,6 +30,7 @@ from agents.controllers.lq import LQ, lq_gain, lq_settings
 from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
+from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise
 from shipgym.tasks.guidance import wrapped
@@ -35,6 +38,7 @@ from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL
 
 OUTPUTS = (YAW_RATE, ERROR)  # measured, columns of the first three states
+STATES = (3, 5)  # how many: sway, yaw rate and heading error; in waves two more
 COURSE_NOISE = np.radians(0.02)  # how much the course to steer may move between two measurements, rad
 NEW_COURSE = np.radians(1.0)  # least jump of the heading error that is a new course, rad
 GATE = 6.0  # such a jump in standard deviations of what noise explains
@@ -64,17 +68,26 @@ class LQG(Stateful):
 
     kind: ClassVar[str] = "lqg"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
         "transition": ("states", "states"),
         "input": ("states",),
-        "kalman": ("states", "outputs"),
-        "output": ("outputs", "states"),
+        "kalman": ("states", len(OUTPUTS)),
+        "output": (len(OUTPUTS), "states"),
     }
+    ranges: ClassVar[Mapping[str, Range]] = {**Controller.ranges, "new_course_rad": Range(1e-6, 10.0)}
 
     transition: Floats
     input: Floats
     kalman: Floats
     output: Floats
+
+    def __post_init__(self) -> None:
+        if len(self.input) not in STATES:
+            raise InputError(
+                f"arrays.input: {len(self.input)} states found, expected {STATES[0]} or {STATES[1]}"
+            )
+        trusted = np.eye(len(self.input)) - self.kalman @ self.output
+        check_stable(trusted @ self.transition, "arrays: transition of the Kalman filter")
 
     @classmethod
     def from_model(

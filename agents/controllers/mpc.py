@@ -20,7 +20,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from agents.controllers.linear_loop import RUDDER, SIGNALS, length_time, sample_ship
+from agents.controllers.controller import Controller, Range
+from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, length_time, sample_ship
 from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from agents.controllers.stateful import Stateful
@@ -31,6 +32,7 @@ from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
 
 ACCURACY = 1e-4  # of the solver, rad
 MOST_ITERATIONS = 20_000
+MOST_STEPS = 640  # of a horizon: 20 ship lengths with any control interval that environments take
 STEP_SIZE = 2.0  # of the solver (its rho), fixed so that an answer depends on the question alone
 
 
@@ -58,13 +60,26 @@ class MPC(Stateful):
 
     kind: ClassVar[str] = "mpc"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
-        "transition": ("signals", "signals"),
-        "effect": ("signals",),
+    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
+        "transition": (len(SIGNALS), len(SIGNALS)),
+        "effect": (len(SIGNALS),),
+    }
+    ranges: ClassVar[Mapping[str, Range]] = {
+        **Controller.ranges,
+        "horizon_steps": Range(2, MOST_STEPS),
+        "rudder_rate_rad_s": Range(1e-6, 1e3),
     }
 
     transition: Floats
     effect: Floats
+
+    def __post_init__(self) -> None:
+        steps = self.design["horizon_steps"]
+        check_number(steps, "horizon_steps", at_most=MOST_STEPS, hint="a shorter horizon or longer interval")
+        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
+        check_number(stays, "arrays.transition: share of the rudder that stays", at_least=0.0, at_most=1.0)
+        check_number(moves, "arrays.effect: share of an order that is followed", at_least=1e-6, at_most=1.0)
+        check_stable(self.transition + np.outer(self.effect, self._row), "arrays.transition")
 
     @classmethod
     def from_model(
@@ -131,8 +146,7 @@ class MPC(Stateful):
         state = deviations(seen, self.neutral_rudder, self.neutral_sway)
         rudder = np.clip(state[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
         state[:, RUDDER] = rudder
-        row = np.array([self.gains[signal] for signal in SIGNALS])
-        orders: Floats = np.einsum("ij,j->i", state, row)
+        orders: Floats = np.einsum("ij,j->i", state, self._row)
         lowest, highest = self._bounds(limit)
         planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
         for ship in np.flatnonzero(np.any((planned < lowest) | (planned > highest), axis=1)):
@@ -140,11 +154,15 @@ class MPC(Stateful):
             orders[ship] = self._within(orders[ship], rudder[ship], limit)
         return self.neutral_rudder + orders, memory
 
+    @property
+    def _row(self) -> Floats:
+        """LQ's gains."""
+        return np.array([self.gains[signal] for signal in SIGNALS])
+
     @cached_property
     def plan(self) -> Plan:
         """How commands and rudder follow from the state and from corrections of LQ's commands."""
-        steps = int(self.design["horizon_steps"])
-        row = np.array([self.gains[signal] for signal in SIGNALS])
+        steps, row = int(self.design["horizon_steps"]), self._row
         closed = self.transition + np.outer(self.effect, row)
         limited = np.stack([row, closed[RUDDER] - np.eye(len(SIGNALS))[RUDDER]])  # command, rudder's change
         by_state = np.empty((2, steps, len(SIGNALS)))

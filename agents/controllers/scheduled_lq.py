@@ -43,15 +43,18 @@ class ScheduledLQ(Stateful):
 
     kind: ClassVar[str] = "lq-scheduled"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str, ...]]] = {
+    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
         "speeds": ("speeds",),
-        "schedule": ("speeds", "signals"),
-        "neutral": ("speeds", "rudder and sway"),
+        "schedule": ("speeds", len(SIGNALS)),
+        "neutral": ("speeds", 2),
     }
 
     speeds: Floats
     schedule: Floats
     neutral: Floats
+
+    def __post_init__(self) -> None:
+        _rising(self.speeds.tolist())
 
     @classmethod
     def from_model(

@@ -10,6 +10,7 @@ import base64
 import hashlib
 import json
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from shipgym.files import read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
 LONGEST_IN_MESSAGE = 200  # characters
+_NUMBERS_OR_TEXTS = re.compile(r"[<>|=][biufcU]\d{1,6}")  # types of arrays
 
 
 def serialised(job: Any, where: str) -> str:
@@ -71,13 +73,15 @@ def pack(value: Any) -> Any:
 
 
 def unpack(value: Any) -> Any:
-    """The result that `pack` was given."""
+    """The result that `pack` was given; Lookup-, Type-, Value- or OverflowError if it is broken."""
     if isinstance(value, list):
         return [unpack(item) for item in value]
     if not isinstance(value, dict):
         return value
     if list(value) == [ARRAY]:
         dtype, shape, data = value[ARRAY]
+        if not _NUMBERS_OR_TEXTS.fullmatch(dtype):
+            raise ValueError(f"array of {dtype}")
         return np.frombuffer(base64.b64decode(data), dtype).reshape(shape).copy()
     if list(value) == [FLOAT]:
         return float(value[FLOAT])
@@ -114,11 +118,12 @@ class KeptResults:
         """The packed result of a job, None where there is none yet or its file is broken."""
         try:
             content = read_json(self._path(text), "result", "it is computed again")
-        except InputError:
+            unpack(content["result"]["value"])
+        except (InputError, LookupError, TypeError, ValueError, OverflowError):
             return None
         same = all(content.get(name) == value for name, value in self._key(text).items())
-        result = content.get("result")
-        return result if same and isinstance(result, dict) else None
+        result: dict[str, Any] = content["result"]
+        return result if same else None
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job; the file is written whole or not at all.

@@ -47,7 +47,7 @@ from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
-from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, quoted
+from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, placed, quoted
 from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES
@@ -109,7 +109,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
     place = _texts(content["environment"], ("id",), f"{where}: environment", more=("options",))
     model = _texts(content["model"], ("name", "sha256"), f"{where}: model")
     base = content["base"]
-    try:
+    with placed(where):
         return LearnedPolicy(
             network=_network(content["network"], tensors, prefix, f"{where}: network"),
             observation_names=names,
@@ -125,8 +125,6 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             model_sha256=model["sha256"],
             training=dict(check_table(content["training"], f"{where}: training")),
         )
-    except InputError as error:
-        raise InputError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
 
 
 def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> Shielded:
@@ -144,7 +142,7 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
     known = [one.name for one in fields(Limits)]
     check_keys(limits, known, f"{where}: limits")
     numbers = {name: check_number(limits.get(name), f"{where}: limits.{name}") for name in known}
-    try:
+    with placed(where):
         return Shielded(
             policy=policy,
             fallback=read_controller(_table(content["fallback"], "fallback", where), f"{where}: fallback"),
@@ -152,8 +150,6 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
             envelope=read_envelope(content["envelope"], f"{where}: envelope"),
             limits=Limits(**numbers),
         )
-    except InputError as error:
-        raise InputError(str(error) if str(error).startswith(where) else f"{where}: {error}") from None
 
 
 def _network(value: Any, tensors: Tensors, prefix: str, where: str) -> Network:

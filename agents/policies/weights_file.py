@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
-from shipgym.files import write_bytes, write_json
+from shipgym.files import LARGEST_TENSORS, read_bytes, write_bytes, write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
 
@@ -59,14 +59,7 @@ def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
 
     Raises InputError if they are missing, broken, or those of another policy.
     """
-    try:
-        content = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: there is no such file, expected the weights of {json_path}; the two belong side by side"
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    content = read_bytes(path, f"file with the weights of {json_path}", LARGEST_TENSORS)
     found = hashlib.sha256(content).hexdigest()
     if found != sha256:
         raise InputError(

@@ -17,7 +17,6 @@ A suite is a TOML file of `agents/suites`:
 from __future__ import annotations
 
 import hashlib
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
@@ -32,6 +31,7 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.ship_env import read_options
 from shipgym.errors import InputError
+from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
@@ -149,10 +149,7 @@ def parse_suite(text: str, where: str) -> Suite:
 
     Raises InputError naming the field at fault.
     """
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from None
+    content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     tasks = check_table(content.get("tasks"), f"{where}: tasks")
     return Suite(

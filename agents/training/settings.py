@@ -12,7 +12,6 @@ A file of a user's own, and `--set`, name settings without tables.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import Field, asdict, dataclass, field, fields, replace
 from importlib.resources import files
@@ -23,6 +22,7 @@ from agents.controllers.registry import controller_kinds
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
+from shipgym.files import parse_toml, read_toml, toml_value
 from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
@@ -261,7 +261,7 @@ def load_settings(
     check_choice(action, ACTIONS, "action")
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.training").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
-    content = _parsed(text, where)
+    content = parse_toml(text, f"{where}:")
     check_keys(content, ("defaults", "residual", "suite", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
     if action == "rudder" and (given or {}).get("base") != "none":
@@ -306,14 +306,8 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 
     Raises InputError if it cannot be read, or names an unknown setting.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise InputError(f"{path}: there is no such settings file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as text ({error})") from None
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-    return _settings(_parsed(text, str(path)), kind, str(path))
+    return _settings(read_toml(path, "settings file"), kind, str(path))
 
 
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:
@@ -326,23 +320,13 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
         name, sign, value = (part.strip() for part in text.partition("="))
         if not sign or not name:
             raise InputError(f"{where}: {text!r} found, expected name=value, such as {where} gamma=0.98")
-        try:
-            found[name] = tomllib.loads(f"value = {value}")["value"]
-        except tomllib.TOMLDecodeError:
-            found[name] = value
+        found[name] = toml_value(value)
     return found
 
 
 def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by their present names, where some have older ones."""
     return {RENAMED.get(name, name): value for name, value in settings.items()}
-
-
-def _parsed(text: str, where: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{where}: not TOML: {error}") from None
 
 
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import NoneType
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ import numpy as np
 from agents.engines.jobs import HERE, JobEngine
 from agents.training.plan import Plan, check_same
 from agents.training.settings import changed
-from shipgym.checks import check_whole
+from shipgym.checks import Shape, check_shape, check_whole
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json, write_text
 
@@ -41,6 +42,8 @@ EVALUATIONS = 10  # of a trial
 CONFIGURATION, STUDY, KEPT, BEST = "study.json", "study.db", "trials", "best.toml"
 
 LAST = 2**62  # steps, after all evaluations
+#: What a training returns.
+TRIAL: Shape = {"cost": (int, float, NoneType), "curve": [[(int,), (int, float)]], "ended": (str,)}
 
 #: Cost of each evaluation of a training, by its steps.
 Curve = Sequence[tuple[int, float]]
@@ -189,6 +192,7 @@ def _job(plan: Plan, settings: Mapping[str, Any], found: Sequence[Trial]) -> dic
 def _trial(
     number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Mapping[str, Any]
 ) -> Trial:
+    check_shape(result, TRIAL, f"trial {number}")
     curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
     return Trial(number, parameters, settings, result["cost"], curve, result["ended"])
 

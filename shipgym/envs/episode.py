@@ -18,6 +18,7 @@ from shipgym.checks import (
     check_table,
     check_text,
     check_whole,
+    placed,
     quoted,
 )
 from shipgym.envs.episode_file import from_file, to_file
@@ -102,13 +103,11 @@ class Episode:
     def __post_init__(self) -> None:
         check_text(self.environment, "environment")
         check_text(self.model, "model")
-        check_number(self.dt, "dt", above=0.0)
-        length = check_number(self.length, "length", above=0.0)
-        check_number(self.rudder_limit, "rudder_limit", above=0.0, at_most=np.pi / 2.0)
-        if self.beam is not None:
-            check_number(self.beam, "beam", above=0.0, at_most=length)
-        if self.corridor is not None:
-            check_number(self.corridor, "corridor", above=0.0)
+        most = {"rudder_limit": np.pi / 2.0, "beam": self.length}
+        for name in ("dt", "length", "rudder_limit", "beam", "corridor"):
+            value = getattr(self, name)
+            if value is not None or name not in ("beam", "corridor"):
+                self._set(name, check_number(value, name, above=0.0, at_most=most.get(name)))
         check_table(self.arguments, "arguments")
         if self.seed is not None:
             check_whole(self.seed, "seed", at_least=0)
@@ -199,10 +198,8 @@ class Episode:
         Raises InputError, naming the file and the field at fault.
         """
         content = read_json(Path(path), "episode file", "record the episode again or take another copy")
-        try:
+        with placed(str(path)):
             return cls(**from_file(content))
-        except InputError as error:
-            raise InputError(f"{path}: {error}") from None
 
 
 def series(values: ArrayLike, where: str, count: int | None) -> Floats:

@@ -20,12 +20,12 @@ Format 1:
     outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_keys, check_table, quoted
+from shipgym.checks import check_array, check_keys, check_table
 from shipgym.errors import InputError
 
 FORMAT = 1
@@ -67,46 +67,25 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(
             f"format: {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
         )
-    _exactly(content, ("format", "kind", *TABLES, *PLAIN), "episode file")
+    known = ("format", "kind", *TABLES, *PLAIN)
+    check_keys(content, known, "episode file", known)
     values = {name: content[name] for name in PLAIN}
     for table, names in TABLES.items():
         if table == "path" and content[table] is None:
             continue
-        found = _fields(content, table, names)
+        found = check_table(content[table], table)
+        check_keys(found, names, table, names)
         values |= {name: found[key] for key, name in names.items()}
-    for name in ("actions", "rewards"):
-        _check_numbers(content[name], name)
+    values["rewards"] = check_array(content["rewards"], (None,), "rewards")
+    values["actions"] = check_array(content["actions"], (None, None), "actions")
     if "waypoints" in values:
-        _check_numbers(values["waypoints"], "path.waypoints")
+        values["waypoints"] = check_array(values["waypoints"], (None, 2), "path.waypoints")
     for group in SERIES:
-        for name, numbers in check_table(content[group], group).items():
-            _check_numbers(numbers, f"{group}.{name}")
+        values[group] = {
+            name: check_array(numbers, (None,), f"{group}.{name}")
+            for name, numbers in check_table(content[group], group).items()
+        }
     return values
-
-
-def _fields(content: Mapping[str, Any], name: str, keys: Collection[str]) -> Mapping[str, Any]:
-    """A table within the file that has just these keys."""
-    table = check_table(content[name], name)
-    _exactly(table, keys, name)
-    return table
-
-
-def _exactly(table: Mapping[str, Any], keys: Collection[str], where: str) -> None:
-    check_keys(table, keys, where)
-    for key in keys:
-        if key not in table:
-            raise InputError(f"{where}: '{key}' is missing, expected {quoted(keys)}")
-
-
-def _check_numbers(value: Any, where: str) -> None:
-    """Refuse what NumPy would take for numbers: texts and truth values."""
-    if not isinstance(value, list):
-        raise InputError(f"{where}: {value!r} found, expected a list")
-    for i, entry in enumerate(value):
-        if isinstance(entry, list):
-            _check_numbers(entry, f"{where}[{i}]")
-        elif isinstance(entry, bool) or not isinstance(entry, (int, float)):
-            raise InputError(f"{where}[{i}]: {entry!r} found, expected a number")
 
 
 def _listed(value: Any) -> Any:

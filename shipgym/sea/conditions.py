@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 from shipgym.checks import (
     check_choice,
+    check_flag,
     check_keys,
     check_number,
     check_table,
@@ -98,8 +99,7 @@ class Wind:
         _direction(self, "wind", "from_deg")
         check_choice(self.spectrum, GUST_SPECTRA, "wind spectrum")
         check_coefficients(self.coefficients, "wind coefficients")
-        if not isinstance(self.gust, bool):
-            raise InputError(f"wind gust: {self.gust!r} found, expected true or false")
+        check_flag(self.gust, "wind gust")
 
     @property
     def calm(self) -> bool:
@@ -293,10 +293,7 @@ def _part(kind: type[Any], content: Any, where: str) -> Any:
     if content is None:
         return None
     values = dict(check_table(content, where))
-    check_keys(values, tuple(kind.__dataclass_fields__), where)
-    for name in _NEEDED[kind]:
-        if name not in values:
-            raise InputError(f"{where}: {name} is missing, expected a number")
+    check_keys(values, tuple(kind.__dataclass_fields__), where, _NEEDED[kind])
     if isinstance(values.get("coefficients"), Mapping):
         values["coefficients"] = WindTable.from_dict(values["coefficients"], f"{where} coefficients")
     return kind(**values)

@@ -88,7 +88,7 @@ class WindTable:
     def __post_init__(self) -> None:
         for name in ("angles_deg", "CX", "CY", "CN", "CK"):
             row = getattr(self, name)
-            if row is not None:
+            if row is not None or name != "CK":
                 object.__setattr__(self, name, _row(row, f"wind table {name}"))
                 self._check_length(name)
         rising = all(a < b for a, b in zip(self.angles_deg, self.angles_deg[1:], strict=False))
@@ -116,10 +116,8 @@ class WindTable:
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "wind table") -> WindTable:
         """Read a table as it stands in JSON; InputError for an unknown or missing row."""
         table = check_table(mapping, where)
-        check_keys(table, ("angles_deg", "CX", "CY", "CN", "CK"), where)
-        for name in ("angles_deg", "CX", "CY", "CN"):
-            if name not in table:
-                raise InputError(f"{where}: {name} is missing, expected a list of numbers")
+        needed = ("angles_deg", "CX", "CY", "CN")
+        check_keys(table, (*needed, "CK"), where, needed)
         return cls(**table)
 
 

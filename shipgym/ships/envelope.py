@@ -6,7 +6,6 @@ manoeuvre, the smallest ellipsoid around the data.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -64,11 +63,6 @@ class Envelope:
             "channels": list(CHANNELS), "low": self.low.tolist(), "high": self.high.tolist(),
             "centre": self.centre.tolist(), "shape": self.shape.tolist(),
         }  # fmt: skip
-
-    @classmethod
-    def from_dict(cls, fields: Mapping[str, Any]) -> Envelope:
-        """From a model file."""
-        return cls(*(np.array(fields[name], dtype=float) for name in ("low", "high", "centre", "shape")))
 
 
 def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats, Floats]:

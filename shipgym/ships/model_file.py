@@ -19,15 +19,29 @@ Format 1:
     steering       {"rudder_limit_deg", "rudder_rate_deg_s", "time_constant"}
     envelope       null or {"channels", "low", "high", "centre", "shape"} of u, v, r, delta
     provenance     null or an object
+    sha256         of coefficients and covariance (`numbers_hash`); may be absent
 """
 
+import hashlib
+import json
 from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, quoted
+from shipgym.checks import (
+    check_array,
+    check_choice,
+    check_flag,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    placed,
+    quoted,
+    shown,
+)
 from shipgym.errors import InputError
 from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
@@ -38,12 +52,13 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
+from shipgym.ships.terms import MOST_TERMS
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
 FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
-    "steering", "service_shaft_speed", "envelope", "provenance",
+    "steering", "service_shaft_speed", "envelope", "provenance", "sha256",
 )  # fmt: skip
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
 
@@ -51,11 +66,8 @@ REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steer
 def load(path: Path, make: Callable[..., Model]) -> Model:
     """Read and validate a model file."""
     fields = read_json(path, "model file", "identify the model again or take another copy")
-    try:
+    with placed(str(path)):
         return read_model(fields, str(path), make)
-    except InputError as error:
-        message = str(error)
-        raise InputError(message if message.startswith(str(path)) else f"{path}: {message}") from None
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
@@ -67,10 +79,7 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
         raise InputError(
             f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
         )
-    check_keys(fields, FIELDS, where)
-    for name in REQUIRED:
-        if name not in fields:
-            raise InputError(f"{where}: field '{name}' is missing; a model file has {quoted(FIELDS)}")
+    check_keys(fields, FIELDS, where, REQUIRED)
     dynamics = _dynamics(fields["structure"], f"{where}: structure", make)
     normalisation = dynamics.normalisation
     if fields.get("normalisation", normalisation) != normalisation:
@@ -94,10 +103,24 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
             fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
         ),
     )
+    found = numbers_hash(model)
+    if fields.get("sha256", found) != found:
+        raise InputError(
+            f"{where}: sha256: {shown(fields['sha256'])} found, expected {found!r}, that of the file's "
+            "coefficients and covariance: they were changed after the file was written; take another copy, "
+            "or, if the change is yours, leave out the field sha256"
+        )
     if model.particulars.speed is None:
         raise InputError(f"{where}: particulars.speed: missing, expected the service speed in m/s")
     model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model
+
+
+def numbers_hash(model: ManoeuvringModel) -> str:
+    """SHA-256 of a model's coefficients and covariance, in the order of its structure."""
+    covariance = None if model.covariance is None else model.covariance.tolist()
+    content = json.dumps([model.coefficients, covariance])
+    return hashlib.sha256(content.encode()).hexdigest()
 
 
 def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:
@@ -126,9 +149,7 @@ def _grey_box(
 ) -> GreyBox:
     """A table of terms that is added to a reference ship, which is held whole."""
     reference = check_table(table.get("reference"), f"{where}.reference")
-    shaft = table.get("shaft", False)
-    if not isinstance(shaft, bool):
-        raise InputError(f"{where}.shaft: {shaft!r} found, expected true or false")
+    shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
     return GreyBox(
         structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
         read_model(reference, f"{where}.reference", make), shaft,
@@ -166,8 +187,8 @@ def _check_lists(
     table = check_table(value, where)
     check_keys(table, equations, where)
     for equation, listed in table.items():
-        if not isinstance(listed, list) or not listed:
-            raise InputError(f"{where}.{equation}: expected a list of {what}")
+        if not isinstance(listed, list) or not 0 < len(listed) <= MOST_TERMS:
+            raise InputError(f"{where}.{equation}: expected a list of {what}, 1 to {MOST_TERMS}")
         for i, entry in enumerate(listed):
             place = f"{where}.{equation}[{i}]"
             term = check_table(entry, place)
@@ -192,7 +213,7 @@ def _coefficients(value: Any, structure: Structure | ShipEquations, where: str) 
 
 
 def _matrix(value: Any, n: int, where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    matrix = _numbers(value, (n, n), f"{where}: covariance")
+    matrix = check_array(value, (n, n), f"{where}: covariance")
     if not np.allclose(matrix, matrix.T, rtol=1e-9, atol=0.0):
         raise InputError(f"{where}: covariance: not symmetric")
     if np.any(np.diag(matrix) < 0.0):
@@ -208,17 +229,5 @@ def read_envelope(value: Any, where: str) -> Envelope | None:
     check_keys(table, ("channels", "low", "high", "centre", "shape"), where)
     if table.get("channels") != list(CHANNELS):
         raise InputError(f"{where}.channels: {table.get('channels')!r} found, expected {list(CHANNELS)}")
-    for name, shape in (("low", (4,)), ("high", (4,)), ("centre", (4,)), ("shape", (4, 4))):
-        _numbers(table.get(name), shape, f"{where}.{name}")
-    return Envelope.from_dict(table)
-
-
-def _numbers(value: Any, shape: tuple[int, ...], where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """An array of finite numbers of the given shape."""
-    try:
-        array = np.array(value, dtype=float)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{where}: expected numbers of shape {shape}, all rows of one length") from None
-    if array.shape != shape or not np.all(np.isfinite(array)):
-        raise InputError(f"{where}: shape {array.shape} found, expected {shape} finite numbers")
-    return array
+    shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
+    return Envelope(*(check_array(table.get(name), shapes[name], f"{where}.{name}") for name in shapes))

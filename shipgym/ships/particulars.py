@@ -69,7 +69,7 @@ class Particulars(Mapping[str, Any]):
         For values that no ship has.
     """
 
-    length: float = field(metadata={"bounds": _Bounds(above=0.0)})
+    length: float = field(metadata={"bounds": _Bounds(0.01, 2000.0, hint="between perpendiculars, in m")})
     name: str = "ship"
     beam: float | None = _optional(of_length=1.0)
     draught: float | None = _optional(of_length=0.5)

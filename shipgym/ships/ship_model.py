@@ -16,7 +16,7 @@ from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.model_file import load, read_model
+from shipgym.ships.model_file import load, numbers_hash, read_model
 from shipgym.ships.simulate import simulate
 from shipgym.trials.trial import Trial
 
@@ -117,7 +117,7 @@ class ShipModel(ManoeuvringModel):
 
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.ships.model_file`)."""
-        write_json(self.to_dict(), Path(path))
+        write_json({**self.to_dict(), "sha256": numbers_hash(self)}, Path(path))
 
     @classmethod
     def load(cls, path: str | Path) -> ShipModel:

@@ -3,6 +3,7 @@
 import csv
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,10 +13,13 @@ import numpy.typing as npt
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
-from shipgym.files import read_bytes
+from shipgym.files import LARGEST_CSV, read_text
 
 #: Cells that stand for "no value".
 MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+
+#: Most lines of a file, columns, and characters of a line.
+MOST_LINES, MOST_COLUMNS, LONGEST_LINE = 1_000_000, 1000, 100_000
 
 _REMEDY_TEXT = "save the table as comma-separated text in UTF-8"
 
@@ -55,23 +59,22 @@ class CsvTable:
                 rows, delimiter=self.delimiter, usecols=indices, comments=None, quotechar='"', ndmin=2
             )
         except ValueError:
+            values = np.empty((0, 0))
+        if len(values) != len(rows):  # a cell that is no number, or a quote that is not closed
             values = self._cell_by_cell(rows, indices)
         return np.asarray(values, dtype=np.float64)
 
     def _check_ragged(self) -> None:
         expected = len(self.header)
         for row, text in enumerate(self.rows):
-            if text.count(self.delimiter) + 1 == expected:
+            if text.count(self.delimiter) + 1 == expected and '"' not in text:
                 continue
-            found = len(self._cells(text))
+            found = len(_cells(text, self.delimiter))
             if found != expected:
                 raise InputError(
                     f"{self.path}: {self.place(row)} has {found} cells, expected {expected} as in the "
                     "header; complete or remove the row"
                 )
-
-    def _cells(self, text: str) -> list[str]:
-        return _split(self.path, text, self.delimiter)
 
     def _with_decimal_points(self) -> list[str]:
         """Read decimal commas as points, where the delimiter leaves no doubt."""
@@ -82,7 +85,7 @@ class CsvTable:
     def _cell_by_cell(self, rows: list[str], indices: list[int]) -> npt.NDArray[np.float64]:
         values = np.empty((len(rows), len(indices)))
         for row, text in enumerate(rows):
-            cells = self._cells(text)
+            cells = _cells(text, self.delimiter)
             for k, index in enumerate(indices):
                 cell = cells[index].strip()
                 try:
@@ -111,7 +114,7 @@ def read_table(path: str | Path) -> CsvTable:
         )
     header_line = lines[first]
     delimiter = max(",;\t", key=re.sub('"[^"]*"', "", header_line).count)
-    header = tuple(name.strip() for name in _split(path, header_line, delimiter))
+    header = tuple(name.strip() for name in _cells(header_line, delimiter))
     _check_header(path, header, first + 1)
     blank = delimiter + " \t"
     kept = [(k + 1, line) for k, line in enumerate(lines) if k > first and line.strip(blank)]
@@ -124,44 +127,45 @@ def read_table(path: str | Path) -> CsvTable:
     )
 
 
-def _split(path: Path, line: str, delimiter: str) -> list[str]:
-    try:
-        return next(csv.reader([line], delimiter=delimiter))
-    except csv.Error as error:
-        raise InputError(
-            f"{path}: not CSV text ({error}), expected rows of short cells; {_REMEDY_TEXT}"
-        ) from None
+def _cells(line: str, delimiter: str) -> list[str]:
+    return next(csv.reader([line], delimiter=delimiter))
 
 
 def _read_lines(path: Path) -> list[str]:
-    data = read_bytes(path, "CSV file")
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError(f"{path}: the file is in UTF-16, expected UTF-8; {_REMEDY_TEXT}")
-    if b"\x00" in data:
-        position = data.index(b"\x00")
+    text = read_text(path, "CSV file", LARGEST_CSV)
+    if "\0" in text:
         raise InputError(
-            f"{path}: binary content (a zero byte at byte {position}), expected CSV text; {_REMEDY_TEXT}"
+            f"{path}: binary content (a zero byte at byte {text.index(chr(0))}), expected CSV text; "
+            f"{_REMEDY_TEXT}"
         )
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    n_lines = text.count("\n") + 1
+    if n_lines > MOST_LINES:
+        raise InputError(f"{path}: {n_lines} lines found, expected at most {MOST_LINES}; split the file")
+    lines = text.split("\n")
+    longest = max(map(len, lines))
+    if longest > LONGEST_LINE:
+        line = next(k for k, text in enumerate(lines, start=1) if len(text) == longest)
         raise InputError(
-            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text "
-            f"(binary content, or another encoding); {_REMEDY_TEXT}"
-        ) from None
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+            f"{path}: line {line} {longest} characters found, expected at most {LONGEST_LINE}; {_REMEDY_TEXT}"
+        )
+    return lines
 
 
 def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+    if len(header) > MOST_COLUMNS:
+        raise InputError(
+            f"{path}: line {line} names {len(header)} columns, expected at most {MOST_COLUMNS}; leave out "
+            "those that are not needed"
+        )
     unprintable = next((name for name in header if not name.isprintable()), None)
     if unprintable is not None:
         raise InputError(f"{path}: line {line} holds {unprintable!r}, expected column names; {_REMEDY_TEXT}")
-    for k, name in enumerate(header):
-        if name and name in header[:k]:
-            raise InputError(
-                f"{path}: line {line}: column '{name}' stands twice in the header; rename or remove one"
-            )
+    twice = [name for name, count in Counter(header).items() if name and count > 1]
+    if twice:
+        raise InputError(
+            f"{path}: line {line}: column '{twice[0]}' stands twice in the header; rename or remove one"
+        )
     if all(_is_number(name) for name in header):
         raise InputError(
             f"{path}: line {line} holds only numbers, expected a header with column names "

@@ -25,7 +25,7 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
     n = t.size
     step = (t[-1] - t[0]) / (n - 1)
     s = (t - t[0]) / step
-    size = float(np.abs(values).max()) or 1.0
+    size = max(float(np.abs(values).max()), 1e-290)
     best = make_interp_spline(s, values, k=min(3, n - 1))
     before: tuple[int, float] | None = None
     spacing = 2

@@ -18,6 +18,9 @@ _DEGREE = math.pi / 180.0
 LIMITS: dict[str, float] = {
     "psi": 100.0, "r": 60.0 * _DEGREE, "p": 360.0 * _DEGREE, "phi": 180.0 * _DEGREE, "delta": 90.0 * _DEGREE,
     "delta_command": 90.0 * _DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
+    "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
+    "r_wave": 60.0 * _DEGREE, "phi_wave": 180.0 * _DEGREE, "p_wave": 360.0 * _DEGREE,
+    "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
 }  # fmt: skip
 
 _FASTEST_TURN = 60.0 * _DEGREE

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only
+from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.errors import InputError
-from shipgym.files import check_readable, read_bytes
+from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.columns import parse_columns
@@ -58,7 +57,7 @@ class ShipFile:
         missing CSV file, naming file, field, value and remedy.
         """
         path = Path(path)
-        data = _read_toml(path)
+        data = read_toml(path, "ship file")
         check_keys(data, _SECTIONS, str(path))
         if "ship" not in data:
             raise InputError(
@@ -77,10 +76,8 @@ class ShipFile:
 
     def completed_particulars(self) -> Particulars:
         """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
-        try:
+        with placed(str(self.path)):
             return self.particulars.completed()
-        except InputError as error:
-            raise InputError(f"{self.path}: {error}") from None
 
     def trials(self, use: str | None = None) -> list[Trial]:
         """Read the trials of a use, by default all but those to skip, each named by its ``file``.
@@ -100,29 +97,14 @@ class ShipFile:
 
     def _read(self, entry: TrialEntry) -> Trial:
         c = entry.conventions
-        try:
+        with placed(entry.where):
             trial = Trial.from_csv(
                 entry.path, entry.columns, c.rudder_positive, c.velocity_frame, origin=c.origin, xg=c.xg,
                 repair=c.repair, name=entry.file, kind=entry.kind, use=entry.use,
                 length=self.particulars.length,
             )  # fmt: skip
-        except InputError as error:
-            raise InputError(f"{entry.where}: {error}") from None
         check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
         return trial
-
-
-def _read_toml(path: Path) -> dict[str, Any]:
-    data = read_bytes(path, "ship file (TOML)")
-    try:
-        return tomllib.loads(data.decode("utf-8-sig"))
-    except UnicodeDecodeError as error:
-        line = data[: error.start].count(b"\n") + 1
-        raise InputError(
-            f"{path}: line {line} holds byte 0x{data[error.start]:02x}, expected TOML text in UTF-8"
-        ) from None
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not valid TOML: {error}; correct that line") from None
 
 
 def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> tuple[TrialEntry, ...]:
@@ -142,8 +124,9 @@ def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> t
         _entry(path, f"{path}: [[trials]] {k}", table, columns, conventions, particulars)
         for k, table in enumerate(tables, start=1)
     ]
-    for k, entry in enumerate(entries):
-        if os.path.normpath(entry.path) in {os.path.normpath(other.path) for other in entries[:k]}:
+    by_path = {os.path.normpath(entry.path): entry for entry in reversed(entries)}
+    for entry in entries:
+        if by_path[os.path.normpath(entry.path)] is not entry:
             raise InputError(f"{entry.where} file: '{entry.file}' is listed twice, expected each file once")
     if all(entry.use == "skip" for entry in entries):
         raise InputError(
@@ -171,10 +154,8 @@ def _entry(
     own_conventions = {key: table[key] for key in _CONVENTIONS if key in table}
     csv_path = path.parent / file
     if use != "skip":
-        try:
+        with placed(f"{where} file"):
             check_readable(csv_path, "CSV file")
-        except InputError as error:
-            raise InputError(f"{where} file: {error}") from None
     return TrialEntry(
         file=file,
         path=csv_path,

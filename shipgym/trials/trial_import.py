@@ -25,6 +25,8 @@ REPAIRS = ("interpolate",)
 #: A run of more rows without a value that lasts more median time steps is too long to fill.
 LONGEST_HOLE_ROWS = 10
 LONGEST_HOLE_STEPS = 20.0
+#: Time that goes on by less stands still.
+SHORTEST_STEP_S = 1e-9
 
 
 @dataclass(frozen=True)
@@ -77,8 +79,8 @@ def import_csv(
         channel: values[:, k] * si_factor(channel, column.unit)
         for k, (channel, column) in enumerate(chosen.items())
     }
-    t = recorded.pop("t")
     check_ranges(recorded, source)
+    t = recorded.pop("t")
     if "psi" in recorded:
         raw_psi = recorded["psi"]
         recorded["psi"] = np.unwrap(raw_psi)
@@ -242,10 +244,10 @@ def _check_time(values: Floats, source: Source) -> None:
             f"{source.table.path}: {t.size} samples found, expected at least 3 rows below the header; "
             "export the whole manoeuvre"
         )
-    back = np.diff(t) <= 0.0
+    back = np.diff(t) <= SHORTEST_STEP_S / si_factor("t", unit)
     if back.any():
         k = int(np.argmax(back))
-        verb = "stands still at" if t[k + 1] == t[k] else f"goes back from {t[k]:.10g} to"
+        verb = "stands still at" if t[k + 1] >= t[k] else f"goes back from {t[k]:.10g} to"
         raise InputError(
             f"{source.at(k + 1, 't')}: time {verb} {t[k + 1]:.10g} {unit}, expected it to increase from row "
             "to row; sort the rows, remove the repeated ones, or split the file into one per run"

@@ -3,11 +3,13 @@
 import json
 import math
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from agents import LQ, PID, load_agent
+from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.mariner import mariner
@@ -130,3 +132,82 @@ def test_a_controller_of_another_ship_is_refused_with_the_difference(tmp_path):
         load_agent(path, mariner(service_speed=4.0))
     with pytest.raises(InputError, match=r"the scale of 'rudder' .*another ship or rudder limit"):
         load_agent(path, replace(MARINER, steering=SteeringGear(35.0, 5.0, 1.0)))
+
+
+CORPUS = sorted((Path(__file__).parents[1] / "corpus" / "controller").glob("*.json"))
+
+
+def changed(path, tmp_path, change):
+    content = json.loads(path.read_text())
+    change(content)
+    target = tmp_path / path.name
+    target.write_text(json.dumps(content))
+    return target
+
+
+def test_there_is_a_file_of_every_kind():
+    assert set(BUILT_IN) == {path.stem for path in CORPUS}
+
+
+@pytest.mark.parametrize("path", CORPUS, ids=lambda path: path.stem)
+def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_path):
+    """Not when it steers: a horizon of 2^32 steps asks for 64 GiB there."""
+    kind = controller_class(path.stem)
+    for name, (least, largest, default) in kind.ranges.items():
+        place = "gains" if name in kind.gain_names else "design"
+        for value in (None, "1", least - 1.0, largest * 2.0):
+            with pytest.raises(InputError, match=rf"{place}.{name}: .* found, expected a number >= "):
+                load_agent(
+                    changed(
+                        path, tmp_path, lambda content, v=value, n=name, p=place: content[p].update({n: v})
+                    )
+                )
+        without = changed(path, tmp_path, lambda content, n=name, p=place: content[p].pop(n))
+        if default is None:
+            with pytest.raises(InputError, match=f"{place}: '{name}' is missing"):
+                load_agent(without)
+        else:
+            assert load_agent(without).design[name] == default
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "message"),
+    [
+        (
+            "lqg",
+            lambda arrays: arrays["kalman"][0].append(1.0),
+            r"arrays.kalman\[0\]: 3 entries .* 2 numbers",
+        ),
+        ("lqg", lambda arrays: arrays["kalman"][0].__setitem__(0, 1e5), "a sampled pole of size .* below 1"),
+        (
+            "lqg",
+            lambda arrays: arrays["output"].pop(),
+            "arrays.output: 1 entries found, expected a list of 2",
+        ),
+        ("mpc", lambda arrays: arrays["effect"].__setitem__(3, 0.0), "share of an order .* 0 found"),
+        ("mpc", lambda arrays: arrays["transition"][0].__setitem__(0, 9.0), "a sampled pole of size"),
+        ("lq-scheduled", lambda arrays: arrays["speeds"].sort(reverse=True), "speeds: .* in rising order"),
+        ("lq-scheduled", lambda arrays: arrays["neutral"][0].pop(), "expected a list of 2 numbers"),
+        (
+            "lq-adaptive",
+            lambda arrays: arrays["prior"][1].__setitem__(2, 0.0),
+            "the yaw acceleration per rudder",
+        ),
+        (
+            "lq-adaptive",
+            lambda arrays: arrays["prior"][1].__setitem__(2, 1e30),
+            "of magnitude 1e\\+09 at most",
+        ),
+    ],
+)
+def test_matrices_that_no_design_has_are_refused(kind, change, message, tmp_path):
+    path = next(path for path in CORPUS if path.stem == kind)
+    with pytest.raises(InputError, match=message):
+        load_agent(changed(path, tmp_path, lambda content: change(content["arrays"])))
+
+
+def test_guidance_leads_what_keeps_a_heading(tmp_path):
+    path = next(path for path in CORPUS if path.stem == "los")
+    nested = changed(path, tmp_path, lambda content: content.update(autopilot=json.loads(path.read_text())))
+    with pytest.raises(InputError, match="autopilot: 'los' found, expected one that keeps a heading"):
+        load_agent(nested)

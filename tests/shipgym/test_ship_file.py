@@ -178,10 +178,10 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
     [
         ("length = 7.0", "length = -7.0", ": [ship] length: -7 found, expected a number > 0"),
         ("length = 7.0", 'length = "7.0"', ": [ship] length: '7.0' (a text"),
-        ("length = 7.0", "length = nan", ": [ship] length: nan found"),
+        ("length = 7.0", "length = nan", ": ship.length: nan found, expected a number"),
         ("length = 7.0", "length = true", ": [ship] length: True found"),
         ("length = 7.0", "", ": [ship] length: missing"),
-        ("length = 7.0", f"length = 1{'0' * 400}", ": [ship] length: inf found"),
+        ("length = 7.0", f"length = 1{'0' * 400}", "0 found, expected a whole number of at most 64 bits"),
         ("beam =", "beem =", ": [ship]: unknown key 'beem'. Did you mean 'beam'?"),
         ("Y_vdot", "Y_wdot", ": [ship] added_mass: unknown key 'Y_wdot'. Did you mean 'Y_vdot'?"),
         ("[steering]", "[stearing]", ": unknown key 'stearing'. Did you mean 'steering'?"),
@@ -244,11 +244,11 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
     with pytest.raises(InputError, match="this is a folder"):
         ShipFile.load(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
-    with pytest.raises(InputError, match="line 2 holds byte 0xff, expected TOML"):
+    with pytest.raises(InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"):
         ShipFile.load(tmp_path / "ship.toml")
 
 
-@pytest.mark.parametrize("file", ["b.csv", "x" * 300, "\\u0000", "runs"])
+@pytest.mark.parametrize("file", ["b.csv", "x" * 300, "runs", "/dev/zero"])
 def test_a_missing_trial_is_refused_on_loading(folder, file):
     assert refusal(folder, '"a.csv"', f'"{file}"').startswith(": [[trials]] 1 file: ")
     (folder / "a.csv").rename(folder / "a_.csv")

@@ -470,12 +470,24 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
         (b"time,speed\n0,1\n", "no column is named like a channel"),
         (b"t,speed\n0,1\n", "no column is named like a channel"),
         (b"u,v\n0,1\n", "column 't' not found"),
-        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "not CSV text"),
+        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "200003 characters found, expected at most 100000"),
+        (b",".join(b"c%d" % i for i in range(1001)), "line 1 names 1001 columns, expected at most 1000"),
+        (b"t,u\n" + b"\n" * 1_000_000, "1000002 lines found, expected at most 1000000"),
+        (b't\tu\tv\n0\t"1\t2\nx\t1\t2\n', "line 2 (data row 1) has 2 cells, expected 3"),
+        (b't,u,c\n0,1,"\n5",3,4\n2,1,0\n3,1,0\n', "line 3 (data row 2), column 't': '5\"' found"),
+        (b"t,x\n0,1\n1,1e150\n2,1\n", "x = 1e+150 m found, expected at most 1e+08 m"),
+        (b"t,u\n0,1\n1e200,1\n2e200,1\n", "t = 1e+200 s found, expected at most 1e+10 s"),
+        (b"t,u\n0,1\n1e-300,1\n1,1\n", "time stands still at 1e-300 s"),
     ],
 )
 def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
     (tmp_path / "run.csv").write_bytes(content)
     assert message in refusal(tmp_path / "run.csv")
+
+
+def test_a_heading_of_the_smallest_numbers_is_differentiated(tmp_path):
+    (tmp_path / "run.csv").write_text("t,psi\n" + "".join(f"{k},5e-324\n" for k in range(70)))
+    assert np.abs(Trial.from_csv(tmp_path / "run.csv")["r"]).max() < 1e-300
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):

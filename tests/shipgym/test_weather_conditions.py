@@ -89,10 +89,10 @@ def test_weather_survives_json(weather):
         (lambda: Current(0.5, time_constant=0.0), "current time_constant: 0 found"),
         (lambda: Weather(wind=5.0), r"weather wind: 5.0 found, expected shipgym.Wind\(...\) or None"),
         (lambda: Weather.from_dict({"winds": {}}), "unknown key 'winds'. Did you mean 'wind'"),
-        (lambda: Weather.from_dict({"wind": {}}), "weather wind: speed is missing"),
+        (lambda: Weather.from_dict({"wind": {}}), "weather wind: field 'speed' is missing"),
         (
             lambda: Weather.from_dict({"wind": {"speed": 1.0, "coefficients": {"CX": []}}}),
-            "angles_deg is missing",
+            "'angles_deg' is missing",
         ),
         (lambda: WindTable((0, 90), (0, 0), (0, 0), (0, 0)), "at least three that rise from 0 to 180"),
         (lambda: WindTable((0, 90, 180), (0, 0), (0, 0, 0), (0, 0, 0)), "CX: 2 values found, expected 3"),

@@ -1,0 +1,186 @@
+"""The kinds of files that are read, a line each in `KINDS`.
+
+A new reader joins with a line: its name, the function that reads a path, and what is done with the result,
+so that a field which nobody checked fails here. Small sound files of the kind go into `tests/corpus/NAME`.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import warnings
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Console
+
+from agents import load_agent, load_results
+from agents.cli.benchmark_tables import costs_table, ranking_table
+from agents.engines.jobs import run_jobs
+from agents.engines.serialisation import KeptResults, serialised
+from agents.suites.suite import parse_suite
+from agents.training.plan import Plan, training_options
+from agents.training.run_folder import other_versions, read_plan
+from agents.training.settings import load_settings, read_settings_file
+from fuzzing.reading import CORPUS, Kind
+from shipgym import Episode, ShipFile, ShipModel, Trial
+from shipgym.envs.episode_file import to_file
+from shipgym.files import LARGEST_TOML, read_bytes
+
+SHOWN = Console(file=io.StringIO(), width=120)
+JOBS: list[dict[str, Any]] = [{"number": 1}, {"number": 2}]
+
+
+def written(fields: Any) -> None:
+    """What was read can be written again."""
+    json.dumps(fields, allow_nan=False).encode()
+
+
+def use_model(model: ShipModel) -> None:
+    """Accelerations of a ship that sails straight ahead, and of one that turns."""
+    written(model.to_dict())
+    with np.errstate(all="ignore"):
+        model.derivatives(model.service_state, model.service_command)
+        if model.covariance is not None:
+            model.sample(1, 0)
+
+
+def use_agent(agent: Any) -> None:
+    """Commands for three ships, again with what it remembers, and its file."""
+    n = len(agent.observation_names)
+    seen = np.linspace(-0.9, 0.8, 3 * n).reshape(3, n)
+    state = None
+    for _ in range(3):
+        with np.errstate(all="ignore"):
+            action, state = agent.predict(seen, state, np.array([False, True, False]))
+        if action.shape[0] != 3 or not np.all(np.abs(action) <= 1.0):
+            raise AssertionError(f"commands {action.tolist()}")
+    written(agent.file_fields()[0] if hasattr(agent, "file_fields") else agent.to_dict())
+    if hasattr(agent, "loop"):
+        with np.errstate(all="ignore"):
+            agent.loop()
+
+
+def use_results(result: Any) -> None:
+    """The tables that are printed, and every figure."""
+    for table in (ranking_table(result), costs_table(result)):
+        SHOWN.print(table)
+    for task, found in result.summary["tasks"].items():
+        for name in found:
+            result.figures(name, task)
+    written(result.summary)
+
+
+def use_episode(episode: Episode) -> None:
+    """As a trial, and its file."""
+    written(to_file(vars(episode)))
+    if episode.n_steps > 1:
+        episode.to_trial()
+
+
+def use_plan(plan: Plan) -> None:
+    """What it is written as, and the environment that is learned in."""
+    written(plan.configuration())
+    training_options(plan)
+
+
+def use_ship(trials: list[Trial]) -> None:
+    """All channels are finite."""
+    for trial in trials:
+        if not all(np.isfinite(values).all() for values in (trial.t, *trial.channels.values())):
+            raise AssertionError(f"{trial.name}: not finite")
+
+
+def read_run(path: Path) -> Plan:
+    """The folder of a training."""
+    other_versions(path.parent)
+    return read_plan(path.parent)
+
+
+def read_suite(path: Path) -> Any:
+    """A suite from its text."""
+    return parse_suite(read_bytes(path, "suite", LARGEST_TOML).decode("utf-8", "replace"), path.name)
+
+
+def read_settings(path: Path) -> Any:
+    """Settings as `shipgym train --settings` takes them."""
+    return load_settings("ppo", given=read_settings_file(path, "ppo")).to_dict()
+
+
+def squared(job: dict[str, Any]) -> dict[str, Any]:
+    """A job."""
+    return {"squares": np.arange(3.0) ** job["number"], "lowest": np.inf, "name": "a"}
+
+
+def keep_results(folder: Path) -> None:
+    """Results of jobs, as a benchmark or a study that goes on finds them."""
+    run_jobs(squared, JOBS[:1], keep=folder)
+
+
+def read_kept(path: Path) -> Any:
+    """Jobs of which some are done."""
+    folder, text = path.parent, serialised(JOBS[0], "job")
+    kept = KeptResults(folder, squared).load(text)
+    return None if kept is None else run_jobs(squared, JOBS[:1], keep=folder)
+
+
+@cache
+def training() -> Any:
+    """A run into which checkpoints are put back, the one that the corpus's is of."""
+    import torch
+
+    from agents.training import training as trainings
+
+    torch.set_num_threads(1)
+    vars(trainings)["N_EVALUATIONS"] = 1
+    with warnings.catch_warnings(action="ignore"):  # random numbers in plain Python overflow, as they should
+        return trainings._Training(read_plan(CORPUS / "run" / "ppo"), None, None, None)
+
+
+def restored(path: Path) -> Any:
+    """A run that goes on from a checkpoint."""
+    with np.errstate(over="ignore"):  # as above
+        training().restore(path)
+    return training()
+
+
+def use_training(run: Any) -> None:
+    """What it does next, and its checkpoint."""
+    from agents.training import checkpoints
+
+    run.agent.predict(run.agent._last_obs)
+    checkpoints.take(run.agent)
+    written(run._found)
+
+
+def keep_study(folder: Path) -> None:
+    """A study before its first trial."""
+    from agents.training.tuning import _opened
+
+    _opened(folder / "ppo", read_plan(CORPUS / "run" / "ppo"), ())
+
+
+def read_study(path: Path) -> Any:
+    """The trials that a study has on record."""
+    from agents.training.tuning import _opened
+
+    return _opened(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
+
+
+KINDS = (
+    Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
+    Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
+    Kind("model", ShipModel.load, use_model, slow=2),
+    Kind("controller", load_agent, use_agent),
+    Kind("policy", load_agent, use_agent, main="agent.json"),
+    Kind("episode", Episode.load, use_episode),
+    Kind("results", load_results, use_results, main="results.json", slow=8),
+    Kind("run", read_run, use_plan, main="run.json", slow=8),
+    Kind("checkpoint", restored, use_training, slow=4),
+    Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
+    Kind("suite", read_suite, slow=2),
+    Kind("settings", read_settings, slow=8),
+    Kind("kept-result", read_kept, prepare=keep_results),
+)

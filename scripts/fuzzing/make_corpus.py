@@ -1,0 +1,185 @@
+"""Write the corpus of the fuzz again: one small sound file, or folder of files, of everything that is read.
+
+PYTHONPATH=scripts python -m fuzzing.make_corpus    into tests/corpus
+
+Files that are there stay as they are: the corpus also says that what was written once can still be read.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import agents
+import shipgym
+from agents.controllers.registry import BUILT_IN, controller_class
+from agents.policies.network import Network
+from agents.policies.policy import LearnedPolicy
+from agents.policies.shield import Shielded
+from agents.suites.suite import FOLDER
+from agents.training import training
+from agents.training.plan import Given, make_plan
+from agents.training.training import train
+from shipgym import Episode, Particulars, ShipFile, ShipModel
+from shipgym.ships.catalogue import xu_ship
+from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
+
+CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
+EXAMPLE = Path(shipgym.__file__).parent / "examples" / "mariner"
+ROWS = 40  # of a trial
+COASTER = Particulars(
+    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+)
+
+
+def trials(folder: Path) -> None:
+    """The example's ship file with the beginning of two of its trials."""
+    ship = folder / "ship-file" / "mariner"
+    ship.mkdir(parents=True)
+    text = (EXAMPLE / "ship.toml").read_text().partition('[[trials]]\nfile = "zigzag_15_15.csv"')[0]
+    (ship / "ship.toml").write_text(text)
+    for name in ("zigzag_20_20.csv", "zigzag_35_30_port.csv"):
+        lines = (EXAMPLE / name).read_text().splitlines(keepends=True)
+        (ship / name).write_text("".join(lines[: ROWS + 1]))
+    trial = ShipFile.load(ship / "ship.toml").trials()[0]
+    (folder / "trial").mkdir()
+    trial.to_csv(folder / "trial" / "own.csv")
+    rows = [f"{0.5 * k};{0.1 * k:.2f};0,0{k % 5};{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
+    (folder / "trial" / "semicolons.csv").write_text("\n".join(["t;psi;r;delta", *rows]))
+
+
+def models(folder: Path) -> None:
+    """Tables of terms with a covariance and without, own equations, a grey box, captive tests."""
+    folder.joinpath("model").mkdir()
+    for name in ("mariner-nomoto", "kvlcc2-rm-svm", "mariner"):
+        shipgym.load_model(name).save(folder / "model" / f"{name}.json")
+    xu_ship(COASTER).save(folder / "model" / "captive.json")
+
+
+def controllers(folder: Path) -> None:
+    """One of every kind."""
+    folder.joinpath("controller").mkdir()
+    for kind in BUILT_IN:
+        made: Any = controller_class(kind)
+        given = {"autopilot": agents.PID.from_model(SHIP)} if made.has_autopilot else {}
+        made.from_model(SHIP, **given).save(folder / "controller" / f"{kind}.json")
+
+
+def network(*sizes: int) -> Network:
+    """Weights at random."""
+    random = np.random.default_rng(0)
+    return Network(
+        tuple(
+            (random.normal(0, 0.3, (b, a)).astype(np.float32), random.normal(0, 0.1, b).astype(np.float32))
+            for a, b in pairwise(sizes)
+        )
+    )
+
+
+def policies(folder: Path) -> None:
+    """Learned, residual with a frame stack, and shielded."""
+    common: dict[str, Any] = {
+        "observation_names": OBSERVATION_NAMES,
+        "observation_scales": tuple(observation_scales(SHIP).tolist()),
+        "model_name": SHIP.name,
+        "training": {"algorithm": "ppo", "steps": 10},
+    }
+    learned = LearnedPolicy(network(8, 4, 1), **common)
+    residual = LearnedPolicy(
+        network(17, 4, 1),
+        base=agents.PID.from_model(SHIP),
+        authority=0.5,
+        frame_stack=2,
+        action_repeat=2,
+        **common,
+    )
+    discrete = LearnedPolicy(network(8, 4, 9), action="rudder-discrete", **common)
+    shielded = Shielded.from_model(shipgym.load_model("mariner-nomoto"), learned)
+    made: dict[str, Any] = {
+        "learned": learned,
+        "residual": residual,
+        "discrete": discrete,
+        "shielded": shielded,
+    }
+    for name, policy in made.items():
+        folder.joinpath("policy", name).mkdir(parents=True)
+        policy.save(folder / "policy" / name / "agent.json")
+
+
+def episode(folder: Path) -> None:
+    """A few steps along a path."""
+    n = 6
+    names = ("x", "y", "psi", "u", "v", "r", "delta")
+    states = {name: np.linspace(0.1, 1.0 / 3.0, n + 1) + k for k, name in enumerate(names)}
+    made = Episode(
+        environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17,
+        rudder_limit=0.7, states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1),
+        rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)},
+        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, corridor=60.0,
+        waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
+        arguments={"model": "mariner", "sea": {"wind": None}}, seed=7, number=3, truncated=True, success=True,
+    )  # fmt: skip
+    folder.joinpath("episode").mkdir()
+    made.save(folder / "episode" / "path.json")
+
+
+def results(folder: Path) -> None:
+    """A benchmark of two controllers."""
+    made = agents.benchmark("pid,lq", tasks=["mariner-calm", "mariner-current"], episodes=3)
+    folder.joinpath("results").mkdir()
+    made.save(folder / "results" / "two")
+
+
+def run(folder: Path) -> None:
+    """The folder of a training in the midst of it."""
+    settings = {
+        "base": "none", "ships": 2, "n_steps": 8, "batch_size": 8, "n_epochs": 1, "total_steps": 32,
+        "net_arch": [4], "evaluate_every": 16,
+    }  # fmt: skip
+    options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
+    vars(training)["N_EVALUATIONS"] = 2
+    target = folder / "run" / "ppo"
+    target.parent.mkdir()
+    train(make_plan(Given("ppo", options=options, settings=settings)), target)
+    for entry in target.iterdir():
+        if entry.name not in ("run.json", "checkpoint.safetensors"):
+            shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+
+
+def texts(folder: Path) -> None:
+    """Files of suites and of settings."""
+    folder.joinpath("suite").mkdir()
+    text = (FOLDER / "shipgym-v1.toml").read_text()
+    names = ("mariner-calm", "mariner-rough", "container-path")
+    tables = ["[tasks." + part for part in text.split("\n[tasks.")[1:]]
+    chosen = [one for one in tables if one.startswith(tuple(f"[tasks.{name}" for name in names))]
+    (folder / "suite" / "three.toml").write_text('name = "three"\n\n' + "\n".join(chosen))
+    folder.joinpath("settings").mkdir()
+    (folder / "settings" / "ppo.toml").write_text(
+        'gamma = 0.98\nnet_arch = [64, 64]\nlog_std_end = "learned"\nbase = "lq"\nauthority = 0.5\n'
+    )
+
+
+MAKERS: tuple[Callable[[Path], None], ...] = (
+    trials, models, controllers, policies, episode, results, run, texts,
+)  # fmt: skip
+SHIP: ShipModel = shipgym.load_model("mariner")
+
+if __name__ == "__main__":
+    CORPUS.mkdir(exist_ok=True)
+    draft = CORPUS.with_name(".corpus.draft")
+    shutil.rmtree(draft, ignore_errors=True)
+    draft.mkdir()
+    for make in MAKERS:
+        make(draft)
+    for path in sorted(draft.rglob("*")):
+        there = CORPUS / path.relative_to(draft)
+        if path.is_file() and not there.exists():
+            there.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, there)
+    shutil.rmtree(draft)

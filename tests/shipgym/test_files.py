@@ -1,0 +1,102 @@
+"""Files are read within limits, and each refusal is one message."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from shipgym.errors import InputError
+from shipgym.files import parse_json, parse_toml, read_bytes, read_json, read_toml, toml_value
+
+
+def said(read, *arguments):
+    with pytest.raises(InputError) as caught:
+        read(*arguments)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"a": {"b": [1, NaN]}}', "a.json: a.b[1]: nan found, expected a number of magnitude"),
+        ('{"a": 1e999}', "a.json: a: inf found, expected a number of magnitude 1e+100 at most"),
+        ('{"a": -1e101}', "a.json: a: -1e+101 found, expected a number of magnitude 1e+100 at most"),
+        ('{"a": 99999999999999999999}', "99 found, expected a whole number of at most 64 bits"),
+        ('{"a": %s}' % ("9" * 5000), "a.json: a whole number of more than 64 bits found"),
+        ('{"a": 1, "b": 2, "a": 3}', "a.json: key 'a' stands twice, expected each once"),
+        ('{"a": "\\ud800"}', "found, expected a text without null bytes and halves of characters"),
+        ('{"a\\u0000": 1}', "expected a text of at most 4096 characters"),
+        ("[" * 21 + "]" * 21, "lists or tables nest deeper than 20"),
+        ("[" * 100_000, "a.json: lists or tables nest deeper than 20"),
+        ("[" + "1," * 1_000_000 + "1]", "a.json: more than 1000000 values found"),
+        ('{"a": ', "a.json: broken JSON (Expecting value: line 1 column 7 (char 6)); the file may"),
+    ],
+)  # fmt: skip
+def test_json_beyond_the_limits_is_refused(text, message):
+    assert message in said(parse_json, text, "a.json:", "x")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (".".join("a" * 20_000) + " = 1", "a.toml: a dotted key of over 20 parts found"),
+        ('a = { "b" . ' + ' . '.join(["'c'"] * 20) + " = 1 }", "a.toml: a dotted key of over 20 parts found"),
+        ("a = [1, nan]", "a.toml: a[1]: nan found"),
+        ("a = 1979-05-27", "a.toml: a: datetime.date(1979, 5, 27) found, expected a text, a number"),
+        ("a = " + "[" * 5000, "a.toml: lists or tables nest deeper than 20"),
+        ("a = " + "9" * 5000, "a.toml: a whole number of more than 64 bits found"),
+        ("a = 1\na = 2", "a.toml: not valid TOML: Cannot overwrite a value"),
+    ],
+)  # fmt: skip
+def test_toml_beyond_the_limits_is_refused(text, message):
+    assert message in said(parse_toml, text, "a.toml:")
+
+
+def test_what_is_within_the_limits_is_read():
+    assert parse_json("[" * 20 + "]" * 20, "a.json:", "x")
+    seed = 2**128 - 1
+    assert parse_json(f'{{"seed": {seed}, "a": "\\ud83d\\ude00"}}', "a.json:", "x") == {
+        "seed": seed,
+        "a": "😀",
+    }
+    assert parse_toml("C = inf\n# a.b.c " + "a." * 19 + "\nx = [" + "1.5, " * 40 + "]", "a.toml:")[
+        "C"
+    ] == float("inf")
+    assert [toml_value(text) for text in ("3", "[1, 2]", "slow", "nan")] == [3, [1, 2], "slow", "nan"]
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("/dev/zero", "this is no regular file (a device, a pipe or a socket), expected a model file"),
+        (".", ": this is a folder, expected a model file"),
+        ("x" * 5000, "File name too long"),
+        ("a\0b", "embedded null byte"),
+        ("\udc80", "there is no such model"),
+        ("none/none", "there is no such model"),
+        ("/proc/self/mem", "/proc/self/mem: broken JSON"),
+    ],
+)  # fmt: skip
+def test_only_regular_files_are_opened(tmp_path, name, message):
+    assert message in said(read_json, tmp_path / name, "model file", "x")
+
+
+def test_a_pipe_is_refused_without_waiting_for_its_writer(tmp_path):
+    os.mkfifo(tmp_path / "pipe")
+    assert "pipe: this is no regular file" in said(read_toml, tmp_path / "pipe", "ship file")
+
+
+def test_a_file_larger_than_its_kind_may_be_is_not_read(tmp_path):
+    path = Path(tmp_path / "a.toml")
+    path.write_bytes(b"#" * (2**18 + 1))
+    assert "262145 bytes found, expected a ship file (TOML) of at most 262144 bytes" in said(
+        read_toml, path, "ship file"
+    )
+    assert read_bytes(path, "file", 2**18 + 1) == path.read_bytes()
+
+
+def test_the_middle_of_an_endless_message_is_left_out():
+    text = str(InputError("a.json: " + "x" * 100_000 + ": take another copy"))
+    assert text.startswith("a.json: xxx")
+    assert text.endswith("xxx: take another copy")
+    assert len(text) < 2100
