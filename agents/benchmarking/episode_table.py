@@ -20,7 +20,7 @@ KEYS = ("contestant", "task", "run", "seed")
 #: Figures that are yes or no, and numbers of events: so they are in the file; missing ones are null.
 FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 COUNTS = ("interventions",)
-MOST_NUMBERS = 20_000_000  # of a table
+MOST_NUMBERS = 5_000_000  # of a table; characters of a column of texts
 
 
 def joined(
@@ -74,9 +74,7 @@ def read_episodes(path: Path, rows: int) -> Columns:
         if found != rows or rows * len(names) > MOST_NUMBERS:
             raise InputError(f"{path}: {len(names)} columns of {found} rows found, expected {rows} rows")
         if len(set(names)) < len(names) or not set(KEYS) <= set(names):
-            raise InputError(
-                f"{path}: columns {quoted(names)} found, expected {quoted(KEYS)} and figures, once"
-            )
+            raise InputError(f"{path}: columns {quoted(names)} found, expected {quoted(KEYS)} and figures")
         return {name: _column(arrow, name, file.read([name]).column(0)) for name in names}
     except InputError:
         raise
@@ -87,7 +85,10 @@ def read_episodes(path: Path, rows: int) -> Columns:
 def _column(arrow: Any, name: str, values: Any) -> NDArray[Any]:
     """A column of the file as an array; ValueError or TypeError if it is of another type."""
     if name in KEYS[:2]:
-        return np.array(values.cast(arrow.string()).to_pylist(), dtype=np.str_)
+        texts = values.cast(arrow.string()).to_pylist()
+        if len(texts) * max(map(len, texts), default=0) > MOST_NUMBERS:
+            raise ValueError(f"column '{name}' of long texts")
+        return np.array(texts, dtype=np.str_)
     if not (arrow.types.is_integer(values.type) or arrow.types.is_floating(values.type) or name in FLAGS):
         raise TypeError(f"column '{name}' of {values.type}")
     kind = arrow.int64() if name in KEYS else arrow.float64()

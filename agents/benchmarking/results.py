@@ -1,21 +1,6 @@
 """What a benchmark found: one row an episode, and the summary with its intervals; both as files.
 
-`results.json`, format 1:
-
-    format, kind         1, "shipgym-benchmark"
-    versions             {name: version}, and the processor: bit for bit on equal ones only
-    suite                {"name", "sha256", "tasks": {task: {"environment", "model", "model_sha256", "why"}}}
-    seeds                {"first", "count"}
-    contestants          {name: {"source", "files": {path: sha256}, "runs", "refused": {task: why}}}
-    tasks                {task: {name: {"cost", "cost_iqm", "score": {"value", "low", "high"},
-                            "relative_cost", "runs", "lost", "failed", "failure", "policy_sha256",
-                            "microseconds_per_action", "metrics": {name: {"mean", "median", "p95"}}}}}
-    reference            {task: {"pid", "oracle"}}: costs that are scores of 0 and 1
-    ranking              [{"name", "score", "relative_cost", "tasks", "lost", "failed"}], best first
-    improvement          {name: {other: {"value", "low", "high"}}}
-    profile              {"thresholds", "shares": {name: [...]}}
-    episodes             {"file", "rows", "sha256"}
-
+What stands in `results.json` is told by `agents.benchmarking.results_shape`.
 `episodes.parquet` has one row for each contestant, task, run and seed, with the figures of `metrics`.
 """
 
@@ -35,7 +20,7 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import Contestant, file_hash, names_code
 from agents.benchmarking.episode_table import Columns, check_library, joined, read_episodes, write_episodes
-from agents.benchmarking.results_shape import check_summary
+from agents.benchmarking.results_shape import SHAPE, check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
@@ -47,10 +32,7 @@ Floats = NDArray[np.float64]
 
 FORMAT, KIND = 1, "shipgym-benchmark"
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
-FIELDS = (
-    "format", "kind", "versions", "suite", "seeds", "contestants", "tasks", "reference", "ranking",
-    "improvement", "profile", "episodes",
-)  # fmt: skip
+FIELDS = ("format", "kind", *SHAPE)
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control", "osqp")
 REMEDY = "run `shipgym benchmark` again"
 
@@ -62,7 +44,7 @@ class BenchmarkResult:
     Attributes
     ----------
     summary : dict
-        What `results.json` holds (format in the module's docstring).
+        What `results.json` holds (`agents.benchmarking.results_shape`).
     episodes : dict of str to array
         One row an episode: contestant, task, run, seed, and figures by name (`metrics`).
     allow_code : tuple of str

@@ -1,4 +1,4 @@
-"""What stands where in `results.json`, and that it is checked when read."""
+"""What stands where in `results.json`, format 1, and that it is checked when read."""
 
 from __future__ import annotations
 
@@ -8,41 +8,34 @@ from typing import Any
 
 from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whole
 
-NUMBER: Shape = (int, float)
-PERHAPS: Shape = (int, float, NoneType)
+TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
+PERHAPS = (int, float, NoneType)
 INTERVAL: Shape = {"value": PERHAPS, "low": PERHAPS, "high": PERHAPS}
-ENTRY: Shape = {
+TASK: Shape = {"environment": TEXT, "model": TEXT, "model_sha256": TEXT, "why": TEXT}
+CONTESTANT: Shape = {  # files: SHA-256 by path; refused: why, by task
+    "source": (str, NoneType), "files": {ANY_KEY: TEXT}, "runs": COUNT, "refused": {ANY_KEY: TEXT},
+}  # fmt: skip
+FOUND: Shape = {
     "cost": {"value": NUMBER, "low": PERHAPS, "high": PERHAPS}, "cost_iqm": INTERVAL, "score": INTERVAL,
-    "relative_cost": PERHAPS, "runs": (int,), "lost": (int,), "failed": (int,), "failure": (str,),
+    "relative_cost": PERHAPS, "runs": COUNT, "lost": COUNT, "failed": COUNT, "failure": TEXT,
     "policy_sha256": [(str, NoneType)], "microseconds_per_action": PERHAPS,
     "metrics": {ANY_KEY: {"mean": PERHAPS, "median": PERHAPS, "p95": PERHAPS}},
 }  # fmt: skip
-SHAPE: dict[str, Shape] = {
-    "versions": {ANY_KEY: (str,)},
-    "suite": {
-        "name": (str,),
-        "sha256": (str,),
-        "tasks": {ANY_KEY: {"environment": (str,), "model": (str,), "model_sha256": (str,), "why": (str,)}},
-    },
-    "seeds": {"first": (int,), "count": (int,)},
-    "contestants": {
-        ANY_KEY: {
-            "source": (str, NoneType), "files": {ANY_KEY: (str,)}, "runs": (int,),
-            "refused": {ANY_KEY: (str,)},
-        }
-    },
-    "tasks": {ANY_KEY: {ANY_KEY: ENTRY}},
-    "reference": {ANY_KEY: {"pid": NUMBER, "oracle": NUMBER}},
-    "ranking": [
-        {
-            "name": (str,), "score": INTERVAL, "relative_cost": PERHAPS, "tasks": (int,), "lost": (int,),
-            "failed": (int,),
-        }
-    ],
-    "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},
-    "profile": {"thresholds": [NUMBER], "shares": {ANY_KEY: [NUMBER]}},
-    "episodes": {"file": (str,), "rows": (int,), "sha256": (str, NoneType)},
+RANKED: Shape = {
+    "name": TEXT, "score": INTERVAL, "relative_cost": PERHAPS, "tasks": COUNT, "lost": COUNT, "failed": COUNT,
 }  # fmt: skip
+SHAPE: dict[str, Shape] = {
+    "versions": {ANY_KEY: TEXT},  # and the processor: bit for bit on equal ones only
+    "suite": {"name": TEXT, "sha256": TEXT, "tasks": {ANY_KEY: TASK}},
+    "seeds": {"first": COUNT, "count": COUNT},
+    "contestants": {ANY_KEY: CONTESTANT},
+    "tasks": {ANY_KEY: {ANY_KEY: FOUND}},  # by task and contestant
+    "reference": {ANY_KEY: {"pid": NUMBER, "oracle": NUMBER}},  # costs that are scores of 0 and 1, by task
+    "ranking": [RANKED],  # best first
+    "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},  # probability that one costs less than another
+    "profile": {"thresholds": [NUMBER], "shares": {ANY_KEY: [NUMBER]}},
+    "episodes": {"file": TEXT, "rows": COUNT, "sha256": (str, NoneType)},
+}
 
 
 def check_summary(content: Mapping[str, Any], where: str) -> None:

@@ -22,16 +22,11 @@ if TYPE_CHECKING:
     from agents.verification.chain import Progress
 
 
-#: What `results_of` returns.
-PART: Shape = {
-    "refused": (str,),
-    "runs": [
-        {
-            "episodes": {ANY_KEY: (np.ndarray,)}, "failure": (str,), "seconds_per_action": (int, float),
-            "policy_sha256": (str, NoneType),
-        }
-    ],
+RUN: Shape = {
+    "episodes": {ANY_KEY: (np.ndarray,)}, "failure": (str,), "seconds_per_action": (int, float),
+    "policy_sha256": (str, NoneType),
 }  # fmt: skip
+PART: Shape = {"refused": (str,), "runs": [RUN]}  # what `results_of` returns
 
 
 def benchmark(
@@ -89,9 +84,9 @@ def benchmark(
         keep=None if folder is None else folder / PARTS,
         progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
     )  # fmt: skip
-    for job, one in zip(jobs, found, strict=True):
-        _check_part(one, episodes, f"part of '{job['contestant']}' on '{job['task']}'")
     done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
+    for (name, on), part in done.items():
+        _check_part(part, episodes, f"part of '{name}' on '{on}'")
     for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
         done[one.name, task.name] = results_of(one, task, suite, episodes)
     return gathered(suite, chosen, who, done, episodes).save(folder)
@@ -100,13 +95,13 @@ def benchmark(
 def _check_part(part: Any, episodes: int, where: str) -> None:
     """Refuse a result of `results_of` that is another: it may be one that was kept in a file."""
     check_shape(part, PART, where)
-    names = [sorted(run["episodes"]) for run in part["runs"]]
-    wrong = [
-        values for run in part["runs"] for values in run["episodes"].values()
-        if values.shape != (episodes,) or values.dtype != np.float64
-    ]  # fmt: skip
-    if wrong or any(one != names[0] or "cost" not in one for one in names):
-        raise InputError(f"{where}: expected the cost and other figures of {episodes} episodes")
+    names = {"cost"}.union(*(run["episodes"] for run in part["runs"]))
+    for run in part["runs"]:
+        shapes = {
+            name: values.shape for name, values in run["episodes"].items() if values.dtype.kind in "bif"
+        }
+        if shapes != dict.fromkeys(names, (episodes,)):
+            raise InputError(f"{where}: expected the cost and other figures of {episodes} episodes")
 
 
 def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:

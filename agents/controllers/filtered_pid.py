@@ -27,6 +27,7 @@ DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
 # and second derivative, the integral, and the notch's four numbers of heading and of yaw rate
 LAST_ERROR, LAST_RATE, LEAD, TURN, TURN_RATE, GATHERED, NOTCHES = range(7)
 N_MEMORY = NOTCHES + 8
+FROM_NONE = Range(0.0, 1e3)  # of rates and frequencies; 0 leaves a filter out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,12 +42,9 @@ class FilteredPID(Stateful):
     kind: ClassVar[str] = "pid-filtered"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = PID.feedback
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "reference_frequency": Range(0.0, 1e3),
-        "largest_turn_rate": Range(0.0, 1e3),
-        "tracking_rate": Range(0.0, 1e3),
-        "wave_frequency": Range(0.0, 1e3),
-    }
+        **Controller.ranges, "reference_frequency": FROM_NONE, "largest_turn_rate": FROM_NONE,
+        "tracking_rate": FROM_NONE, "wave_frequency": FROM_NONE,
+    }  # fmt: skip
 
     @classmethod
     def from_model(
