@@ -57,14 +57,12 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
     from agents.cli.terminal import err, prediction_table, print_json
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.result import FILES
     from identification.validation.warnings import why_unstable
 
-    check_folder(out, FILES)
-    with err.status("identifying"):
+    with whole_folder(out, FILES) as draft, err.status("identifying"):
         result = identify_ship(read, settings)
-    with whole_folder(out, FILES) as draft:
         result.save(draft)
     instability = why_unstable(result)
     if as_json:
@@ -93,13 +91,11 @@ def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str |
     from agents.cli.terminal import comparison_table, err, print_json, warn
     from agents.cli.terminal import out as console
     from agents.identifying import compare_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
 
-    check_folder(out, COMPARISON_FILES)
-    with err.status("comparing"):
+    with whole_folder(out, COMPARISON_FILES) as draft, err.status("comparing"):
         found = compare_ship(read, settings, methods)
-    with whole_folder(out, COMPARISON_FILES) as draft:
         found.save(draft)
     if as_json:
         print_json(found.to_dict())
@@ -174,17 +170,14 @@ def reduce_command(
     from agents.cli.terminal import err, prediction_table, print_json
     from agents.cli.terminal import out as console
     from agents.identifying import reduce_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.result import FILES
     from shipgym.files import write_json
 
-    names = (*FILES, "reduction.json")
-    check_folder(out, names)
     read, settings = _chosen(ship, options)
-    with err.status("reducing"):
+    with whole_folder(out, (*FILES, "reduction.json")) as draft, err.status("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
-    with whole_folder(out, names) as draft:
         found.reduced.save(draft)
         write_json(fields, draft / "reduction.json")
     if as_json:
