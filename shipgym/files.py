@@ -8,7 +8,7 @@ import socket
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from errno import EBUSY, EXDEV
+from errno import EBUSY, ENOENT, EXDEV
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -37,7 +37,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
         yield draft
         _take_place(draft, path)
     except OSError as error:
-        remedy = "" if os.path.isdir(path.parent) else "; choose a folder that exists"
+        remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
         raise InputError(f"{path}: cannot be written ({error.strerror or error}){remedy}") from error
     finally:
         with suppress(OSError):

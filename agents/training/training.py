@@ -120,8 +120,8 @@ def train(
     Raises
     ------
     InputError
-        If another process uses the folder; if it holds something already, or, to resume, nothing or a run of another configuration; if
-        the ship and the settings do not go together; or if the networks diverge.
+        If another process uses the folder; if it holds something already, or, to resume, nothing or a run of
+        another configuration; if the ship and the settings do not go together; or if the networks diverge.
     """
     folder = None if out is None else Path(out)
     if resume and folder is None:

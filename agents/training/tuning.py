@@ -101,8 +101,8 @@ def tune(
     Raises
     ------
     InputError
-        If Optuna is missing, another process uses the folder, it holds a study of something else or anything else, or every trial
-        of the first batch diverges.
+        If Optuna is missing, another process uses the folder, it holds a study of something else or anything
+        else, or every trial of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
     with in_use(Path(out)):
