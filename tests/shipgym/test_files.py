@@ -38,7 +38,7 @@ def test_drafts_of_dead_processes_are_removed_by_the_next_writer_beside(tmp_path
     write_text("whole", tmp_path / "new")
     assert {path.name for path in tmp_path.iterdir()} == {"new", ".mine.draft", living.name, elsewhere.name}
     for path in (living, elsewhere):
-        os.utime(path, (os.path.getmtime(path) - WEEK - 1,) * 2)
+        os.utime(path, (path.stat().st_mtime - WEEK - 1,) * 2)
     assert sorted(abandoned_drafts(tmp_path)) == sorted([living, elsewhere])
     remove_drafts.cache_clear()
 
