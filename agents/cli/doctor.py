@@ -10,7 +10,7 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rich.markup import escape
+from rich.text import Text
 
 import shipgym
 from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder
@@ -26,7 +26,10 @@ EXTRAS = {
     "ray": ("ray",),
     "render": ("pygame-ce",),
 }
-MARKS = {"fine": "[green]ok    [/]", "absent": "[dim]absent[/]", "wrong": "[bold red]wrong [/]"}
+MARKS = {
+    "fine": ("ok", "green"), "absent": ("absent", "dim"), "left": ("left", "yellow"),
+    "wrong": ("wrong", "bold red"),
+}  # fmt: skip
 OURS = ("shipgym", "identification", "agents")
 
 
@@ -35,8 +38,8 @@ class Finding:
     """The result of one check."""
 
     what: str
-    #: "fine", "absent", "wrong": "absent": an option that is not installed; "wrong": something does not
-    #: work
+    #: "fine"; "absent": an option that is not installed; "left": something that may be removed; "wrong":
+    #: something does not work
     state: str
     detail: str  # what was found and, where needed, what to do
 
@@ -44,9 +47,10 @@ class Finding:
         """Plain values, ready for JSON."""
         return asdict(self)
 
-    def line(self) -> str:
-        """One line for the terminal, with rich's markup."""
-        return f"{MARKS[self.state]}  {self.what:<20} {escape(self.detail)}"
+    def line(self) -> Text:
+        """One line for the terminal."""
+        mark, style = MARKS[self.state]
+        return Text.assemble((f"{mark:<6}", style), f"  {self.what:<20} {self.detail}")
 
 
 def examine_installation() -> list[Finding]:

@@ -69,7 +69,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
         print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
     else:
         if instability is None:
-            console.print(result.summary(), markup=False, soft_wrap=True)
+            console.print(result.summary(), soft_wrap=True)
             console.print(prediction_table(result))
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     _check_stable(result)
@@ -144,7 +144,7 @@ def advise_command(
     if as_json:
         print_json(advice.to_dict())
         return
-    console.print(str(advice), markup=False, soft_wrap=True)
+    console.print(str(advice), soft_wrap=True)
     console.print(f"run next: {', then '.join(advice.chosen)}", soft_wrap=True)
 
 
@@ -185,7 +185,7 @@ def reduce_command(
     else:
         for q, reduction in found.reductions.items():
             console.print(f"equation of {q}")
-            console.print(str(reduction), markup=False, soft_wrap=True)
+            console.print(str(reduction), soft_wrap=True)
         console.print(prediction_table(found.full, "with all terms"))
         console.print(prediction_table(found.reduced, "with the terms left"))
         count = fields["terms"]
