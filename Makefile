@@ -1,7 +1,8 @@
 # make demo      identify a ship from the trials in the box, design and verify autopilots; needs no torch
 # make test      everything that is checked: format, lint, types, tests
 # make bench     how fast it is
-# make soak      a long run with random and extreme actions
+# make soak      long runs with extreme actions, kills at random moments, wrong command lines
+# make release-check  the lowest declared versions of all dependencies, installed and tried
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
 
@@ -12,7 +13,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak evidence docs clean
+.PHONY: demo test lint format type bench soak release-check evidence docs clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -36,6 +37,11 @@ bench: $(VENV)/dev-installed
 
 soak: $(VENV)/dev-installed
 	$(BIN)/python scripts/soak.py
+	$(BIN)/python scripts/soak_kills.py
+	$(BIN)/python scripts/wrong_commands.py
+
+release-check: $(VENV)/dev-installed
+	$(BIN)/python scripts/release_check.py
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md

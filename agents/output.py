@@ -16,9 +16,10 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from shipgym.errors import InputError
-from shipgym.files import atomic_path, draft_folder, is_draft, remove_drafts
+from shipgym.files import abandoned_drafts, atomic_path, draft_folder, is_draft, remove_drafts
 
 ASIDE = ".old"
+PROCESS = "process"
 LONGEST_COMMAND = 200  # characters that are told of it
 
 
@@ -80,14 +81,14 @@ def in_use(folder: Path) -> Iterator[Path]:
     """
     lock_path = _lock_path(folder)
     missing = [one for one in (folder.absolute(), *folder.absolute().parents) if not one.exists()]
-    lock = FileLock(lock_path)
+    lock, user = FileLock(lock_path), holder(lock_path)
     try:
         lock_path.parent.mkdir(parents=True, exist_ok=True)
         with suppress(NotImplementedError):
             lock.acquire(timeout=0)
     except Timeout:
         raise InputError(
-            f"{folder}: in use by {holder(lock_path)}; wait until it has ended, or name another folder"
+            f"{folder}: in use by {user}; wait until it has ended, or name another folder"
         ) from None
     except OSError as error:
         if not lock_path.parent.is_dir():
@@ -120,7 +121,7 @@ def _lock_path(folder: Path) -> Path:
 def _this_process() -> str:
     command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])[:LONGEST_COMMAND]
     since = datetime.now().astimezone().isoformat(" ", "seconds")
-    return f"process {os.getpid()} on {socket.gethostname()} since {since} ({command})"
+    return f"{PROCESS} {os.getpid()} on {socket.gethostname()} since {since} ({command})"
 
 
 def holder(lock: Path) -> str:
@@ -129,6 +130,21 @@ def holder(lock: Path) -> str:
         return lock.read_text(encoding="utf-8", errors="replace") or "another process"
     except OSError:
         return "another process"
+
+
+def locks_and_drafts(folder: Path) -> Iterator[tuple[str, bool]]:
+    """What processes have in a folder beside results, in words, and whether its process is dead."""
+    for draft in abandoned_drafts(folder):
+        yield f"{draft}: left by a process that was killed; the next run there removes it", True
+    for path in sorted(folder.glob(".*.lock")):
+        if (user := holder(path)).startswith(PROCESS):
+            try:
+                with FileLock(path, timeout=0):
+                    yield f"{path}: left by {user}, which is dead; the next run there removes it", True
+            except Timeout:
+                yield f"{path}: {user}", False
+            except OSError:  # another user's
+                continue
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from pathlib import Path
 from rich.text import Text
 
 import shipgym
+from agents.output import locks_and_drafts
 from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder
 
 NEEDED = (
@@ -64,6 +65,7 @@ def examine_installation() -> list[Finding]:
             for extra, names in EXTRAS.items()
         ),
         cache_finding(),
+        *left_findings(),
         *(name_finding(name) for name in OURS),
     ]
 
@@ -101,6 +103,17 @@ def cache_finding() -> Finding:
             f"{CACHE_VARIABLE} to a folder that can be",
         )
     return Finding("cache", "fine", kept)
+
+
+def left_findings() -> list[Finding]:
+    """Folders in use, and what dead processes left: here, one level below, and in the cache."""
+    here = Path.cwd()
+    folders = [here, *(path for path in sorted(here.iterdir()) if path.is_dir()), cache_folder()]
+    return [
+        Finding("left over" if dead else "in use", "left" if dead else "fine", told)
+        for folder in folders
+        for told, dead in locks_and_drafts(folder)
+    ]
 
 
 def name_finding(name: str) -> Finding:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from agents.cli.doctor import left_findings
 from agents.output import check_folder, in_use, whole_folder
 from shipgym import InputError
 from shipgym.files import remove_drafts
@@ -112,6 +113,19 @@ def test_a_second_process_is_told_who_uses_the_folder_and_takes_over_when_that_i
     with whole_folder(tmp_path / "ship", NAMES) as draft:
         (draft / "model.json").write_text("new")
     assert everything(tmp_path) == ["ship", "ship/model.json"]
+
+
+def test_doctor_tells_of_folders_in_use_and_of_what_killed_processes_left(holder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (found,) = left_findings()
+    assert (found.what, found.state) == ("in use", "fine")
+    assert f"process {holder.pid} on " in found.detail
+    holder.kill()
+    holder.wait()
+    found = left_findings()
+    assert [(one.what, one.state) for one in found] == [("left over", "left")] * 2
+    assert ".draft: left by a process that was killed" in found[0].detail
+    assert f".ship.lock: left by process {holder.pid} on " in found[1].detail
 
 
 def test_a_folder_set_aside_by_a_killed_process_is_back(tmp_path):
