@@ -81,9 +81,10 @@ def check(extra: str) -> str:
         pinned = home / "constraints.txt"
         lines = (ROOT / "constraints.txt").read_text().splitlines()
         pinned.write_text("\n".join(line for line in lines if line.startswith("torch==")))
+        uv = [sys.executable, "-m", "uv"]
         commands = [
-            [sys.executable, "-m", "uv", "venv", "--quiet", "--python", sys.executable, str(home / "env")],
-            [sys.executable, "-m", "uv", "pip", "install", "--quiet", "--python", python, "--resolution", "lowest-direct",
+            [*uv, "venv", "--quiet", "--python", sys.executable, str(home / "env")],
+            [*uv, "pip", "install", "--quiet", "--python", python, "--resolution", "lowest-direct",
              "--constraint", str(pinned), wanted],
             *([python, *(["-c", one] if isinstance(one, str) else ["-m", "agents.cli", *one])]
               for one in TRIED[extra]),
