@@ -1,8 +1,9 @@
 # make demo      identify a ship from the trials in the box, design and verify autopilots; needs no torch
 # make test      everything that is checked: format, lint, types, tests
 # make bench     how fast it is
-# make soak      a long run with random and extreme actions
 # make fuzz      a million mutated files of every kind that is read
+# make soak      long runs with extreme actions, kills at random moments, wrong command lines
+# make release-check  the lowest declared versions of all dependencies, installed and tried
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
 
@@ -13,7 +14,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak fuzz evidence docs clean
+.PHONY: demo test lint format type bench soak fuzz release-check evidence docs clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -37,6 +38,11 @@ bench: $(VENV)/dev-installed
 
 soak: $(VENV)/dev-installed
 	$(BIN)/python scripts/soak.py
+	$(BIN)/python scripts/soak_kills.py
+	$(BIN)/python scripts/wrong_commands.py
+
+release-check: $(VENV)/dev-installed
+	$(BIN)/python scripts/release_check.py
 
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py

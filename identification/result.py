@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +11,7 @@ from identification.report.figures import all_figures
 from identification.report.page import report_page
 from identification.report.summary import summary_table
 from shipgym.errors import InputError
-from shipgym.files import write_json, write_text
+from shipgym.files import draft_folder, write_json, write_text
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -71,11 +70,11 @@ class IdentificationResult(Fit):
         folder = Path(folder)
         try:
             folder.mkdir(parents=True, exist_ok=True)
-            with tempfile.TemporaryDirectory(prefix=".identified-", dir=folder) as draft:
-                self._write(Path(draft))
+            with draft_folder(folder / "identification") as draft:
+                self._write(draft)
                 for name in FILES:
-                    if (Path(draft) / name).exists():
-                        (Path(draft) / name).replace(folder / name)
+                    if (draft / name).exists():
+                        (draft / name).replace(folder / name)
                     else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:

@@ -8,14 +8,19 @@ import json
 import math
 import os
 import re
+import shutil
+import socket
 import stat
+import time
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from functools import partial
+from contextlib import contextmanager, suppress
+from errno import EBUSY, ENOENT, EXDEV
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from shipgym.checks import check_table, did_you_mean, shown
 from shipgym.errors import InputError
@@ -32,23 +37,110 @@ LARGEST_NUMBER = 1e100
 _LONG_KEY = re.compile(rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{DEEPEST}}}""")
 #: What cannot be written in UTF-8, or ends a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
+DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
+ABANDONED_S = 7 * 86400.0
+MOUNTED = (EXDEV, EBUSY)  # what renaming onto a mount point fails with
 
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary name beside a file, renamed to it when the block ends without an error.
 
-    Raises InputError if the folder does not exist or cannot be written.
+    Raises InputError if the folder does not exist or cannot be written, or there is something else than a
+    file, such as a device.
     """
-    draft = path.with_name(f".{path.name}.{os.getpid()}.draft")
+    draft = draft_name(path)
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: is not a file; choose another name")
+        remove_drafts(path.parent)
         yield draft
-        draft.replace(path)
+        _take_place(draft, path)
     except OSError as error:
-        remedy = "" if path.parent.is_dir() else "; choose a folder that exists"
+        remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
         raise InputError(f"{path}: cannot be written ({error.strerror or error}){remedy}") from error
     finally:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):
+            draft.unlink()
+
+
+def _take_place(draft: Path, path: Path) -> None:
+    try:
+        draft.replace(path)
+    except OSError as error:
+        if error.errno not in MOUNTED:
+            raise
+        shutil.copyfile(draft, path)
+
+
+def draft_name(path: Path) -> Path:
+    """The hidden name beside a file or folder under which this process writes it."""
+    return path.parent / f".{path.name}.{_host()}-{os.getpid()}.draft"
+
+
+@contextmanager
+def draft_folder(path: Path) -> Iterator[Path]:
+    """A folder beside a path that is removed when the block ends, unless it was renamed."""
+    remove_drafts(path.parent)
+    draft = draft_name(path)
+    try:
+        draft.mkdir()
+        yield draft
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+def is_draft(name: str) -> bool:
+    """Whether a name is one of `draft_name`."""
+    return DRAFT.fullmatch(name) is not None
+
+
+def abandoned_drafts(folder: Path) -> list[Path]:
+    """Drafts in a folder whose process is dead.
+
+    Those of other computers, and of a process whose number is in use again, count after a week.
+    """
+    found = []
+    with suppress(OSError):
+        for path in folder.iterdir():
+            named = DRAFT.fullmatch(path.name)
+            if named and (_is_dead(*named.groups()) or time.time() - path.lstat().st_mtime > ABANDONED_S):
+                found.append(path)
+    return found
+
+
+@cache
+def remove_drafts(folder: Path) -> None:
+    """Remove what killed processes left half-written in a folder; a process looks once in each folder."""
+    for path in abandoned_drafts(folder):
+        with suppress(OSError):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+
+
+def _is_dead(host: str, process: str) -> bool:
+    """Whether a process of this computer is no more."""
+    if host != _host() or os.name != "posix":  # elsewhere the signal 0 would end it
+        return False
+    try:
+        os.kill(int(process), 0)
+    except (ProcessLookupError, OverflowError):
+        return True
+    except PermissionError:
+        pass
+    return False
+
+
+@cache
+def _host() -> str:
+    return f"{crc32(socket.gethostname().encode()):08x}"
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it where they do not exist; raises InputError if that cannot be."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{folder}: no folder can be made there ({error.strerror or error})") from None
 
 
 def write_bytes(content: bytes, path: Path) -> None:

@@ -23,10 +23,11 @@ from agents.benchmarking.episode_table import Columns, check_library, joined, re
 from agents.benchmarking.results_shape import SHAPE, check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
+from agents.output import present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
 from shipgym.checks import check_choice, check_keys
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import make_folder, read_json, write_json
 
 Floats = NDArray[np.float64]
 
@@ -94,10 +95,7 @@ class BenchmarkResult:
             return self
         target = Path(folder)
         check_library()
-        try:
-            target.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from None
+        make_folder(target)
         write_episodes(self.episodes, target / EPISODES)
         about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
         saved = replace(self, summary={**self.summary, "episodes": about})
@@ -115,7 +113,7 @@ def check_new(folder: Path, resume: bool) -> Path:
         return folder
     if not folder.is_dir():
         raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
-    found = sorted(entry.name for entry in folder.iterdir())
+    found = present(folder)
     ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
     if ours and not resume:
         raise InputError(

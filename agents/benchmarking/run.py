@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from types import NoneType
 from typing import TYPE_CHECKING, Any
@@ -12,6 +13,7 @@ import numpy as np
 from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
 from agents.engines.jobs import check_engine, run_jobs
+from agents.output import in_use
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import oracle_costs
 from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
@@ -75,21 +77,22 @@ def benchmark(
     chosen, who = _chosen(suite, tasks), contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)
     check_engine(engine, workers, address)
-    folder = None if out is None else check_new(Path(out), resume)
     for one in who:
         check_agents(one, chosen)
+    folder = None if out is None else check_new(Path(out), resume)
     jobs = [job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
-    found = run_jobs(
-        run_job, jobs, engine=engine, workers=workers, address=address,
-        keep=None if folder is None else folder / PARTS,
-        progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
-    )  # fmt: skip
-    done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
-    for (name, on), part in done.items():
-        _check_part(part, episodes, f"part of '{name}' on '{on}'")
-    for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
-        done[one.name, task.name] = results_of(one, task, suite, episodes)
-    return gathered(suite, chosen, who, done, episodes).save(folder)
+    with nullcontext() if folder is None else in_use(folder):
+        found = run_jobs(
+            run_job, jobs, engine=engine, workers=workers, address=address,
+            keep=None if folder is None else folder / PARTS,
+            progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
+        )  # fmt: skip
+        done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
+        for (name, on), part in done.items():
+            _check_part(part, episodes, f"part of '{name}' on '{on}'")
+        for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
+            done[one.name, task.name] = results_of(one, task, suite, episodes)
+        return gathered(suite, chosen, who, done, episodes).save(folder)
 
 
 def _check_part(part: Any, episodes: int, where: str) -> None:

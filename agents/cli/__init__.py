@@ -6,6 +6,9 @@ standard error and nothing written; 130 interrupted.
 
 from __future__ import annotations
 
+import os
+import sys
+from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +18,7 @@ from agents.cli.benchmark import benchmark_command
 from agents.cli.command import (
     FAILED,
     Address,
+    Commands,
     EngineName,
     IdentifyCommand,
     IdentifyOptions,
@@ -23,6 +27,7 @@ from agents.cli.command import (
     Workers,
     answered,
     fail,
+    told_failure,
 )
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
@@ -36,6 +41,7 @@ if TYPE_CHECKING:
     from agents.verification.result import AutopilotResult
 
 app = typer.Typer(
+    cls=Commands,
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
     no_args_is_help=True,
     add_completion=False,
@@ -241,4 +247,13 @@ def doctor_command(as_json: Json = False) -> None:
 
 def main() -> None:
     """Run the command line."""
-    app(prog_name="shipgym")
+    if sys.stdout is None:
+        sys.exit("error: standard output is closed")
+    sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115 - until the end
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files may have any bytes
+    try:
+        app(prog_name="shipgym")
+    except OSError as error:  # of the help, which no command answers for
+        sys.exit(told_failure(error))

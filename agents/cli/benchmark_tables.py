@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from rich.text import Text
+
 from agents.cli.terminal import plain_table
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ def ranking_table(result: BenchmarkResult) -> Table:
             str(entry["tasks"]),
             str(summary["contestants"][name]["runs"]),
             str(entry["lost"]),
-            f"[bold red]{failed}[/]" if failed else "0",
+            Text(str(failed), "bold red") if failed else "0",
             number(sum(times) / len(times) if times else None, 2),
         )
     return table
@@ -84,7 +86,7 @@ def verification_table(checks: Sequence[Check]) -> Table:
             check.task,
             str(check.episodes),
             "none" if check.exact else f"{check.difference:.1e}",
-            "[green]the same[/]" if check.exact else "[green]close[/]" if check.passed else "[red]differs[/]",
+            Text("the same" if check.exact else "close", "green") if check.passed else Text("differs", "red"),
             check.note,
         )
     return table

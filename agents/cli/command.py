@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import functools
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 P = ParamSpec("P")
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+LONGEST_NAME = 200  # characters of a path that are told
 
 ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
 Algorithm = Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
@@ -52,17 +54,43 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
 
         try:
             command(*args, **kwargs)
+            sys.stdout.flush()
         except InputError as error:
             fail(str(error), WRONG_INPUT)
         except (ManoeuvreError, UnstableModelError, WorkerDiedError) as error:
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)
-        except BrokenPipeError:  # the reader of the output went away
-            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
-            raise typer.Exit(FAILED) from None
+        except OSError as error:
+            raise typer.Exit(told_failure(error)) from None
 
     return wrapped
+
+
+def told_failure(error: OSError) -> int:
+    """Say what could not be read or written; the exit code."""
+    from agents.cli.terminal import fail as tell
+
+    if error.filename is not None:
+        tell(f"{str(error.filename)[:LONGEST_NAME]}: {error.strerror}")
+        return WRONG_INPUT
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in buffers fails no more
+    if not isinstance(error, BrokenPipeError):  # the reader of the output went away
+        tell(f"the output cannot be written ({error.strerror or error})")
+    return FAILED
+
+
+class Commands(TyperGroup):
+    """The commands; an argument without text is refused before any of them is called."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:
+        """Refuse empty arguments, and those that no name of a file can be."""
+        for k, text in enumerate(args):
+            name, sign, value = text.partition("=") if text.startswith("--") else ("", "", text)
+            if "\0" in text or (not value and (sign or not name)):
+                name = name or (args[k - 1] if k and args[k - 1].startswith("-") else "argument")
+                ctx.fail(f"{name}: {value!r} found, expected a text that is not empty")
+        return super().parse_args(ctx, args)
 
 
 def fail(message: str, code: int) -> None:

@@ -10,9 +10,10 @@ import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from rich.markup import escape
+from rich.text import Text
 
 import shipgym
+from agents.output import locks_and_drafts
 from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder, loop_fault, open_folder
 
 NEEDED = (
@@ -26,7 +27,10 @@ EXTRAS = {
     "ray": ("ray",),
     "render": ("pygame-ce",),
 }
-MARKS = {"fine": "[green]ok    [/]", "absent": "[dim]absent[/]", "wrong": "[bold red]wrong [/]"}
+MARKS = {
+    "fine": ("ok", "green"), "absent": ("absent", "dim"), "left": ("left", "yellow"),
+    "wrong": ("wrong", "bold red"),
+}  # fmt: skip
 OURS = ("shipgym", "identification", "agents")
 
 
@@ -35,8 +39,8 @@ class Finding:
     """The result of one check."""
 
     what: str
-    #: "fine", "absent", "wrong": "absent": an option that is not installed; "wrong": something does not
-    #: work
+    #: "fine"; "absent": an option that is not installed; "left": something that may be removed; "wrong":
+    #: something does not work
     state: str
     detail: str  # what was found and, where needed, what to do
 
@@ -44,9 +48,10 @@ class Finding:
         """Plain values, ready for JSON."""
         return asdict(self)
 
-    def line(self) -> str:
-        """One line for the terminal, with rich's markup."""
-        return f"{MARKS[self.state]}  {self.what:<20} {escape(self.detail)}"
+    def line(self) -> Text:
+        """One line for the terminal."""
+        mark, style = MARKS[self.state]
+        return Text.assemble((f"{mark:<6}", style), f"  {self.what:<20} {self.detail}")
 
 
 def examine_installation() -> list[Finding]:
@@ -60,6 +65,7 @@ def examine_installation() -> list[Finding]:
             for extra, names in EXTRAS.items()
         ),
         cache_finding(),
+        *left_findings(),
         *(name_finding(name) for name in OURS),
     ]
 
@@ -102,6 +108,17 @@ def cache_finding() -> Finding:
             f"{CACHE_VARIABLE} to a folder that can be",
         )
     return Finding("cache", "fine", kept)
+
+
+def left_findings() -> list[Finding]:
+    """Folders in use, and what dead processes left: here, one level below, and in the cache."""
+    here = Path.cwd()
+    folders = [here, *(path for path in sorted(here.iterdir()) if path.is_dir()), cache_folder()]
+    return [
+        Finding("left over" if dead else "in use", "left" if dead else "fine", told)
+        for folder in folders
+        for told, dead in locks_and_drafts(folder)
+    ]
 
 
 def name_finding(name: str) -> Finding:

@@ -57,21 +57,19 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
     from agents.cli.terminal import err, prediction_table, print_json
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.result import FILES
     from identification.validation.warnings import why_unstable
 
-    check_folder(out, FILES)
-    with err.status("identifying"):
+    with whole_folder(out, FILES) as draft, err.status("identifying"):
         result = identify_ship(read, settings)
-    with whole_folder(out, FILES) as draft:
         result.save(draft)
     instability = why_unstable(result)
     if as_json:
         print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
     else:
         if instability is None:
-            console.print(result.summary(), markup=False, soft_wrap=True)
+            console.print(result.summary(), soft_wrap=True)
             console.print(prediction_table(result))
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     _check_stable(result)
@@ -93,13 +91,11 @@ def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str |
     from agents.cli.terminal import comparison_table, err, print_json, warn
     from agents.cli.terminal import out as console
     from agents.identifying import compare_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
 
-    check_folder(out, COMPARISON_FILES)
-    with err.status("comparing"):
+    with whole_folder(out, COMPARISON_FILES) as draft, err.status("comparing"):
         found = compare_ship(read, settings, methods)
-    with whole_folder(out, COMPARISON_FILES) as draft:
         found.save(draft)
     if as_json:
         print_json(found.to_dict())
@@ -148,7 +144,7 @@ def advise_command(
     if as_json:
         print_json(advice.to_dict())
         return
-    console.print(str(advice), markup=False, soft_wrap=True)
+    console.print(str(advice), soft_wrap=True)
     console.print(f"run next: {', then '.join(advice.chosen)}", soft_wrap=True)
 
 
@@ -174,17 +170,14 @@ def reduce_command(
     from agents.cli.terminal import err, prediction_table, print_json
     from agents.cli.terminal import out as console
     from agents.identifying import reduce_ship
-    from agents.output import check_folder, whole_folder
+    from agents.output import whole_folder
     from identification.result import FILES
     from shipgym.files import write_json
 
-    names = (*FILES, "reduction.json")
-    check_folder(out, names)
     read, settings = _chosen(ship, options)
-    with err.status("reducing"):
+    with whole_folder(out, (*FILES, "reduction.json")) as draft, err.status("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
-    with whole_folder(out, names) as draft:
         found.reduced.save(draft)
         write_json(fields, draft / "reduction.json")
     if as_json:
@@ -192,7 +185,7 @@ def reduce_command(
     else:
         for q, reduction in found.reductions.items():
             console.print(f"equation of {q}")
-            console.print(str(reduction), markup=False, soft_wrap=True)
+            console.print(str(reduction), soft_wrap=True)
         console.print(prediction_table(found.full, "with all terms"))
         console.print(prediction_table(found.reduced, "with the terms left"))
         count = fields["terms"]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console
+from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -24,8 +25,37 @@ if TYPE_CHECKING:
 
 WIDTH_WITHOUT_TERMINAL = 110
 
-out = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
-err = Console(stderr=True, highlight=False)
+#: Control characters but tab and newline, and those that turn the direction of writing.
+CONTROLS = dict.fromkeys(
+    [*range(9), *range(11, 32), *range(127, 160), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+)
+
+
+class _WithoutControls:
+    """What is printed, without control characters: names come from files and must not steer a terminal."""
+
+    def __init__(self, printed: ConsoleRenderable) -> None:
+        self.printed = printed
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Segment]:
+        for segment in console.render(self.printed, options):
+            yield segment if segment.control else segment._replace(text=segment.text.translate(CONTROLS))
+
+
+class _Stripping(RenderHook):
+    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
+        return [_WithoutControls(one) for one in renderables]
+
+
+def _console(**settings: Any) -> Console:
+    """A console to which brackets, colons and control characters in names mean nothing."""
+    console = Console(highlight=False, markup=False, emoji=False, **settings)
+    console.push_render_hook(_Stripping())
+    return console
+
+
+out = _console(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
+err = _console(stderr=True)
 
 
 def plain_table(title: str, *headings: str) -> Table:
@@ -65,7 +95,7 @@ def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
         return
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-    described = TextColumn("{task.description:<30}")
+    described = TextColumn("{task.description:<30}", markup=False)
     with Progress(described, BarColumn(bar_width=32), TimeElapsedColumn(), console=err) as bars:
         tasks: dict[str, Any] = {}
 
@@ -98,7 +128,7 @@ def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | No
         return
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    told = TextColumn("{task.fields[costs]}")
+    told = TextColumn("{task.fields[costs]}", markup=False)
     with Progress(
         TextColumn("training"), BarColumn(bar_width=32), TaskProgressColumn(), TimeRemainingColumn(), told,
         console=err,
@@ -126,7 +156,7 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
         rmse = metrics["rmse"]
         angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
         errors = [_number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
-        found = "[bold red]ran away[/]" if metrics["diverged"] else _indices(metrics)
+        found = Text("ran away", "bold red") if metrics["diverged"] else _indices(metrics)
         table.add_row(PurePath(name).name, metrics["use"], *errors, found)
     return table
 
@@ -146,7 +176,7 @@ def comparison_table(comparison: Comparison) -> Table:
     for standing in comparison.standings:
         table.add_row(
             standing.method,
-            "stable" if standing.stable else "[bold red]unstable[/]",
+            "stable" if standing.stable else Text("unstable", "bold red"),
             _number(standing.error, 4),
             _number(standing.heading_deg, 2),
             _number(standing.yaw_rate_deg_s, 4),
@@ -206,10 +236,10 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     return table
 
 
-def _verdict(criterion: Criterion) -> str:
+def _verdict(criterion: Criterion) -> str | Text:
     if criterion.passed is None:
         return "not assessable"
-    return "[green]passes[/]" if criterion.passed else "[red]fails[/]"
+    return Text("passes", "green") if criterion.passed else Text("fails", "red")
 
 
 def _interval(interval: tuple[float, float] | None) -> str:

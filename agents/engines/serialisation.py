@@ -19,7 +19,7 @@ import numpy as np
 
 import shipgym
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import make_folder, read_json, write_json
 
 ARRAY, FLOAT = "__array__", "__float__"
 LONGEST_IN_MESSAGE = 200  # characters
@@ -130,10 +130,7 @@ class KeptResults:
 
         Raises InputError if it cannot be written.
         """
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{self.folder}: no folder can be made there ({error.strerror})") from None
+        make_folder(self.folder)
         write_json({**self._key(text), "result": packed}, self._path(text))
 
     def _key(self, text: str) -> dict[str, Any]:

@@ -16,12 +16,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from agents.output import whole_folder
+from agents.output import present
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import present_names
 from shipgym.checks import check_keys, check_table, check_whole, data_only
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
+from shipgym.files import make_folder, read_json, write_json
 
 FORMAT = 1
 RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"
@@ -49,22 +49,18 @@ def check_new(folder: Path) -> None:
     """
     if (folder / RUN).is_file():
         raise InputError(f"{folder}: a run is there already; resume it with --resume, or name another folder")
-    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    if folder.exists() and (not folder.is_dir() or present(folder)):
         raise InputError(f"{folder}: exists and is not a training run; name another folder")
 
 
 def begin_folder(folder: Path, plan: Plan, command: str) -> None:
-    """Make the folder of a new run, whole or not at all.
-
-    Raises InputError if there is something already, or it cannot be written.
-    """
-    check_new(folder)
+    """Make the folder of a new run; raises InputError if it cannot be written."""
     content = {
         "format": FORMAT, "configuration": plan.configuration(), "threads": plan.threads, "command": command,
         "versions": versions(),
     }  # fmt: skip
-    with whole_folder(folder, ()) as draft:
-        write_json(content, draft / RUN)
+    make_folder(folder)
+    write_json(content, folder / RUN)
 
 
 def read_plan(folder: Path, given: Given | None = None) -> Plan:

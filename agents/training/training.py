@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.agent_file import load_agent
+from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
 from agents.training.bases import design_base
@@ -119,13 +120,13 @@ def train(
     Raises
     ------
     InputError
-        If the folder holds something already, or, to resume, nothing or a run of another configuration; if
-        the ship and the settings do not go together; or if the networks diverge.
+        If another process uses the folder; if it holds something already, or, to resume, nothing or a run of
+        another configuration; if the ship and the settings do not go together; or if the networks diverge.
     """
     folder = None if out is None else Path(out)
     if resume and folder is None:
         raise InputError("resume: found without a folder, expected the one of the run")
-    with _torch_threads(plan.threads):
+    with _torch_threads(plan.threads), nullcontext() if folder is None else in_use(folder):
         if folder is not None:
             run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
         training = _Training(plan, folder, tell, max_seconds)
@@ -294,8 +295,6 @@ class _Training:
     def restore(self, checkpoint: Path) -> None:
         """Resume from a checkpoint; a run that was killed before its first one starts again."""
         self.resumed_from = 0
-        for draft in checkpoint.parent.glob(".*.draft"):  # of a file that was being written
-            draft.unlink(missing_ok=True)
         if not checkpoint.exists():
             return
         content = read_values(checkpoint, "checkpoint of a training")

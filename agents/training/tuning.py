@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 
 from agents.engines.jobs import HERE, JobEngine
+from agents.output import in_use, present
 from agents.training.plan import Plan, check_same
 from agents.training.settings import changed
 from shipgym.checks import Shape, check_shape, check_whole
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json, write_text
+from shipgym.files import make_folder, read_json, write_json, write_text
 
 try:
     import optuna
@@ -103,11 +104,23 @@ def tune(
     Raises
     ------
     InputError
-        If Optuna is missing, the folder holds a study of something else or anything else, or every trial
-        of the first batch diverges.
+        If Optuna is missing, another process uses the folder, it holds a study of something else or anything
+        else, or every trial of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
-    folder = Path(out)
+    with in_use(Path(out)):
+        return _tuned(plan, Path(out), trials, fixed, where, progress, training or train_trial)
+
+
+def _tuned(
+    plan: Plan,
+    folder: Path,
+    trials: int,
+    fixed: Sequence[str],
+    where: JobEngine,
+    progress: Callable[[int, int, float | None], None] | None,
+    training: Callable[[dict[str, Any]], dict[str, Any]],
+) -> Tuning:
     study = _opened(folder, plan, fixed)
     found: list[Trial] = []
     for first in range(0, trials, BATCH):
@@ -119,7 +132,7 @@ def tune(
                 progress(before + done, trials, best)
 
         jobs = [_job(plan, settings, found) for _, settings in proposed]
-        results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
+        results = replace(where, keep=folder / KEPT).run(training, jobs, tell)
         for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
             found.append(_trial(first + k, parameters, settings, result))
         _record(study, found, plan, fixed)
@@ -235,13 +248,10 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
     if note.is_file():
         found = read_json(note, "study", "name another folder")
         check_same(expected, found, str(note))
-    elif folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+    elif folder.exists() and (not folder.is_dir() or present(folder)):
         raise InputError(f"{folder}: exists and is not a tuning study; name another folder")
     else:
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise InputError(f"{folder}: no folder can be made there ({error.strerror})") from None
+        make_folder(folder)
         write_json(expected, note)
     try:
         return optuna.create_study(

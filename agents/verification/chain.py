@@ -15,7 +15,7 @@ from agents.controllers.lq import LQ
 from agents.controllers.pid import PID
 from agents.engines.jobs import HERE, JobEngine
 from agents.identifying import identification_settings, identify_trials, trials_of
-from agents.output import check_folder, whole_folder
+from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import monte_carlo
@@ -68,30 +68,28 @@ def build_autopilot(
     where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
-    check_folder(folder, FILES)
     graph_objects()  # a missing extra is reported now, not after the work
-    result = examine(
-        ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
-        where=where,
-    )  # fmt: skip
-    _tell(progress, "writing the report", 0, 1)
-    _write(result, folder)
+    with whole_folder(folder, FILES) as draft:
+        result = examine(
+            ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
+            where=where,
+        )  # fmt: skip
+        _tell(progress, "writing the report", 0, 1)
+        _write(result, draft)
     _tell(progress, "writing the report", 1, 1)
     return result
 
 
 def _write(result: AutopilotResult, folder: Path) -> None:
-    """Write the files of the chain, all or none."""
     from agents.verification.page import write_report
 
-    with whole_folder(folder, FILES) as draft:
-        write_json(result.metrics, draft / "metrics.json")
-        if result.verification is not None:
-            result.model.save(draft / "model.json")
-            for pilot in result.verification.pilots:
-                if pilot.design is not None:  # the others are files already
-                    pilot.design.save(draft / f"{pilot.key}.json")
-        write_report(result, draft / "report.html")
+    write_json(result.metrics, folder / "metrics.json")
+    if result.verification is not None:
+        result.model.save(folder / "model.json")
+        for pilot in result.verification.pilots:
+            if pilot.design is not None:  # the others are files already
+                pilot.design.save(folder / f"{pilot.key}.json")
+    write_report(result, folder / "report.html")
 
 
 def examine(

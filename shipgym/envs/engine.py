@@ -340,9 +340,9 @@ class Engine:
         Raises
         ------
         InputError
-            If their shape is another.
+            If their shape is another, or they are texts, objects or complex.
         """
-        array = np.asarray(actions, dtype=np.float32)
+        array = as_numbers(actions, "actions")
         if array.shape != self._orders.shape:
             raise InputError(f"actions: shape {array.shape} found, expected {self._orders.shape}")
         self._orders[...] = array
@@ -462,6 +462,22 @@ class Engine:
             return None
         tile, lane = divmod(lane, LANES)
         return plan[tile, :, lane].reshape(-1, 2).copy()
+
+
+def as_array(actions: Any, where: str) -> NDArray[Any]:
+    """Actions as an array; raises InputError for lists of several lengths and what NumPy cannot read."""
+    try:
+        return np.asarray(actions)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise InputError(f"{where}: {type(actions).__name__} found, not an array ({error})") from None
+
+
+def as_numbers(actions: Any, where: str) -> NDArray[Any]:
+    """Actions as an array of real numbers; raises InputError for texts, objects and complex numbers."""
+    array = as_array(actions, where)
+    if array.dtype.kind not in "fiub":
+        raise InputError(f"{where}: array of {array.dtype} found, expected real numbers in [-1, 1]")
+    return array
 
 
 def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:

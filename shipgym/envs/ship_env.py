@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_keys
 from shipgym.engine.episodes import REFUSED
-from shipgym.envs.engine import Engine, episode_key
+from shipgym.envs.engine import Engine, as_array, as_numbers, episode_key
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -27,6 +27,7 @@ Observation = NDArray[np.float32]
 Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
+FLOAT32 = np.dtype(np.float32)
 ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
 
 
@@ -114,7 +115,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._engine = Engine(self.model, 1, self.task, randomisation, allow_unstable)
         self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
-        self._advance = self._engine.step_of_one()
+        self._step_of_one = self._engine.step_of_one()
+        self._advance: Callable[[], int] = refuse_step
         self._command = self._engine.command[:, 0]
         self._discrete = self.task.action == "rudder-discrete"
         self._names = self.task.info_names
@@ -168,6 +170,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
             self._key = episode_key(self.np_random)
             self._episode = -1
         self._episode += 1
+        self._advance = self._step_of_one
         self._engine.begin([self._key], [self._episode])
         if self._artist is not None:
             self._artist.begin(self._engine)
@@ -196,7 +199,7 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         Raises
         ------
         InputError
-            If the action is not a finite number for each command.
+            If the action is not a finite number for each command, or no episode has begun.
         """
         self._order(action)
         if self._advance() == REFUSED:
@@ -223,7 +226,9 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         if self._discrete:
             self._command[0] = RUDDER_ORDERS[_one_order(action)]
             return
-        array = action if isinstance(action, np.ndarray) else np.asarray(action, dtype=np.float32)
+        array = action
+        if not isinstance(array, np.ndarray) or array.dtype is not FLOAT32:
+            array = as_numbers(action, "action")
         if array.shape != self._command.shape:
             what = "the commanded rudder" + (" and shaft speed" if len(self._command) > 1 else "")
             raise InputError(f"action: shape {array.shape} found, expected {self._command.shape}: {what}")
@@ -241,14 +246,20 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         return picture if self.render_mode == "rgb_array" else None
 
     def close(self) -> None:
-        """Close the window, if there is one."""
+        """Close the window, if there is one; to step again takes a `reset`."""
+        self._advance = refuse_step
         if self._artist is not None:
             self._artist.close()
 
 
+def refuse_step() -> int:
+    """The step of an environment that was not reset yet, or is closed: raises InputError."""
+    raise InputError("step: no episode has begun, or the environment was closed; call reset first")
+
+
 def _one_order(action: Any) -> int:
     """The number of a discrete rudder order."""
-    array = np.asarray(action)
+    array = as_array(action, "action")
     if array.shape != () or array.dtype.kind not in "iu" or not 0 <= array < len(RUDDER_ORDERS):
         raise InputError(
             f"action: {action!r} found, expected a whole number from 0 to {len(RUDDER_ORDERS) - 1}: "

@@ -13,9 +13,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys, quoted
-from shipgym.envs.engine import Engine, episode_key, episode_keys
+from shipgym.envs.engine import Engine, as_array, episode_key, episode_keys
 from shipgym.envs.outputs import named_rows
-from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, read_options, spaces
+from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, read_options, refuse_step, spaces
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import RUDDER_ORDERS
@@ -83,6 +83,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         self._mode = mode
         self._own_reward = not self.task.definition.shipped
         self._discrete = self.task.action == "rudder-discrete"
+        self._begun = False  # and not closed since
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keys: NDArray[np.uint64] | None = None
 
@@ -125,6 +126,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
             if (number := seeded[row]) is not None:
                 self._keys[row], episodes[row] = episode_keys(number), 0
         self._keep_shown()
+        self._begun = True
         self._engine.begin(self._keys, episodes, mask)
         for artist, begun in zip(self._artists, mask, strict=False):
             if begun:
@@ -188,8 +190,11 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         Raises
         ------
         InputError
-            If an action is not a number or their shape is another, or a reward of your own is not finite.
+            If an action is not a number or their shape is another, a reward of your own is not finite, or no
+            episode has begun.
         """
+        if not self._begun:
+            refuse_step()
         engine = self._engine
         engine.order(self._commands(actions) if self._discrete else actions)
         ended = engine.advance(self._some_over, anew=True)
@@ -207,7 +212,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         return shown.observations, shown.outcomes[0], shown.terminated, shown.truncated, infos
 
     def _commands(self, actions: Any) -> Any:
-        array = np.asarray(actions)
+        array = as_array(actions, "actions")
         if array.shape != (self.num_envs,) or array.dtype.kind not in "iu":
             raise InputError(
                 f"actions: {array.dtype} of shape {array.shape} found, "
@@ -249,6 +254,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
+        self._begun = True
         self._keys, self._some_over = memory["row_keys"].copy(), bool(memory["some_over"])
         self._engine.remember(memory)
 
@@ -267,7 +273,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         return tuple(artist.picture(self._engine) for artist in self._artists)
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Nothing stays open."""
+        """Nothing stays open; to step again takes a `reset`."""
+        self._begun = False
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:

@@ -127,6 +127,37 @@ def test_wrong_actions_are_refused_and_change_nothing(name, action, message):
         rows.step(np.array([action, action], dtype=np.float32))
 
 
+RAGGED = [[0.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize("name", [COURSE, "shipgym/CourseKeepingDiscrete-v0"])
+@pytest.mark.parametrize(
+    "action",
+    ["left", "0.5", ["0.5"], np.array([0.5], dtype=object), [None], [1j], {"rudder": 0}, RAGGED, b"0"],
+)
+def test_texts_objects_and_complex_numbers_are_no_actions(name, action):
+    env, rows = gymnasium.make(name, model="mariner").unwrapped, gymnasium.make_vec(name, 1, model="mariner")
+    for one, given in ((env, action), (rows, action), (rows, [action])):
+        one.reset(seed=0)
+        before = one.physical_state()
+        with pytest.raises(InputError, match=r"actions?: "):
+            one.step(given)
+        assert one.physical_state() == before
+
+
+@pytest.mark.parametrize("name", [COURSE, "shipgym/CourseKeepingDiscrete-v0"])
+def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
+    for env in (gymnasium.make(name).unwrapped, gymnasium.make_vec(name, 2)):
+        action = env.action_space.sample()
+        with pytest.raises(InputError, match="no episode has begun"):
+            env.step(action)
+        env.reset(seed=0)
+        env.step(action)
+        env.close()
+        with pytest.raises(InputError, match="was closed; call reset first"):
+            env.step(action)
+
+
 def test_wrong_actions_of_rudder_and_shaft():
     env = gymnasium.make(PATH, model="kvlcc2", action="rudder-shaft").unwrapped
     env.reset(seed=0)

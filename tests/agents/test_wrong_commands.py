@@ -1,0 +1,48 @@
+"""Wrong command lines are refused with one message, and leave nothing."""
+
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import wrong_commands
+from rich.text import Text
+
+from agents.cli import terminal
+
+ROOT = Path(__file__).parents[2]
+SAMPLE = random.Random(0).sample(list(wrong_commands.lines()), 60)
+
+
+def test_wrong_commands_are_refused_with_one_message_and_nothing_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert wrong_commands.faults(SAMPLE) == {}
+
+
+def test_there_are_many_wrong_commands():
+    assert len(list(wrong_commands.lines())) >= 500
+
+
+@pytest.mark.parametrize("words", [["--help"], ["doctor", "--json"]])
+def test_an_output_that_cannot_be_written_is_told(words):
+    with Path("/dev/full").open("w") as full:
+        answer = subprocess.run(
+            [sys.executable, "-m", "agents.cli", *words],
+            cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
+        )  # fmt: skip
+    assert answer.returncode == 1
+    assert answer.stderr == "error: the output cannot be written (No space left on device)\n"
+
+
+def test_names_from_files_do_not_steer_the_terminal(capsys):
+    name = "\x1b[31mred\x1b]0;title\x07 [bold]ship[/] :ship: \u202eright to left\x9b2J"
+    table = terminal.plain_table(name, name)
+    table.add_row(name, Text(name))
+    for printed in (name, Text(name), table):
+        terminal.out.print(printed, soft_wrap=True)
+    terminal.warn(name)
+    shown = capsys.readouterr()
+    for text in (shown.out, shown.err):
+        assert not {*"\x1b\x07\u202e\x9b"} & {*text}
+        assert "[31mred]0;title [bold]ship[/] :ship: right to left2J" in text
