@@ -5,6 +5,7 @@ from agents import LQ, PID, sail
 from agents.rollouts.metrics import evaluate, reversals, step_figures, worst_step_cost
 from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
+from shipgym.tasks.guidance import wrapped
 
 KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})
 PATH = BenchmarkTask("path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1})
@@ -101,6 +102,29 @@ def test_overshoot_and_settling_of_a_damped_oscillation():
         outside = t[np.abs(response) > 0.05].max()
         assert (settling, unsettled) == (pytest.approx(outside + 0.1), 0.0)
     assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (0.0, 2.0, 1.0)  # has not settled
+
+
+def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):
+    """One change of course of 20 degrees, which LQ makes with little overshoot well before the end."""
+    options = {"course_changes_deg": [20.0], "change_interval_steps": 400, "episode_steps": 300}
+    found = evaluate(lq, BenchmarkTask("change", "course-keeping", "mariner", options=options), SEEDS[:2])
+    error = np.degrees(wrapped(found.run.states["set_point"] - found.run.states["psi"]))
+    np.testing.assert_allclose(error[0], 20.0)
+    np.testing.assert_allclose(found.figures["overshoot_percent"], -error.min(axis=0) / 20.0 * 100.0)
+    last_outside = np.array([np.flatnonzero(np.abs(one) > 1.0)[-1] for one in error.T])
+    np.testing.assert_allclose(found.figures["settling_s"], (last_outside + 1) * found.run.dt)
+    assert (found.figures["unsettled"] == 0.0).all()
+    assert (found.figures["overshoot_percent"] < 20.0).all()
+
+
+def test_each_change_of_course_counts_once(lq):
+    """Two changes that never settle, beside one too small to count."""
+    options = {"course_changes_deg": [20.0, 30.0, 2.0], "change_interval_steps": 50, "episode_steps": 150}
+    task = BenchmarkTask("changes", "course-keeping", "mariner", options=options)
+    figures = evaluate(steady(0.0), task, SEEDS[:2]).figures
+    np.testing.assert_allclose(figures["unsettled"], 1.0)
+    np.testing.assert_allclose(figures["settling_s"], 49.0 * task.engine(1).dt, rtol=0.05)
+    np.testing.assert_allclose(figures["overshoot_percent"], 0.0, atol=1e-9)
 
 
 FAILURES = {

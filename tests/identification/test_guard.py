@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -26,6 +27,15 @@ def test_a_ship_that_runs_away_is_found_with_the_reason(mariner: ShipModel, cao_
     reasons = reasons_unstable(runaway(mariner), [cao_zigzag])
     assert "trial 'zigzag_15_15', open loop" in reasons[0]
     assert any("turning circle" in reason for reason in reasons_unstable(runaway(mariner), []))
+
+
+def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(mariner: ShipModel) -> None:
+    """A restoring moment and hardly any damping: she turns steadily, but swings up where the rudder does."""
+    c = mariner.coefficients
+    swinging = replace(mariner, coefficients=c | {"N_v": -c["N_v"], "N_r": -0.3 * c["N_r"]})
+    reasons = reasons_unstable(swinging, [])
+    assert reasons
+    assert all(re.match(r"rudder [+-]\d+ deg reversed every [\d.]+ L/U: ", reason) for reason in reasons)
 
 
 def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:

@@ -71,6 +71,22 @@ def test_noise_of_the_position_shows_in_the_cross_track_error():
     assert np.std(wrong) == pytest.approx(2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count))
 
 
+def test_the_course_to_steer_is_that_of_the_position_shown():
+    """So satellite noise reaches it: what remains of the heading error's noise is the compass's alone."""
+    count, lookahead, length = 4000, 0.2, 160.93
+    env = many(count, PATH, noise=2.0, lookahead=lookahead, waypoints=[[0.0, 0.0], [-3000.0, 4000.0]])
+    env.reset(seed=0)
+    seen, *_, infos = env.step(idle(env))
+    shown = dict(zip(env.observation_names, (seen * env.observation_scales).T, strict=True))
+    wrong = np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"]) - infos["heading_error"]
+    ahead = lookahead * length
+    of_position = np.arctan2(infos["cross_track"], ahead) - np.arctan2(shown["cross_track"], ahead)
+    margin = 5.0 / np.sqrt(2 * count)
+    assert np.std(of_position) > np.std(wrong - of_position)
+    compass = 2.0 * SEA_TRIAL["psi"].noise
+    assert np.std(wrong - of_position) == pytest.approx(compass, rel=margin)
+
+
 def test_noise_is_only_shown_and_none_is_none():
     plain, none, noisy = (make(**options) for options in ({}, {"noise": 0.0}, {"noise": 2.0}))
     for env in (plain, none, noisy):

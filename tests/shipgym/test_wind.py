@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Wind, load_model
-from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
+from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves, wind_tables
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names
+from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names, isherwood_coefficients
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
@@ -56,6 +56,39 @@ def test_isherwood_worked_by_hand():
     assert at(curves, 60)[0] == pytest.approx(CX_60 * frontal)
     assert at(curves, 90)[1] == pytest.approx(-CY_90 * lateral)
     assert at(curves, 90)[2] == pytest.approx(-CN_90 * lateral * length)
+    assert at(curves, 90)[3] == pytest.approx(at(curves, 90)[1] * 9.0)  # heels about the waterline
+    house = 0.15 * 0.07 * 175.0**2
+    CY_130 = 1.014 + 0.191 * 2.0 * frontal / beam**2 - 0.280 * perimeter / length - 0.69 * 94.0 / length
+    assert at(curves, 130)[1] == pytest.approx(-(CY_130 + 0.44 * house / lateral) * lateral)
+
+
+def test_isherwoods_superstructure_is_felt_on_the_quarter_only():
+    hull = {"length": 180.0, "beam": 25.4, "lateral_area": 2700.0, "frontal_area": 600.0, "perimeter": 234.5}
+    bare, housed = (
+        isherwood_coefficients(**hull, bow_to_centroid=94.0, masts=2.0, superstructure_area=area)
+        for area in (0.0, 0.5 * 2700.0)
+    )
+    angles = np.arange(0, 181, 10)
+    more = dict(zip(angles.tolist(), (housed[1] - bare[1]).round(12).tolist(), strict=True))
+    assert {angle: value for angle, value in more.items() if value} == {
+        120: 0.17, 130: 0.22, 140: 0.19, 150: 0.135
+    }  # fmt: skip
+    np.testing.assert_array_equal(bare[0], housed[0])
+    np.testing.assert_array_equal(bare[2], housed[2])
+
+
+def test_published_tables_keep_their_numbers():
+    """Sums of the columns of Isherwood's three tables and of Blendermann's."""
+    found = [
+        table.sum(axis=0).round(6).tolist() for table in (wind_tables._CX, wind_tables._CY, wind_tables._CN)
+    ]
+    assert found == [
+        [6.664, -13.63, 0.929, -0.633, -2.477, 4.63, 0.115],
+        [11.104, 7.43, 1.686, 0.003, -1.283, -7.54, 1.43],
+        [2.3069, 2.589, -0.2483, 0.086, 0.4644, -6.981],
+    ]
+    sums = np.sum(list(BLENDERMANN.values()), axis=0)
+    assert sums.round(6).tolist() == [14.65, 10.35, 10.525, 9.0, 24.8]
 
 
 @pytest.mark.parametrize("coefficients", coefficient_names())
