@@ -1,15 +1,15 @@
 """Put small faults into modules, one at a time, and see whether the tests beside the module notice.
 
-`make mutate MODULES="shipgym/sea identification/estimators/l_curve.py"` draws 40 faults of these modules; `--count 300`
-of all of them. `tests/beside.toml` says which tests stand beside a module.
+`make mutate MODULES="shipgym/sea identification/estimators/l_curve.py"` draws 40 faults of these
+modules, by default of all. `tests/beside.toml` says which tests stand beside a module.
 
-The faults: a sign or factor turned over, a constant 10 % larger, a condition or comparison turned round, a statement
-dropped, a value not returned. Where they fit, they are cosmic-ray's; its own loop changes the files in place and runs
-the same tests for all modules, so here a copy of the tree is changed, and each module has its tests. (mutmut puts a
-dispatcher around every function, which Numba does not compile.)
+The faults: a sign or factor turned over, a constant 10 % larger, a condition or comparison turned round, a
+statement dropped, a value not returned. Where they fit, they are cosmic-ray's. Its own loop changes the files
+in place and runs the same tests for all modules; here a copy of the tree is changed, and each module has its
+tests. (mutmut puts a dispatcher around every function, which Numba does not compile.)
 
-A fault that makes tests run into the time limit counts as noticed. Annotations, imports, docstrings and what stands
-under TYPE_CHECKING have no faults.
+A fault that makes tests run into the time limit counts as noticed. Annotations, imports, docstrings and what
+stands under TYPE_CHECKING have no faults.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ import tempfile
 import time
 import tomllib
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
@@ -46,73 +46,71 @@ from cosmic_ray.operators import (
     unary_operator_replacement,
 )
 from cosmic_ray.operators.operator import Operator
+from parso.tree import search_ancestor
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("shipgym", "identification", "agents")
 #: loaded once, before the processes of the tests are forked
 PRELOADED = ["numpy", "scipy.optimize", "scipy.signal", "sklearn.svm", "numba", "gymnasium"]
+#: Kinds of statements that are not dropped.
+KEPT = {"import_name", "import_from", "return_stmt", "global_stmt", "nonlocal_stmt"}
+KEPT |= {"string", "strings", "keyword", "operator"}  # docstrings, pass, ...
 
 
-class LargerConstant(Operator):
+class OwnOperator(Operator):
+    """An operator of our own; the examples are for cosmic-ray's own tests."""
+
+    @classmethod
+    def examples(cls):
+        """Return none."""
+        return ()
+
+
+class LargerConstant(OwnOperator):
     """A number 10 % larger, an integer by at least one."""
 
     def mutation_positions(self, node):
+        """Numbers but imaginary ones."""
         if is_number(node) and "j" not in node.value.lower():
             yield node.start_pos, node.end_pos
 
     def mutate(self, node, index):
+        """Return the larger number."""
         value = ast.literal_eval(node.value)
         larger = value + max(1, value // 10) if isinstance(value, int) else 1.1 * value or 0.1
         return parso.python.tree.Number(repr(larger), node.start_pos, node.prefix)
 
-    @classmethod
-    def examples(cls):
-        return ()
 
-
-class DroppedStatement(Operator):
+class DroppedStatement(OwnOperator):
     """A statement within a function that is left out."""
 
-    kept = [
-        "import_name",
-        "import_from",
-        "return_stmt",
-        "global_stmt",
-        "nonlocal_stmt",
-        "string",
-        "strings",
-        "keyword",
-        "operator",
-    ]
-
     def mutation_positions(self, node):
-        if node.type == "simple_stmt" and node.children[0].type not in self.kept:
-            if parso.tree.search_ancestor(node, "funcdef"):
-                yield node.start_pos, node.end_pos
+        """Simple statements but for those that do nothing, and those that return, which `LostReturn` has."""
+        if (
+            node.type == "simple_stmt"
+            and node.children[0].type not in KEPT
+            and search_ancestor(node, "funcdef")
+        ):
+            yield node.start_pos, node.end_pos
 
     def mutate(self, node, index):
+        """Return `pass` with the end of the line."""
         prefix = node.get_first_leaf().prefix
         return parso.python.tree.Name(f"pass{node.get_last_leaf().value}", node.start_pos, prefix)
 
-    @classmethod
-    def examples(cls):
-        return ()
 
-
-class LostReturn(Operator):
+class LostReturn(OwnOperator):
     """A function that returns None."""
 
     def mutation_positions(self, node):
+        """Statements that return something else."""
         if node.type == "return_stmt" and node.children[1].get_code().strip() != "None":
             yield node.start_pos, node.end_pos
 
     def mutate(self, node, index):
+        """Return the statement without its value."""
         node.children[1] = parso.python.tree.Name("None", node.children[1].start_pos, " ")
         return node
-
-    @classmethod
-    def examples(cls):
-        return ()
 
 
 def _named(module, prefix: str, pairs: str) -> list[Operator]:
@@ -294,17 +292,15 @@ def refuse_failing_tests(tests: list[str], folder: Path, limit_s: float) -> None
 def main() -> None:
     """Draw faults, try them, and print those that nobody noticed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument(
-        "modules", nargs="*", default=PACKAGES, help="files and folders; all where none is given"
-    )
+    parser.add_argument("modules", nargs="*", default=PACKAGES, help="files and folders; by default all")
     parser.add_argument("--count", type=int, default=40, help="how many faults are drawn")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--limit", type=float, default=300.0, help="seconds for the tests of one fault")
     parser.add_argument(
-        "--log", type=Path, help="JSON lines, one a fault; what is in it already is not tried again"
+        "--log", type=Path, help="JSON lines, a fault each; those in it already are not tried again"
     )
-    parser.add_argument("--trust", action="store_true", help="do not run the tests without any fault first")
+    parser.add_argument("--trust", action="store_true", help="do not run the tests without a fault first")
     asked = parser.parse_args()
     multiprocessing.get_context("forkserver").set_forkserver_preload(PRELOADED)
     log = asked.log.read_text("utf-8").splitlines() if asked.log and asked.log.exists() else []
@@ -323,7 +319,9 @@ def main() -> None:
             tests = sorted({test for fault in wanted for test in beside(fault.module)})
             refuse_failing_tests(tests, Path(temporary) / "0", 3 * asked.limit)
         with ThreadPoolExecutor(asked.jobs) as pool:
-            for result in pool.map(lambda fault: tried(fault, folders, asked.limit), wanted):
+            tasks = [pool.submit(tried, fault, folders, asked.limit) for fault in wanted]
+            for task in as_completed(tasks):
+                result = task.result()
                 results.append(result)
                 if asked.log:
                     with asked.log.open("a", encoding="utf-8") as stream:

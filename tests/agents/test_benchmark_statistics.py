@@ -57,7 +57,7 @@ def test_training_runs_that_differ_widen_the_interval():
 
 
 def test_intervals_of_every_statistic_are_those_of_theory():
-    """Half-widths within a tenth of 1.96 standard errors; the middle half of normal costs has 1.19 of the mean's."""
+    """Half-widths of 1.96 standard errors: the middle half of normal costs has 1.19 times that variance."""
     costs = np.random.default_rng(3).normal(50.0, 10.0, (1, 4000))
     draws = Draws(1, 4000, n_draws=1000)
     sigma = 10.0 / np.sqrt(4000)

@@ -92,7 +92,7 @@ def test_every_choice_gains_and_none_loses(ship: ShipModel, criterion: str) -> N
 
 
 def test_criteria_ask_for_volume_longest_axis_or_one_coefficient() -> None:
-    """Relative errors 0.1, 0.01 and 1: what narrows the narrow axes most shrinks the volume, not the longest."""
+    """Relative errors 0.1, 0.01 and 1: to narrow a narrow axis shrinks the volume, not the longest axis."""
     known, size = np.diag([1e2, 1e4, 1.0]), np.ones(3)
     offers = {"first": np.diag([1e8, 0.0, 0.0]), "longest": np.diag([0.0, 0.0, 15.0])}
 

@@ -88,6 +88,22 @@ def test_without_penalty_it_is_least_squares() -> None:
     np.testing.assert_allclose([*estimator.coef_, estimator.intercept_], expected, rtol=1e-8)
 
 
+@pytest.mark.parametrize("n", [60, 9])
+def test_gcv_keeps_the_rank_of_least_generalised_cross_validation(n: int) -> None:
+    """Targets in two of eight directions, and noise: the score of each rank is worked out from its fit."""
+    rng = np.random.default_rng(4)
+    X = np.linalg.qr(rng.standard_normal((n, 8)))[0] * np.geomspace(1.0, 1e-3, 8)
+    y = 5.0 * X[:, 0] - 40.0 * X[:, 1] + 0.05 * rng.standard_normal(n)
+    scores = []
+    for rank in range(1, 9):
+        fit = TruncatedLSSVM(rank=rank, scale=False, fit_intercept=False).fit(X, y)
+        residual = y - fit.predict(X)
+        scores.append(float(residual @ residual) / (n - rank) ** 2 if n > rank else np.inf)
+    chosen = TruncatedLSSVM(selection="gcv", scale=False, fit_intercept=False).fit(X, y).rank_
+    assert chosen == int(np.argmin(scores)) + 1
+    assert 2 <= chosen < 8
+
+
 def test_standardised_fit_does_not_depend_on_units() -> None:
     X, y, _ = regression()
     units = np.geomspace(1e-4, 1e4, X.shape[1])
