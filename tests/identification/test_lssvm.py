@@ -322,3 +322,17 @@ def test_support_vectors_shrug_off_outliers_too() -> None:
         estimator.weights_[np.argmax(np.abs(y - estimator.predict(X)))] < 0.1 < np.median(estimator.weights_)
     )
     assert np.all(np.linalg.eigvalsh(estimator.covariance_) > 0.0)
+
+
+def test_what_an_estimator_cannot_do_is_refused() -> None:
+    X, y, _ = regression(n=40, m=3)
+    with pytest.raises(InputError, match="C: inf found, expected a finite number with kernel 'rbf'"):
+        LSSVM(C=np.inf, kernel="rbf").fit(X, y)
+    for scale in ([1.0, 1.0], [1.0, 0.0, 1.0], [1.0, np.nan, 1.0]):
+        with pytest.raises(InputError, match="expected 3 finite numbers above 0, True or False"):
+            LSSVM(scale=scale).fit(X, y)
+    for share in (0.0, 1.1):
+        with pytest.raises(InputError, match="expected a share above 0 and at most 1"):
+            TruncatedLSSVM(selection="explained-variance", explained_variance=share).fit(X, y)
+    with pytest.raises(InputError, match="objective: 'free-running' found"):
+        TunedLSSVM(objective="free-running").fit(X, y)

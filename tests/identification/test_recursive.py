@@ -231,3 +231,17 @@ def test_samples_that_do_not_fit_are_named() -> None:
         coefficient_history(
             hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, "ls"
         )
+
+
+@pytest.mark.parametrize(
+    ("phi", "y", "message"),
+    [
+        (np.zeros((5, 2)), np.zeros(4), r"shapes \(5, 2\) and \(4,\) found"),
+        (np.zeros((5, 3, 2)), np.zeros((5, 2)), "3 signals found, expected 2 as in y"),
+        (np.zeros((5, 2, 2, 2)), np.zeros(5), "found, expected \\(n_samples, n_features\\)"),
+        (np.full((5, 2), np.inf), np.zeros(5), "not finite"),
+    ],
+)
+def test_samples_that_do_not_belong_together_are_refused(phi: Any, y: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        RecursiveLeastSquares().update(phi, y)

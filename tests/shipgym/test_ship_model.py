@@ -196,3 +196,20 @@ def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):
     assert distances.max() == pytest.approx(1.0)
     away = envelope.centre + 3.0 * (points[distances.argmax()] - envelope.centre)
     assert envelope.distance(*away) == pytest.approx(3.0)
+
+
+def test_what_cannot_be_simulated_or_sampled_is_refused():
+    mariner = shipgym.load_model("mariner")
+    for dt in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="expected a step in s above 0"):
+            mariner.simulate(np.zeros((5, 1)), dt)
+    for state in (np.zeros(3), np.full(len(mariner.state_names), np.nan)):
+        with pytest.raises(InputError, match="finite numbers for x, y, psi, u, v, r, delta"):
+            mariner.simulate(np.zeros((5, 1)), 1.0, state)
+    with pytest.raises(InputError, match="'mariner' has no covariance"):
+        mariner.sample(2, 0)
+    trial = mariner.simulate(np.zeros((5, 1)), 1.0)
+    for name in ("psi", "u", "v", "r", "delta"):
+        rest = {one: trial[one] for one in trial.channels if one != name}
+        with pytest.raises(InputError, match=f"channel '{name}' is missing, it is needed to predict"):
+            open_loop(mariner, shipgym.Trial(trial.t, rest))

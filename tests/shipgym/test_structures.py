@@ -260,3 +260,11 @@ def test_nomoto_is_recovered_from_its_own_linear_form():
     gain, time = 0.031, 30.2487
     found = nomoto(virtual_ship("nomoto", c_r=-1.0 / time, c_d=gain / time))
     np.testing.assert_allclose([found.K, found.T], [gain, time], rtol=1e-6)
+
+
+def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
+    table = get_structure("nomoto2")
+    assert table.regressed == ("r",)
+    assert table.regression_names("r") == table.names("r") + table.names("q")
+    assert table.state_names == ("x", "y", "psi", "u", "v", "r", "q", "delta")
+    assert get_structure("nomoto").regression_names("r") == get_structure("nomoto").names("r")
