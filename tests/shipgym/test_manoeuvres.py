@@ -157,8 +157,8 @@ def test_what_a_trial_lacks_is_named():
         manoeuvres.zigzag_indices(trial)
     with pytest.raises(InputError, match="'delta' is missing, it shows when the rudder moved"):
         manoeuvres.zigzag_indices(Trial(np.arange(5.0), {"psi": np.zeros(5)}))
+    turn = manoeuvres.turning_circle(load_model("mariner"), 35)
     with pytest.raises(InputError, match="length is not known; give length in m"):
-        turn = manoeuvres.turning_circle(load_model("mariner"), 35)
         manoeuvres.turning_indices(Trial(turn.t, {name: turn[name] for name in turn.channels}))
     with pytest.raises(InputError, match="'x' is missing"):
         manoeuvres.turning_indices(trial)
