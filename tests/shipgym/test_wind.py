@@ -139,6 +139,28 @@ def test_estimates_are_marked_and_given_areas_are_used():
     assert 330.0 * 9.2 < estimated.lateral_area < 1.5 * 330.0 * 9.2
 
 
+def test_what_is_not_known_above_the_water_is_estimated_as_documented():
+    """KVLCC2, 320 x 58 x 20.8 m, CB 0.81: a house of 48 x 22.4 m stands at 0.42 L aft, 0.6 B wide."""
+    ship = weather_particulars(KVLCC2)
+    deck, house = 20.8 * (1.3 - 1.05 * 0.81), 48.0 * 22.4
+    assert ship.length_overall == pytest.approx(1.03 * 320.0)
+    assert ship.frontal_area == pytest.approx(58.0 * (deck + 0.6 * 22.4))
+    assert ship.lateral_area == pytest.approx(329.6 * deck + house)
+    assert ship.lateral_centroid == pytest.approx(-0.42 * 320.0 * house / (329.6 * deck + house))
+    height = (329.6 * deck * deck / 2.0 + house * (deck + 11.2)) / (329.6 * deck + house)
+    assert ship.lateral_centroid_height == pytest.approx(height)
+    assert ship.metacentric_height == pytest.approx(2.9)
+    factor = 0.373 + 0.023 * 58.0 / 20.8 - 0.043 * 3.2  # below 0.3, which counts
+    assert factor < 0.3
+    assert ship.roll_period == pytest.approx(2.0 * 0.3 * 58.0 / np.sqrt(2.9))
+    fine = weather_particulars(Particulars(length=120.0, beam=20.0, draught=5.0, block_coefficient=0.6))
+    assert fine.lateral_centroid == 0.0  # the house amidships
+    factor = 0.373 + 0.023 * 4.0 - 0.043 * 1.2
+    assert fine.roll_period == pytest.approx(2.0 * factor * 20.0 / np.sqrt(1.0))
+    boat = weather_particulars(Particulars(length=12.0, beam=4.0, draught=1.0, block_coefficient=0.5))
+    assert boat.roll_period == pytest.approx(2.0 * (0.373 + 0.092 - 0.043) * 4.0 / np.sqrt(0.2))
+
+
 def test_a_table_of_ones_own_is_followed():
     table = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0), (0.0, 1.2, 0.0))
     curves = wind_curves(S175, table)
@@ -171,6 +193,14 @@ def test_gusts_are_as_strong_as_over_a_rough_sea():
     norsok = gust_filter(Wind(15.0, spectrum="norsok")).standard_deviation / 15.0
     assert norsok == pytest.approx(0.06 * (1.0 + 0.043 * 15.0), rel=0.15)
     assert gust_filter(Wind(15.0, gust=False)).standard_deviation == 0.0
+
+
+def test_time_constants_of_gusts_are_those_of_their_most_energetic_frequency():
+    """T = 1 / (2 pi f): 165.4 m and 110.3 m by the wind speed for Harris and Davenport."""
+    for speed in (5.0, 20.0):
+        assert gust_filter(Wind(speed)).time_constant == pytest.approx(165.4 / speed, rel=1e-3)
+        davenport = gust_filter(Wind(speed, spectrum="davenport")).time_constant
+        assert davenport == pytest.approx(110.3 / speed, rel=1e-3)
 
 
 @pytest.mark.parametrize(("spectrum", "bound"), [("harris", 0.18), ("davenport", 0.21), ("norsok", 0.65)])
