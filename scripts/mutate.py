@@ -124,11 +124,7 @@ KINDS: dict[str, list[Operator]] = {
         *_named(binary_operator_replacement, "ReplaceBinaryOperator", "Add_Sub Sub_Add Mul_Div Div_Mul"),
         *_named(unary_operator_replacement, "ReplaceUnaryOperator", "Delete_USub"),
     ],
-    "constant": [
-        LargerConstant(),
-        boolean_replacer.ReplaceTrueWithFalse(),
-        boolean_replacer.ReplaceFalseWithTrue(),
-    ],
+    "constant": [LargerConstant()],
     "condition": [
         boolean_replacer.AddNot(),
         boolean_replacer.ReplaceAndWithOr(),

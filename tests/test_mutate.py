@@ -21,10 +21,7 @@ def half(x: "int | None", go: bool = True) -> float | None:
 '''
 EXPECTED = {
     "sign": {"y = x * 2 - 1", "y = x / 2 + 1", "return y if y < LIMIT else LIMIT"},
-    "constant": {
-        'LIMIT: "float | None" = 2.75', "y = x / 3 - 1", "y = x / 2 - 2",
-        'def half(x: "int | None", go: bool = False) -> float | None:',
-    },
+    "constant": {'LIMIT: "float | None" = 2.75', "y = x / 3 - 1", "y = x / 2 - 2"},
     "condition": {
         "if not x is None or not go:", "if x is None and not go:", "if x is None or  go:",
         "return y if not y < LIMIT else -LIMIT",

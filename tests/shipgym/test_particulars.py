@@ -146,3 +146,12 @@ def test_what_no_ship_has_is_refused(values, message):
         Particulars.from_mapping(KVLCC2 | values, "ship.toml: [ship]")
     assert str(caught.value).startswith("ship.toml: [ship]")
     assert message in str(caught.value)
+
+
+def test_inertia_is_about_midship():
+    """The gyradius is about the centre of gravity, which stands xg forward (Steiner)."""
+    ship = Particulars(length=100.0, mass=8e6, xg=5.0, yaw_gyradius=25.0, water_density=1000.0)
+    unit = 0.5 * 1000.0 * 100.0**3
+    assert ship.mass_prime == pytest.approx(8e6 / unit)
+    assert ship.xg_prime == pytest.approx(0.05)
+    assert ship.inertia_prime == pytest.approx(8e6 * (25.0**2 + 5.0**2) / (unit * 100.0**2))
