@@ -268,3 +268,24 @@ def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
     assert table.regression_names("r") == table.names("r") + table.names("q")
     assert table.state_names == ("x", "y", "psi", "u", "v", "r", "q", "delta")
     assert get_structure("nomoto").regression_names("r") == get_structure("nomoto").names("r")
+
+
+@pytest.mark.parametrize(
+    ("name", "equations", "message"),
+    [
+        ("nomoto", {"r": "r, delta"}, "name 'nomoto' found, which is another structure's"),
+        ("kvlcc2", {"r": "r, delta"}, "name 'kvlcc2' found, which is another structure's"),
+        ("grey-box", {"r": "r, delta"}, "name 'grey-box' found, which is another structure's"),
+        ("mine", {"r": 3}, "equations.r: 3 found, expected formulas such as"),
+        ("mine", {"r": ["r", "delta"]}, "equations.r: 'r' found, expected a formula in one text, or Terms"),
+    ],
+)
+def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, message):
+    with pytest.raises(InputError, match=message):
+        shipgym.register_structure(name, equations)
+    assert "mine" not in STRUCTURES
+
+
+def test_a_grey_box_is_no_structure_by_itself():
+    with pytest.raises(InputError, match="'grey-box' found, which is a reference ship and a table of terms"):
+        get_structure("grey-box")

@@ -11,12 +11,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from scipy.signal import bilinear, lfilter
 
 import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
 from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
+from shipgym.instruments import bridge
 from shipgym.sea import (
     AIR_DENSITY,
     Current,
@@ -309,6 +311,20 @@ def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gu
     ahead = u * np.cos(bow) + v * np.sin(bow)
     met_at = max(abs(0.628 + 0.628**2 / 9.81 * ahead), 0.0628)
     assert open_sea.encounter_frequency(motion, sea, p) == pytest.approx(met_at)
+
+
+def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
+    """Notch (s^2 + 0.2 w s + w^2) / (s^2 + 1.4 w s + w^2), its frequency kept (Fossen 11.1.2)."""
+    turn, signal = 0.4, np.random.default_rng(0).standard_normal(200)
+    w = 2.0 * np.tan(0.5 * turn)
+    b, a = bilinear([1.0, 0.2 * w, w * w], [1.0, 1.4 * w, w * w], fs=1.0)
+    rest = np.concatenate([np.zeros(2), signal - signal[0]])
+    expected = signal - (lfilter(b, a, rest)[2:] + signal[0])
+    memory, taken = bridge.Notch(0.0, 0.0, 0.0, 0.0), []
+    for k, value in enumerate(signal):
+        memory = bridge.notched(value, turn, k == 0, memory)
+        taken.append(memory.taken_1)
+    np.testing.assert_allclose(taken, expected, atol=1e-12)
 
 
 def test_a_sea_begins_and_goes_on_as_it_always_was():
