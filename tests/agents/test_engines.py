@@ -118,6 +118,7 @@ def test_progress_counts_equal_jobs_each_and_two_tries_more_are_usual(functions,
     told = []
     run_jobs(functions.spectrum, [{"seed": 1}] * 3, progress=lambda *progress: told.append(progress))
     assert told == [(0, 3), (3, 3)]
+    assert len(run_jobs(functions.spectrum, [{"seed": 1}], retries=0)) == 1
     assert inspect.signature(run_jobs).parameters["retries"].default == 2
     assert inspect.signature(run_jobs).parameters["workers"].default == 1
 
@@ -204,6 +205,10 @@ def test_workers_end_with_the_process_that_started_them(functions, tmp_path, num
         ({"retries": -1}, "retries: -1 found"),
         ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
         ({"engine": "ray", "address": "10.0.0.1"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:65536"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:0"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": ":6379"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:ray"}, "expected 'HOST:PORT'"),
         ({"function": lambda job: job}, "top level of a module"),
         ({"jobs": [{"k": object()}]}, r"jobs\[0\]: .* found, expected a dict of numbers"),
         ({"jobs": [{"k": math.nan}]}, r"jobs\[0\]"),

@@ -245,3 +245,11 @@ def test_samples_that_do_not_fit_are_named() -> None:
 def test_samples_that_do_not_belong_together_are_refused(phi: Any, y: Any, message: str) -> None:
     with pytest.raises(InputError, match=message):
         RecursiveLeastSquares().update(phi, y)
+
+
+def test_settings_reach_to_their_bounds() -> None:
+    for least in ({"start_samples": 0}, {"start_interval": 1}, {"forgetting": 1.0}, {"C": 1e-9}):
+        assert np.isfinite(RecursiveLeastSquares(**least).fit(*regression()).coef_).all()
+    for wrong in ({"start_interval": 0}, {"forgetting": 0.0}, {"C": 0.0}, {"start_C": 0.0}):
+        with pytest.raises(InputError, match=f"{next(iter(wrong))}: 0 found"):
+            RecursiveLeastSquares(**wrong).fit(*regression())

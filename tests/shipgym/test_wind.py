@@ -8,6 +8,7 @@ import pytest
 from shipgym import InputError, Particulars, Wind, load_model
 from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves, wind_tables
 from shipgym.sea.estimates import weather_particulars
+from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names, isherwood_coefficients
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
@@ -225,3 +226,10 @@ def test_a_simulated_gust_has_the_spectrum_of_the_filter():
     low = (f > 0) & (f < 0.1)  # well below the Nyquist frequency of 1 Hz
     np.testing.assert_allclose(density[low], gust.spectrum(f[low]), rtol=0.25)
     assert density[low].sum() == pytest.approx(gust.spectrum(f[low]).sum(), rel=0.03)
+
+
+def test_the_spectrum_of_a_process_holds_its_variance_and_halves_at_its_corner():
+    process = GaussMarkov(30.0, 2.0)
+    f = np.concatenate([[0.0], np.geomspace(1e-7, 1e4, 200_000)])
+    assert np.trapezoid(process.spectrum(f), f) == pytest.approx(4.0, rel=1e-4)
+    assert process.spectrum(1.0 / (2.0 * np.pi * 30.0)) == pytest.approx(0.5 * process.spectrum(0.0))
