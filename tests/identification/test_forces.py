@@ -157,3 +157,14 @@ def test_trials_of_the_other_kind_are_refused() -> None:
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
     with pytest.raises(InputError, match="mass of the ship and the added mass"):
         ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_numbers()
+
+
+def test_rows_of_the_regression_know_their_force_and_their_trial() -> None:
+    runs = tank_tests()[:3]
+    found = force_regression(runs, PMM18, PARTICULARS)
+    rows = len(found.targets)
+    assert found.features.shape == (rows, len(PMM18.coefficient_names))
+    assert found.equation.shape == found.trial.shape == (rows,)
+    of_axis = [found.trial[found.equation == k].tolist() for k in range(3)]
+    assert of_axis[0] == of_axis[1] == of_axis[2] == sorted(of_axis[0])
+    assert {k: of_axis[0].count(k) for k in range(3)} == {k: len(run) for k, run in enumerate(runs)}
