@@ -1,7 +1,10 @@
+from itertools import count
+
 import numpy as np
 import pytest
 
 from agents import LQ, PID, sail
+from agents.rollouts import rollout as rollout_module
 from agents.rollouts.metrics import evaluate, reversals, step_figures, worst_step_cost
 from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
@@ -166,6 +169,15 @@ def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(ho
     )
     for name, values in found.figures.items():
         np.testing.assert_array_equal(values[~concerned], sails.figures[name][~concerned], err_msg=name)
+
+
+def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypatch):
+    """A clock that goes on by half a second whenever it is read: each call takes so long."""
+    clock = count(0.0, 0.5)
+    monkeypatch.setattr(rollout_module.time, "process_time", lambda: next(clock))
+    run = evaluate(steady(0.0), KEEPING, SEEDS[:2]).run
+    calls = run.sailing.shape[0]
+    assert run.seconds_per_action == pytest.approx(0.5 * calls / run.sailing.sum(), rel=0.01)
 
 
 def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():

@@ -133,6 +133,13 @@ def test_what_cannot_be_reduced_is_named() -> None:
         backward_elimination(X[:20], y[:20], NAMES)
     with pytest.raises(InputError, match="b is 0 throughout"):
         forward_selection(X * np.array([1.0, 0, 1, 1, 1, 1, 1, 1]), y, NAMES)
+    for wrong in ((np.where(X > 2.0, np.nan, X), y), (X, np.append(y[1:], np.inf))):
+        with pytest.raises(InputError, match="a value that is not finite found"):
+            backward_elimination(*wrong, NAMES)
+    with pytest.raises(InputError, match="y is 0 throughout"):
+        forward_selection(X, 0.0 * y, NAMES)
+    with pytest.raises(InputError, match="one name a term"):
+        backward_elimination(X, y[:-1], NAMES)
     with pytest.raises(InputError, match="one name a term"):
         backward_elimination(X, y, NAMES[:3])
 

@@ -15,6 +15,7 @@ import shipgym
 from shipgym import InputError
 from shipgym.engine.motion import Motion, Ship
 from shipgym.envs.engine import Engine
+from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping
 from shipgym.tasks.contract import Interval, Random
@@ -287,6 +288,9 @@ def test_wrong_batches(mariner):
         engine.step(np.zeros((3, 1)))
     with pytest.raises(InputError, match="nan found in lane 1"):
         engine.step([[0.0], [np.nan]])
+    pool = Randomisation(speed_range=(0.8, 1.0))
+    with pytest.raises(InputError, match="several lanes' ships and a pool of ships"):
+        Engine([mariner, mariner], 2, randomisation=pool)
     with pytest.raises(InputError, match="models: of several structures"):
         Engine([mariner, shipgym.load_model("kvlcc2")], 2)
     for lanes, message in (

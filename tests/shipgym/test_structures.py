@@ -289,3 +289,11 @@ def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, mes
 def test_a_grey_box_is_no_structure_by_itself():
     with pytest.raises(InputError, match="'grey-box' found, which is a reference ship and a table of terms"):
         get_structure("grey-box")
+
+
+def test_structures_are_listed_by_the_names_of_their_sources():
+    names = set(shipgym.ships.list_structures())
+    assert {f"zhu-{k}" for k in range(1, 11)} <= names
+    assert {"abkowitz", "cubic", "nomoto", "nomoto2", "norrbin", "surge", "steering5", "steering7"} <= names
+    assert {"linear-steering", "mmg4dof", "pmm18", "pmm38", "surge-perturbed"} <= names
+    assert "zhu-11" not in names
