@@ -219,3 +219,20 @@ def test_pattern_search_goes_downhill_on_a_mesh_that_it_halves() -> None:
     few = pattern_search(bowl, [9.0, -9.0], [0.0, 0.0], [4.0, 8.0], most_evaluations=10)
     assert seen[0] == (4.0, 0.0)  # the start is brought into the box
     assert 10 <= few.evaluations <= 13
+
+
+@pytest.mark.parametrize(
+    ("optimiser", "least"),
+    [
+        (ArtificialBeeColony, {"sources": 2, "rounds": 1, "limit": 1}),
+        (ParticleSwarm, {"particles": 1, "rounds": 1}),
+        (GridSearch, {"points": 3, "refinements": 0}),
+        (DifferentialEvolution, {"members": 5, "rounds": 1}),
+    ],
+)
+def test_searches_may_be_as_small_as_they_say(optimiser: Any, least: dict[str, int]) -> None:
+    found = optimiser(**least).minimise(sphere, BOX)
+    assert np.isfinite(found.value)
+    for name, value in least.items():
+        with pytest.raises(InputError, match=f"{name}: {value - 1} found"):
+            optimiser(**{name: value - 1}).minimise(sphere, BOX)

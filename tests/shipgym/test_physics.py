@@ -11,7 +11,7 @@ from shipgym import manoeuvres, scale_model
 from shipgym.engine import motion
 from shipgym.engine.motion import Ship
 from shipgym.ships.catalogue import REFERENCE_SHIPS
-from shipgym.ships.inertia import inertia
+from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.term_table import Structure
 
 SHIPS = tuple(REFERENCE_SHIPS)
@@ -208,3 +208,50 @@ def test_a_ship_is_lost_beyond_what_any_ship_does(velocities, heel, lost, monkey
     assert motion.lost(state, SHIP) == lost
     monkeypatch.setattr(motion, "HAS_ROLL", False)
     assert motion.lost(state, SHIP) == (lost and heel == 0.0)
+
+
+def test_inertia_of_each_ship_is_that_of_her_source():
+    """KVLCC2 of Yasukawa & Yoshimura 2015, S175 of Son & Nomoto 1981, the Esso tanker in 37 m; by hand."""
+    mass, added = 312.6e6, 0.5 * 1000.0 * 320.0**2 * 20.8
+    yaw = mass * (80.0**2 + 11.2**2)
+    expected = np.array(
+        [
+            [mass + 0.022 * added, 0.0, 0.0, 0.0],
+            [0.0, mass + 0.223 * added, mass * 11.2, 0.0],
+            [0.0, mass * 11.2, yaw + 0.011 * added * 320.0**2, 0.0],
+        ]
+    )
+    kvlcc2 = shipgym.load_model("kvlcc2")
+    np.testing.assert_allclose(inertia(kvlcc2), expected)
+    assert rigid_inertia(kvlcc2) == pytest.approx((mass, mass * 11.2, yaw))
+
+    unit, L = 0.5 * 1025.0 * 175.0**3, 175.0
+    container = shipgym.load_model("container")
+    found = inertia(container) / unit
+    assert found[0, 0] == pytest.approx(0.00792 + 0.000238)
+    assert found[1] == pytest.approx([0.0, 0.00792 + 0.007049, 0.007049 * 0.05 * L, -0.007049 * 0.0313 * L])
+    assert found[2] == pytest.approx([0.0, 0.007049 * 0.05 * L, (0.000456 + 0.000419) * L**2, 0.0])
+    assert rigid_inertia(container) == pytest.approx((0.00792 * unit, 0.0, 0.000456 * unit * L**2))
+
+    tanker = shipgym.load_model("tanker")
+    shallow = 18.46 / (37.0 - 18.46)
+    in_tons = np.diag(inertia(tanker, 37.0)[:, :3]) / 225.5e6
+    yaw = (0.1232 + 0.0045 * shallow) * 304.8**2
+    np.testing.assert_allclose(in_tons, [1.05 + 0.05 * shallow, 2.02 + 0.387 * shallow, yaw])
+
+
+def test_inertia_of_a_table_is_that_of_the_particulars():
+    """With the centre of gravity off midship: mass, static moment and Steiner's part; less the derivatives."""
+    mariner = shipgym.load_model("mariner")
+    ship = replace(mariner.particulars, mass=2e7, xg=-3.0, yaw_gyradius=40.0)
+    ship = replace(ship, X_udot=-1e-3, Y_vdot=-8e-3, Y_rdot=-1e-4, N_vdot=-2e-4, N_rdot=-5e-4)
+    model = replace(mariner, particulars=ship)
+    unit, L = 0.5 * ship.require("water_density") * ship.length**3, ship.length
+    yaw = 2e7 * (40.0**2 + 9.0)
+    expected = [
+        [2e7 + 1e-3 * unit, 0.0, 0.0, 0.0],
+        [0.0, 2e7 + 8e-3 * unit, -6e7 + 1e-4 * unit * L, 0.0],
+        [0.0, -6e7 + 2e-4 * unit * L, yaw + 5e-4 * unit * L**2, 0.0],
+    ]
+    np.testing.assert_allclose(inertia(model), expected, rtol=1e-9)
+    assert rigid_inertia(model) == pytest.approx((2e7, -6e7, yaw))
