@@ -241,7 +241,7 @@ def test_inertia_of_each_ship_is_that_of_her_source():
 
 
 def test_inertia_of_a_table_is_that_of_the_particulars():
-    """With the centre of gravity off midship: mass, static moment and Steiner's part; less the derivatives."""
+    """With the centre of gravity off midship: mass, static moment, Steiner's part and added mass."""
     mariner = shipgym.load_model("mariner")
     ship = replace(mariner.particulars, mass=2e7, xg=-3.0, yaw_gyradius=40.0)
     ship = replace(ship, X_udot=-1e-3, Y_vdot=-8e-3, Y_rdot=-1e-4, N_vdot=-2e-4, N_rdot=-5e-4)
