@@ -4,6 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the lowest declared versions of all dependencies, installed and tried
+# make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
 
@@ -14,7 +15,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak fuzz release-check evidence docs clean
+.PHONY: demo test lint format type bench soak fuzz release-check mutate evidence docs clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -46,6 +47,9 @@ release-check: $(VENV)/dev-installed
 
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py
+
+mutate: $(VENV)/dev-installed
+	SHIPGYM_CACHE=$(CURDIR)/$(VENV)/mutated OMP_NUM_THREADS=1 $(BIN)/python scripts/mutate.py $(MODULES)
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md

@@ -1,10 +1,14 @@
+from itertools import count
+
 import numpy as np
 import pytest
 
 from agents import LQ, PID, sail
+from agents.rollouts import rollout as rollout_module
 from agents.rollouts.metrics import evaluate, reversals, step_figures, worst_step_cost
 from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
+from shipgym.tasks.guidance import wrapped
 
 KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})
 PATH = BenchmarkTask("path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1})
@@ -66,6 +70,19 @@ def test_straight_running_needs_the_fuel_of_straight_running():
     assert np.isnan(found["overshoot_percent"]).all()  # no change of course, no figure
 
 
+def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
+    """With the shaft ordered to half its speed: by the mean of its cube and the speed that is left."""
+    options = {"course_change_deg": 0.0, "episode_steps": 300, "action": "rudder-shaft"}
+    slow = BenchmarkTask("slow", "course-keeping", "tanker", options=options)
+    orders = np.array([[0.0, 0.5]], dtype=np.float32)
+    found = evaluate(Steers(lambda call, seen: np.repeat(orders, len(seen), axis=0)), slow, SEEDS[:2])
+    shaft, speed = found.run.states["n"][1:], found.run.states["u"][1:]
+    power = np.mean((shaft / slow.ship.service_shaft_speed) ** 3, axis=0)
+    expected = power * slow.ship.particulars["speed"] / speed.mean(axis=0)
+    np.testing.assert_allclose(found.figures["fuel"], expected, rtol=5e-3)
+    assert shaft[-1] == pytest.approx(0.5 * slow.ship.service_shaft_speed, rel=0.02)
+
+
 def test_hard_over_makes_no_way_along_the_course_and_costs_more_fuel(lq):
     turns = evaluate(steady(0.3), KEEPING, SEEDS[:2]).figures["fuel"]
     assert (turns > 1.2 * evaluate(lq, KEEPING, SEEDS[:2]).figures["fuel"]).all()
@@ -103,6 +120,29 @@ def test_overshoot_and_settling_of_a_damped_oscillation():
     assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (0.0, 2.0, 1.0)  # has not settled
 
 
+def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):
+    """One change of course of 20 degrees, which LQ makes with little overshoot well before the end."""
+    options = {"course_changes_deg": [20.0], "change_interval_steps": 400, "episode_steps": 300}
+    found = evaluate(lq, BenchmarkTask("change", "course-keeping", "mariner", options=options), SEEDS[:2])
+    error = np.degrees(wrapped(found.run.states["set_point"] - found.run.states["psi"]))
+    np.testing.assert_allclose(error[0], 20.0)
+    np.testing.assert_allclose(found.figures["overshoot_percent"], -error.min(axis=0) / 20.0 * 100.0)
+    last_outside = np.array([np.flatnonzero(np.abs(one) > 1.0)[-1] for one in error.T])
+    np.testing.assert_allclose(found.figures["settling_s"], (last_outside + 1) * found.run.dt)
+    assert (found.figures["unsettled"] == 0.0).all()
+    assert (found.figures["overshoot_percent"] < 20.0).all()
+
+
+def test_each_change_of_course_counts_once(lq):
+    """Two changes that never settle, beside one too small to count."""
+    options = {"course_changes_deg": [20.0, 30.0, 2.0], "change_interval_steps": 50, "episode_steps": 150}
+    task = BenchmarkTask("changes", "course-keeping", "mariner", options=options)
+    figures = evaluate(steady(0.0), task, SEEDS[:2]).figures
+    np.testing.assert_allclose(figures["unsettled"], 1.0)
+    np.testing.assert_allclose(figures["settling_s"], 49.0 * task.engine(1).dt, rtol=0.05)
+    np.testing.assert_allclose(figures["overshoot_percent"], 0.0, atol=1e-9)
+
+
 FAILURES = {
     "nan for one ship": lambda call, seen: np.where(
         (np.arange(len(seen)) == 1) & (call >= 50), np.nan, 0.0
@@ -129,6 +169,15 @@ def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(ho
     )
     for name, values in found.figures.items():
         np.testing.assert_array_equal(values[~concerned], sails.figures[name][~concerned], err_msg=name)
+
+
+def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypatch):
+    """A clock that goes on by half a second whenever it is read: each call takes so long."""
+    clock = count(0.0, 0.5)
+    monkeypatch.setattr(rollout_module.time, "process_time", lambda: next(clock))
+    run = evaluate(steady(0.0), KEEPING, SEEDS[:2]).run
+    calls = run.sailing.shape[0]
+    assert run.seconds_per_action == pytest.approx(0.5 * calls / run.sailing.sum(), rel=0.01)
 
 
 def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():

@@ -56,6 +56,31 @@ def test_training_runs_that_differ_widen_the_interval():
     assert wide.high - wide.low > 10.0 * (narrow.high - narrow.low)
 
 
+def test_intervals_of_every_statistic_are_those_of_theory():
+    """Half-widths of 1.96 standard errors: the middle half of normal costs has 1.19 times that variance."""
+    costs = np.random.default_rng(3).normal(50.0, 10.0, (1, 1000))
+    draws = Draws(1, 1000, n_draws=1000)
+    sigma = 10.0 / np.sqrt(1000)
+    wins = improvement({0: costs}, {0: np.full((1, 1000), 50.0)}, draws, (0, 1))
+    scores = aggregate_score([costs], [(60.0, 40.0)], draws, [0], 0)
+    middle = np.sqrt(1.19) * sigma
+    for found, error in (
+        (mean_cost(costs, draws, 0), sigma),
+        (interquartile_cost(costs, draws, 0), middle),
+        (scores, sigma / 20.0),
+        (wins, 0.5 / np.sqrt(1000)),
+    ):
+        assert found.low < found.value < found.high
+        assert 0.5 * (found.high - found.low) == pytest.approx(1.96 * error, rel=0.1)
+
+
+def test_an_interval_of_what_is_no_number_has_no_ends():
+    found = interval(np.nan, np.arange(5.0))
+    assert np.isnan(found).all()
+    assert found.to_dict() == {"value": None, "low": None, "high": None}
+    assert np.isnan(interval(1.0, np.array([1.0, np.nan]))[1:]).all()
+
+
 def test_interquartile_cost_does_not_see_one_bad_end():
     costs = RANDOM.normal(50.0, 1.0, (1, 100))
     lost = costs.copy()

@@ -1,5 +1,6 @@
 """Jobs give the same results wherever they run, outlive their workers, and are not done twice."""
 
+import inspect
 import json
 import math
 import os
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agents.engines import ray_engine
 from agents.engines.jobs import JobError, WorkerDiedError, run_jobs
 from agents.engines.ray_engine import check_answers
 from agents.engines.serialisation import pack, unpack
@@ -51,6 +53,13 @@ def logged(job):
 
 def divides(job):
     return 1 / job["k"]
+
+
+def threads(job):
+    from threadpoolctl import threadpool_info
+
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return [[pool["num_threads"] for pool in threadpool_info()], os.environ["OMP_NUM_THREADS"]]
 
 
 def sleeps(job):
@@ -93,6 +102,25 @@ def test_ray_gives_the_same_results(functions, tmp_path):
     assert same(
         run_jobs(functions.spectrum, jobs, engine="ray", workers=2), run_jobs(functions.spectrum, jobs)
     )
+
+
+def test_a_job_has_one_thread_and_leaves_the_environment_as_it_was(functions, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
+    ((numbers, given),) = run_jobs(functions.threads, [{}])
+    assert set(numbers) == {1}
+    assert given == "1"
+    assert os.environ["OMP_NUM_THREADS"] == "7"
+    assert "MKL_NUM_THREADS" not in os.environ
+
+
+def test_progress_counts_equal_jobs_each_and_two_tries_more_are_usual(functions, tmp_path):
+    told = []
+    run_jobs(functions.spectrum, [{"seed": 1}] * 3, progress=lambda *progress: told.append(progress))
+    assert told == [(0, 3), (3, 3)]
+    assert len(run_jobs(functions.spectrum, [{"seed": 1}], retries=0)) == 1
+    assert inspect.signature(run_jobs).parameters["retries"].default == 2
+    assert inspect.signature(run_jobs).parameters["workers"].default == 1
 
 
 def test_killed_worker_is_replaced(functions, tmp_path):
@@ -177,6 +205,10 @@ def test_workers_end_with_the_process_that_started_them(functions, tmp_path, num
         ({"retries": -1}, "retries: -1 found"),
         ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
         ({"engine": "ray", "address": "10.0.0.1"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:65536"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:0"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": ":6379"}, "expected 'HOST:PORT'"),
+        ({"engine": "ray", "address": "10.0.0.1:ray"}, "expected 'HOST:PORT'"),
         ({"function": lambda job: job}, "top level of a module"),
         ({"jobs": [{"k": object()}]}, r"jobs\[0\]: .* found, expected a dict of numbers"),
         ({"jobs": [{"k": math.nan}]}, r"jobs\[0\]"),
@@ -199,6 +231,17 @@ def test_address_that_does_not_answer():
         silent.listen()
         with pytest.raises(InputError, match=r"no ray cluster answers .* \(no answer that ray"):
             check_answers(f"ray://127.0.0.1:{port}", ray_patience_s=0.2)
+
+
+def test_what_ray_says_last_is_told(monkeypatch):
+    def fails(command, **options):
+        raise subprocess.CalledProcessError(1, command, stderr="a traceback\nConnectionError: wrong token\n")
+
+    monkeypatch.setattr(ray_engine.subprocess, "run", fails)
+    with pytest.raises(
+        InputError, match=r"no ray cluster answers at 'auto' .*\(ConnectionError: wrong token\)"
+    ):
+        check_answers("auto")
 
 
 def test_nothing_is_left_where_no_cluster_answers(functions, tmp_path):

@@ -197,3 +197,13 @@ def test_the_public_name():
     import agents
 
     assert agents.LearnedPolicy is LearnedPolicy
+
+
+def test_a_base_of_other_observations_is_refused():
+    """A course autopilot that sees in other scales would steer by other numbers than the policy's."""
+    names, scales = LQ_MARINER.observation_names, LQ_MARINER.observation_scales
+    assert random_policy(base=LQ_MARINER, authority=0.3).base is LQ_MARINER
+    other = replace(LQ_MARINER, observation_scales=tuple(2.0 * scale for scale in scales))
+    assert other.observation_names == names
+    with pytest.raises(InputError, match="base"):
+        random_policy(base=other, authority=0.3)

@@ -202,3 +202,15 @@ def test_another_ship_is_refused():
         Shielded.from_model(MARINER, random_policy()).check_fits_model(kvlcc2)
     with pytest.raises(InputError, match="fallback: Always found, expected a controller"):
         Shielded.from_model(MARINER, random_policy(), fallback=Always(0.0))
+
+
+def test_a_shield_waits_a_quarter_and_a_whole_ship_length():
+    assert Limits() == Limits(1.5, 1.1, 0.25, 10.0, 5.0, 1.0)
+    wrong = {"envelope_out": 0.9, "envelope_back": 1.5, "runaway_deg": 181.0, "back_deg": 10.0}
+    for name, value in wrong.items():
+        with pytest.raises(InputError, match=rf"limits\.{name}: {value:g} found"):
+            Limits(**{name: value})
+    for name in ("out_lengths", "calm_lengths"):
+        with pytest.raises(InputError, match=rf"limits\.{name}: -1 found"):
+            Limits(**{name: -1.0})
+        assert getattr(Limits(**{name: 0.0}), name) == 0.0

@@ -113,6 +113,9 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     assert progress["best_cost"] == result.best_cost
     assert progress["lq_cost"] == result.lq_cost
     assert [row["steps"] for row in progress["curve"]] == [0, 256, 512, 768]
+    returns = [row["mean_return"] for row in progress["curve"]]
+    assert returns[0] is None
+    assert all(0.1 * result.lq_cost < -one < 30.0 * result.lq_cost for one in returns[1:])
 
 
 def test_the_residual_of_nothing_costs_what_its_base_does():

@@ -2,14 +2,22 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
-from identification.validation.diagnostics import autocorrelation, check_trials, variance_inflation
+from identification import LSSVM, IdentificationResult, Samples, identify
+from identification.validation.diagnostics import (
+    autocorrelation,
+    check_trials,
+    diagnose,
+    variance_inflation,
+    without_overlap,
+)
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.ships import get_structure
 
 
 def test_variance_inflation_of_two_correlated_features() -> None:
@@ -97,3 +105,40 @@ def test_times_that_nearly_coincide_are_refused(
     message = r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the repeated row"
     with pytest.raises(InputError, match=message):
         identify([twice], particulars=mariner.particulars)
+
+
+def test_each_equation_tells_its_numbers() -> None:
+    """Two orthogonal features of sizes 1 and 100, one of them explained but for alternating errors of 0.5."""
+    rows = np.arange(400)
+    a = np.where(rows % 2 == 0, 1.0, -1.0)
+    b = np.where(rows // 2 % 2 == 0, 100.0, -100.0)
+    error = 0.5 * np.where(rows // 4 % 2 == 0, 1.0, -1.0)
+    X, y = np.column_stack([a, b]), 3.0 * a + error
+    samples = Samples({"r": X}, {"r": y}, 1.0 * rows, np.ones(400), np.zeros(400, dtype=np.int64), 1)
+    fit = LSSVM(C=np.inf, fit_intercept=False).fit(X, y)
+    found = diagnose({"r": fit}, samples, get_structure("nomoto"))["r"]
+    assert (found.samples, found.terms, found.rank) == (400, 2, 2)
+    assert found.condition_number == pytest.approx(1.0)
+    assert found.residual_rms == pytest.approx(0.5)
+    assert found.r_squared == pytest.approx(1.0 - 0.25 / 9.25)
+    assert list(found.variance_inflation.values()) == pytest.approx([1.0, 1.0])
+    assert found.collinear_pairs == ()
+    assert found.residual_autocorrelation[3] == pytest.approx(-0.99)
+    assert len(found.residual_autocorrelation) == 10
+    alike = replace(samples, features={"r": np.column_stack([a, a + 0.01 * b / 100.0])})
+    ((first, second, correlation),) = diagnose({"r": fit}, alike, get_structure("nomoto"))[
+        "r"
+    ].collinear_pairs
+    assert (first, second) == get_structure("nomoto").names("r")
+    assert correlation == pytest.approx(1.0, abs=1e-3)
+
+
+def test_rows_without_overlap_are_a_window_apart() -> None:
+    def apart(window: int) -> list[int]:
+        none = np.zeros(7)
+        samples = Samples({}, {}, none, none, none.astype(np.int64), window)
+        return without_overlap(samples).tolist()
+
+    assert apart(1) == [0, 1, 2, 3, 4, 5, 6]  # steps
+    assert apart(4) == [0, 2, 4, 6]  # half windows apart
+    assert apart(3) == [0, 3, 6]

@@ -9,7 +9,7 @@ import pytest
 
 import shipgym
 from identification import build_samples
-from identification.design.experiment import advise, fisher_information, standard_candidates
+from identification.design.experiment import _gains, advise, fisher_information, standard_candidates
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import get_structure
@@ -89,6 +89,20 @@ def test_every_choice_gains_and_none_loses(ship: ShipModel, criterion: str) -> N
     text = str(advice)
     assert advice.chosen[0] in text
     assert "gentle" in text
+
+
+def test_criteria_ask_for_volume_longest_axis_or_one_coefficient() -> None:
+    """Relative errors 0.1, 0.01 and 1: to narrow a narrow axis shrinks the volume, not the longest axis."""
+    known, size = np.diag([1e2, 1e4, 1.0]), np.ones(3)
+    offers = {"first": np.diag([1e8, 0.0, 0.0]), "longest": np.diag([0.0, 0.0, 15.0])}
+
+    def gains(criterion: str, at: int = 0) -> dict[str, float]:
+        return _gains(known, offers, size, criterion, at)
+
+    assert gains("E") == pytest.approx({"first": 1.0, "longest": 4.0})
+    assert gains("D") == pytest.approx({"first": (1.0 + 1e6) ** (1 / 6), "longest": 16 ** (1 / 6)})
+    assert gains("c", 2) == pytest.approx({"first": 1.0, "longest": 4.0})
+    assert gains("c", 1) == pytest.approx({"first": 1.0, "longest": 1.0})
 
 
 def test_advice_for_an_identified_mariner_of_forty_coefficients() -> None:

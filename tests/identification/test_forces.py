@@ -14,6 +14,7 @@ from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
 from shipgym.ships.catalogue import xu_ship
 from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
+from shipgym.ships.shared_structure import read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
@@ -47,6 +48,18 @@ def test_the_models_have_the_coefficients_of_the_paper() -> None:
     assert {"Y_vdot", "Y_rdot"} < set(PMM18.names("u"))
     assert "X_udot" in PMM18.names("v")
     assert {"X_udot", "Y_vdot", "Y_rdot"} < set(PMM18.names("r"))
+
+
+def test_each_term_stands_once_and_before_those_of_the_mass() -> None:
+    named = {"u": "X_uuu -Y_vdot:vr X_uvv", "v": "Y_v Y_uv", "r": "N_r Y_v"}
+    shares = {axis: read_shares(text) for axis, text in named.items()}
+    table = shared_structure("mine", "own", shares)
+    assert [term.name for term in table.terms("u")] == ["uuu", "uvv", "vr", "rr"]
+    assert sorted(term.name for term in table.terms("r")) == ["r", "ur", "uv", "v"]
+    assert table.terms("v") == table.terms("r")
+    assert table.coefficient_names == ("X_uuu", "Y_vdot", "X_uvv", "Y_v", "Y_uv", "N_r")
+    signs = {share.coefficient: share.sign for share in table.shares["u"]}
+    assert signs == {"X_uuu": 1.0, "Y_vdot": -1.0, "X_uvv": 1.0}
 
 
 def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
@@ -144,3 +157,14 @@ def test_trials_of_the_other_kind_are_refused() -> None:
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
     with pytest.raises(InputError, match="mass of the ship and the added mass"):
         ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_numbers()
+
+
+def test_rows_of_the_regression_know_their_force_and_their_trial() -> None:
+    runs = tank_tests()[:3]
+    found = force_regression(runs, PMM18, PARTICULARS)
+    rows = len(found.targets)
+    assert found.features.shape == (rows, len(PMM18.coefficient_names))
+    assert found.equation.shape == found.trial.shape == (rows,)
+    of_axis = [found.trial[found.equation == k].tolist() for k in range(3)]
+    assert of_axis[0] == of_axis[1] == of_axis[2] == sorted(of_axis[0])
+    assert {k: of_axis[0].count(k) for k in range(3)} == {k: len(run) for k, run in enumerate(runs)}

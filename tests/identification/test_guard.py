@@ -1,12 +1,14 @@
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
+from identification import IdentificationResult, Samples, identify
+from identification.estimators.methods import fit_held
 from identification.validation import guarded_fit
 from identification.validation.guard import hard_turn_features, reasons_unstable
 from shipgym import ShipModel, Trial
@@ -26,6 +28,15 @@ def test_a_ship_that_runs_away_is_found_with_the_reason(mariner: ShipModel, cao_
     reasons = reasons_unstable(runaway(mariner), [cao_zigzag])
     assert "trial 'zigzag_15_15', open loop" in reasons[0]
     assert any("turning circle" in reason for reason in reasons_unstable(runaway(mariner), []))
+
+
+def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(mariner: ShipModel) -> None:
+    """A restoring moment and hardly any damping: she turns steadily, but swings up where the rudder does."""
+    c = mariner.coefficients
+    swinging = replace(mariner, coefficients=c | {"N_v": -c["N_v"], "N_r": -0.3 * c["N_r"]})
+    reasons = reasons_unstable(swinging, [])
+    assert reasons
+    assert all(re.match(r"rudder [+-]\d+ deg reversed every [\d.]+ L/U: ", reason) for reason in reasons)
 
 
 def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
@@ -109,3 +120,16 @@ def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
     assert cao_fit.stable
     assert cao_fit.model.provenance is not None
     assert cao_fit.model.provenance["guard"] == {"decision": "stable as fitted"}
+
+
+def test_the_penalty_of_a_held_fit_is_relative_to_the_terms_of_a_hard_turn() -> None:
+    """Ridge of strength^2 times the number of samples on each term by its size over the mean window."""
+    rng = np.random.default_rng(0)
+    X, sizes, duration = rng.standard_normal((50, 3)), np.array([1.0, 5.0, 0.2]), np.linspace(1.0, 3.0, 50)
+    y = X @ [1.0, 2.0, 3.0] + 0.1 * rng.standard_normal(50)
+    none = np.zeros(50, dtype=np.int64)
+    samples = Samples({"r": X}, {"r": y}, np.arange(50.0), duration, none, 1)
+    held = fit_held(samples, {"r": sizes}, 0.3)["r"]
+    scaled = X / (2.0 * sizes)
+    coefficients = np.linalg.solve(scaled.T @ scaled + 50 * 0.3**2 * np.eye(3), scaled.T @ y) / (2.0 * sizes)
+    np.testing.assert_allclose(held.coef_, coefficients, rtol=1e-9)

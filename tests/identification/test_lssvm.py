@@ -88,6 +88,22 @@ def test_without_penalty_it_is_least_squares() -> None:
     np.testing.assert_allclose([*estimator.coef_, estimator.intercept_], expected, rtol=1e-8)
 
 
+@pytest.mark.parametrize("n", [60, 9])
+def test_gcv_keeps_the_rank_of_least_generalised_cross_validation(n: int) -> None:
+    """Targets in two of eight directions, and noise: the score of each rank is worked out from its fit."""
+    rng = np.random.default_rng(4)
+    X = np.linalg.qr(rng.standard_normal((n, 8)))[0] * np.geomspace(1.0, 1e-3, 8)
+    y = 5.0 * X[:, 0] - 40.0 * X[:, 1] + 0.05 * rng.standard_normal(n)
+    scores = []
+    for rank in range(1, 9):
+        fit = TruncatedLSSVM(rank=rank, scale=False, fit_intercept=False).fit(X, y)
+        residual = y - fit.predict(X)
+        scores.append(float(residual @ residual) / (n - rank) ** 2 if n > rank else np.inf)
+    chosen = TruncatedLSSVM(selection="gcv", scale=False, fit_intercept=False).fit(X, y).rank_
+    assert chosen == int(np.argmin(scores)) + 1
+    assert 2 <= chosen < 8
+
+
 def test_standardised_fit_does_not_depend_on_units() -> None:
     X, y, _ = regression()
     units = np.geomspace(1e-4, 1e4, X.shape[1])
@@ -307,3 +323,17 @@ def test_support_vectors_shrug_off_outliers_too() -> None:
         estimator.weights_[np.argmax(np.abs(y - estimator.predict(X)))] < 0.1 < np.median(estimator.weights_)
     )
     assert np.all(np.linalg.eigvalsh(estimator.covariance_) > 0.0)
+
+
+def test_what_an_estimator_cannot_do_is_refused() -> None:
+    X, y, _ = regression(n=40, m=3)
+    with pytest.raises(InputError, match="C: inf found, expected a finite number with kernel 'rbf'"):
+        LSSVM(C=np.inf, kernel="rbf").fit(X, y)
+    for scale in ([1.0, 1.0], [1.0, 0.0, 1.0], [1.0, np.nan, 1.0]):
+        with pytest.raises(InputError, match="expected 3 finite numbers above 0, True or False"):
+            LSSVM(scale=scale).fit(X, y)
+    for share in (0.0, 1.1):
+        with pytest.raises(InputError, match="expected a share above 0 and at most 1"):
+            TruncatedLSSVM(selection="explained-variance", explained_variance=share).fit(X, y)
+    with pytest.raises(InputError, match="objective: 'free-running' found"):
+        TunedLSSVM(objective="free-running").fit(X, y)

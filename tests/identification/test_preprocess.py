@@ -16,6 +16,7 @@ from identification.regression.preprocess import (
     smooth_kinematics,
 )
 from identification.regression.preprocess.kinematics import current_of
+from identification.regression.preprocess.noise import is_noisy, noise_ratio
 from identification.regression.preprocess.spline import Reinsch
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -112,3 +113,45 @@ def test_unknown_current_is_found(mariner: ShipModel, record: Callable[..., Tria
 def test_preprocessing_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
     with pytest.raises(InputError, match="preprocessing: 'fourier'"):
         identify([cao_zigzag], preprocessing="fourier", particulars=mariner.particulars)
+
+
+def test_noise_is_told_by_the_change_over_a_window() -> None:
+    """White noise of 0.1 on a ramp of 0.5 a sample: sqrt(2) 0.1 by the root mean square of the change."""
+    t = np.arange(20_000.0)
+    values = 0.5 * t + 0.1 * np.random.default_rng(0).standard_normal(len(t))
+    for window in (1, 10):
+        change = np.hypot(0.5 * window, np.sqrt(2.0) * 0.1)
+        assert noise_ratio(t, values, window) == pytest.approx(np.sqrt(2.0) * 0.1 / change, rel=0.03)
+    assert noise_ratio(t, np.ones(len(t))) == 0.0
+    assert noise_ratio(t[:1], values[:1]) == 0.0
+    assert is_noisy(t, [t, values])
+    assert not is_noisy(t, [t, 2.0 * t])
+
+
+def test_dropouts_of_up_to_ten_steps_are_filled() -> None:
+    """At the usual step, straight where the channel is; a longer one stays a gap."""
+    t = np.arange(200.0)
+    for missing, filled in ((1, True), (9, True), (10, False)):
+        kept = (t < 50.0) | (t >= 50.0 + missing)
+        found = repaired(Trial(t[kept], {"u": 3.0 + 0.01 * t[kept]}, name="holes"))
+        if filled:
+            np.testing.assert_allclose(found.t, t)
+            np.testing.assert_allclose(found["u"], 3.0 + 0.01 * t)
+            assert found.repaired == {"u": missing}
+        else:
+            assert len(found) == kept.sum()
+
+
+def test_a_channel_of_outliers_is_refused() -> None:
+    t = np.arange(400.0)
+    clean = np.sin(0.05 * t) + 1e-3 * np.random.default_rng(0).standard_normal(400)
+    for every, refused in ((35, False), (25, True)):  # three beside each other, 9 and 12 % of all
+        spiked = clean + np.where((t % every >= 10.0) & (t % every < 13.0) & (t < 390.0), 5.0, 0.0)
+        trial = Trial(t, {"u": spiked}, name="spiked")
+        if refused:
+            with pytest.raises(InputError, match=r"samples of u would be outliers, expected at most a tenth"):
+                repaired(trial)
+        else:
+            found = repaired(trial)
+            np.testing.assert_allclose(found["u"], clean, atol=0.05)
+            assert found.raw is not None

@@ -17,7 +17,7 @@ from identification.simulation_error.formulas import (
     kijima_derivatives,
 )
 from identification.simulation_error.prior import reference_prior
-from shipgym import ShipModel, Trial
+from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 from shipgym.ships.linear import steering_state_space
@@ -208,3 +208,20 @@ def test_formulas_need_the_rudder_area(target: ShipModel, short_trials: list[Tri
     bare = replace(target, particulars=replace(target.particulars, rudder_area=None))
     with pytest.raises(InputError, match="rudder_area is needed"):
         fit(bare, short_trials, prior="clarke")
+
+
+def test_formulas_are_those_printed() -> None:
+    """B/L 0.15, B/T 3, CB 0.7, T/L 0.05: Clarke et al. 1983 and Kijima et al. 1990, worked out."""
+    ship = Particulars(
+        length=100.0, beam=15.0, draught=5.0, block_coefficient=0.7, rudder_area=10.0, xg=0.0, speed=6.0
+    ).completed()
+    scale = -np.pi * 0.05**2
+    rudder = {"Y_delta": -0.003, "N_delta": 0.0015}
+    clarke = {"Y_v": 1.84 * scale, "Y_r": -0.41 * scale, "N_v": 0.62 * scale, "N_r": 0.283 * scale}
+    assert clarke_derivatives(ship) == pytest.approx(clarke | rudder)
+    mass = ship.mass_prime - ship.require("X_udot")
+    kijima = {
+        "Y_v": -0.05 * (np.pi / 2 * 0.1 + 1.4 * 0.105), "Y_r": -0.05 * 1.5 * 0.105 + mass,
+        "N_v": -0.05 * 0.1, "N_r": -0.05 * (0.54 * 0.1 - 0.1**2),
+    }  # fmt: skip
+    assert kijima_derivatives(ship) == pytest.approx(kijima | rudder)

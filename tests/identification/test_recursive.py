@@ -231,3 +231,25 @@ def test_samples_that_do_not_fit_are_named() -> None:
         coefficient_history(
             hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, "ls"
         )
+
+
+@pytest.mark.parametrize(
+    ("phi", "y", "message"),
+    [
+        (np.zeros((5, 2)), np.zeros(4), r"shapes \(5, 2\) and \(4,\) found"),
+        (np.zeros((5, 3, 2)), np.zeros((5, 2)), "3 signals found, expected 2 as in y"),
+        (np.zeros((5, 2, 2, 2)), np.zeros(5), "found, expected \\(n_samples, n_features\\)"),
+        (np.full((5, 2), np.inf), np.zeros(5), "not finite"),
+    ],
+)
+def test_samples_that_do_not_belong_together_are_refused(phi: Any, y: Any, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        RecursiveLeastSquares().update(phi, y)
+
+
+def test_settings_reach_to_their_bounds() -> None:
+    for least in ({"start_samples": 0}, {"start_interval": 1}, {"forgetting": 1.0}, {"C": 1e-9}):
+        assert np.isfinite(RecursiveLeastSquares(**least).fit(*regression()).coef_).all()
+    for wrong in ({"start_interval": 0}, {"forgetting": 0.0}, {"C": 0.0}, {"start_C": 0.0}):
+        with pytest.raises(InputError, match=f"{next(iter(wrong))}: 0 found"):
+            RecursiveLeastSquares(**wrong).fit(*regression())

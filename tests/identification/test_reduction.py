@@ -133,5 +133,27 @@ def test_what_cannot_be_reduced_is_named() -> None:
         backward_elimination(X[:20], y[:20], NAMES)
     with pytest.raises(InputError, match="b is 0 throughout"):
         forward_selection(X * np.array([1.0, 0, 1, 1, 1, 1, 1, 1]), y, NAMES)
+    for wrong in ((np.where(X > 2.0, np.nan, X), y), (X, np.append(y[1:], np.inf))):
+        with pytest.raises(InputError, match="a value that is not finite found"):
+            backward_elimination(*wrong, NAMES)
+    with pytest.raises(InputError, match="y is 0 throughout"):
+        forward_selection(X, 0.0 * y, NAMES)
+    with pytest.raises(InputError, match="one name a term"):
+        backward_elimination(X, y[:-1], NAMES)
     with pytest.raises(InputError, match="one name a term"):
         backward_elimination(X, y, NAMES[:3])
+
+
+def test_each_step_says_how_much_is_explained_and_of_what_is_held_out() -> None:
+    """Of y = 2 a + c with orthogonal terms of one size a explains 4/5, c the rest."""
+    rows = np.arange(400)
+    X = np.column_stack([np.where(rows // 2**k % 2, 1.0, -1.0) for k in range(4)])
+    found = forward_selection(X, 2.0 * X[:, 0] + X[:, 2], ["a", "b", "c", "d"])
+    assert found.terms == ("a", "c")
+    first, second = found.path[0], found.path[1]
+    assert (first.changed, second.changed) == ("a", "c")
+    assert (first.r_squared, second.r_squared) == pytest.approx((0.8, 1.0), abs=1e-9)
+    assert (first.error_reduction, second.error_reduction) == pytest.approx((0.8, 0.2), abs=1e-9)
+    assert second.coefficients == pytest.approx({"a": 2.0, "c": 1.0})
+    assert second.held_out == pytest.approx(1.0)
+    assert first.held_out == pytest.approx(0.8, abs=0.02)

@@ -13,9 +13,11 @@ import pytest
 
 from identification import IdentificationResult, identify
 from identification.report.figures import rudder_at_windows
+from identification.report.view import fit_view, short_names
 from identification.result import FILES
 from identification.validation.diagnostics import cross_correlation
 from shipgym import ShipFile, ShipModel, Trial
+from shipgym.ships.particulars import ADDED_MASSES
 
 ROOT = Path(__file__).parents[2]
 SAVE = """
@@ -153,3 +155,54 @@ def test_cross_correlation_finds_the_delay() -> None:
     assert found.max() == pytest.approx(1.0, abs=0.01)
     assert np.abs(np.delete(found, 12)).max() < 4.0 / np.sqrt(4000)
     assert not cross_correlation(noise, np.ones(4000), lags).any()
+
+
+def test_the_summary_prints_each_coefficient_with_its_error(truncated: IdentificationResult) -> None:
+    rows = {
+        cells[0]: cells[1:]
+        for line in truncated.summary().splitlines()
+        if len(cells := [cell.strip() for cell in line.replace("┃", "│").split("│")[1:-1]]) == 4
+    }
+    for name, error in truncated.standard_errors.items():
+        value = truncated.coefficients[name]
+        assert rows[name] == [f"{1e5 * value:.2f}", f"{1e5 * error:.2g}", f"{value / error:.1f}"]
+    gear = truncated.model.steering
+    assert rows["rudder limit"][:2] == [f"{gear.rudder_limit_deg:.4g}", "deg"]
+    assert rows["rudder rate"] == [f"{gear.rudder_rate_deg_s:.4g}", "deg/s", "given"]
+    assert rows["Y_vdot"][:2] == [f"{1e5 * truncated.model.particulars['Y_vdot']:.6g}", "1e-5"]
+
+
+def test_the_page_shows_trials_in_degrees_and_knots(truncated: IdentificationResult) -> None:
+    view = fit_view(truncated)
+    for row, trial in zip(view["trials"], truncated.trials, strict=True):
+        assert row["rudder"] == pytest.approx(np.degrees(np.abs(trial["delta"]).max()))
+        assert row["speeds"][1] == pytest.approx(np.hypot(trial["u"], trial["v"]).max() / 0.514444, rel=1e-5)
+        assert (row["samples"], row["duration"]) == (len(trial), trial.duration)
+        assert row["interval"] == pytest.approx(trial.duration / (len(trial) - 1), rel=1e-6)
+    particulars = {text: (value, unit) for text, _, value, unit in view["particulars"]}
+    ship = truncated.model.particulars
+    assert particulars["length between perpendiculars"] == (f"{ship['length']:.5g}", "m")
+    assert particulars["mass"] == (f"{ship['mass'] / 1000.0:.5g}", "t")
+    trials = truncated.metrics["trials"].values()
+    unseen = [metrics["rmse"]["psi"] for metrics in trials if metrics["use"] == "validate"]
+    errors = np.degrees(unseen)
+    assert view["heading"]["unseen"]
+    assert view["heading"]["largest"] == pytest.approx(errors.max())
+    assert view["heading"]["median"] == pytest.approx(np.median(errors))
+    for rows in view["coefficients"].values():
+        for row in rows:
+            assert row["value"] == pytest.approx(1e5 * truncated.coefficients[row["name"]])
+            assert row["significant"] == (abs(row["t"]) >= 2.0)
+    assert {name for name, _, _ in view["added_masses"]} == {n for n in ADDED_MASSES if ship[n] is not None}
+    assert {n: v for n, _, v in view["added_masses"]}["N_rdot"] == pytest.approx(1e5 * ship["N_rdot"])
+    assert view["derivatives"]
+
+
+def test_short_names_are_those_without_folders_where_they_differ() -> None:
+    t = np.arange(3.0)
+
+    def named(*names: str) -> dict[str, str]:
+        return short_names([Trial(t, {"u": t}, name=name) for name in names])
+
+    assert named("a/one.csv", "b/two.csv") == {"a/one.csv": "one.csv", "b/two.csv": "two.csv"}
+    assert named("a/one.csv", "b/one.csv") == {"a/one.csv": "a/one.csv", "b/one.csv": "b/one.csv"}

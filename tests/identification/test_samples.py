@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, Samples, build_samples, identify
-from shipgym import InputError, ShipModel, Trial
+from identification.regression.samples import between_gaps
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.simulate import open_loop
 
@@ -135,3 +136,20 @@ def test_a_record_of_nothing_but_gaps_is_refused(mariner: ShipModel, cao_zigzag:
     message = r"holes\.csv': 2[45] gaps in time found \(the longest from .*nowhere 10 samples"
     with pytest.raises(InputError, match=message):
         build_samples([without(cao_zigzag, *holes)], mariner.table, mariner.particulars)
+
+
+def test_a_gap_is_a_step_of_more_than_five_usual_ones() -> None:
+    """And of more than 0.15 of the time to sail a ship length, here 1.5 s of 10 s; pieces have 10 samples."""
+    ship = Particulars(length=50.0, speed=5.0)
+
+    def pieces(step: float, pause: float, first: int = 30) -> list[int]:
+        t = step * np.arange(60.0)
+        t[first:] += pause - step
+        return [len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(60)}), ship)]
+
+    assert pieces(0.5, 2.5) == [60]  # five usual steps
+    assert pieces(0.5, 2.6) == [30, 30]
+    assert pieces(0.1, 1.5) == [60]  # many steps, but a short time
+    assert pieces(0.1, 1.6) == [30, 30]
+    assert pieces(0.5, 9.0, first=9) == [51]  # too short a piece is left out
+    assert pieces(0.5, 9.0, first=10) == [10, 50]

@@ -18,6 +18,7 @@ from identification import (
     minimise,
 )
 from identification.search.objectives import held_out_error, time_blocks, training_error
+from identification.search.pattern_search import pattern_search
 from identification.search.search import Optimiser
 from shipgym import InputError
 
@@ -198,3 +199,41 @@ def test_robust_search_is_not_moved_by_outliers() -> None:
     assert robust.search_.value < 3.0 < plain.search_.value
     away = [np.linalg.norm(X @ (m.coef_ - clean.coef_)) for m in (plain, robust)]
     assert away[1] < 0.3 * away[0]
+
+
+def test_pattern_search_goes_downhill_on_a_mesh_that_it_halves() -> None:
+    """From the corner of a box of 4 x 8 to (1, 2): no point twice, none off the finest mesh."""
+    seen: list[tuple[float, ...]] = []
+
+    def bowl(x: Floats) -> float:
+        seen.append(tuple(x.tolist()))
+        return float((x[0] - 1.0) ** 2 + 3.0 * (x[1] - 2.0) ** 2)
+
+    found = pattern_search(bowl, [4.0, 8.0], [0.0, 0.0], [4.0, 8.0], mesh=0.25, finest=1 / 64)
+    np.testing.assert_allclose(found.x, [1.0, 2.0])
+    assert found.value == 0.0 == found.history[-1]
+    assert found.evaluations == len(seen) == len(set(seen))
+    assert {a % 0.0625 for a, _ in seen} == {b % 0.125 for _, b in seen} == {0.0}
+    assert np.all(np.diff(found.history) <= 0.0)
+    assert found.history[0] == bowl(np.array([4.0, 8.0]))
+    seen.clear()
+    few = pattern_search(bowl, [9.0, -9.0], [0.0, 0.0], [4.0, 8.0], most_evaluations=10)
+    assert seen[0] == (4.0, 0.0)  # the start is brought into the box
+    assert 10 <= few.evaluations <= 13
+
+
+@pytest.mark.parametrize(
+    ("optimiser", "least"),
+    [
+        (ArtificialBeeColony, {"sources": 2, "rounds": 1, "limit": 1}),
+        (ParticleSwarm, {"particles": 1, "rounds": 1}),
+        (GridSearch, {"points": 3, "refinements": 0}),
+        (DifferentialEvolution, {"members": 5, "rounds": 1}),
+    ],
+)
+def test_searches_may_be_as_small_as_they_say(optimiser: Any, least: dict[str, int]) -> None:
+    found = optimiser(**least).minimise(sphere, BOX)
+    assert np.isfinite(found.value)
+    for name, value in least.items():
+        with pytest.raises(InputError, match=f"{name}: {value - 1} found"):
+            optimiser(**{name: value - 1}).minimise(sphere, BOX)

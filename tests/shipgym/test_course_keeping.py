@@ -13,8 +13,13 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
 from shipgym import InputError
+from shipgym.engine.motion import Motion, Ship
 from shipgym.envs.engine import Engine
+from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
+from shipgym.tasks import course_keeping
+from shipgym.tasks.contract import Interval, Random
+from shipgym.tasks.steering import Weights, integrated, steering_reward
 from shipgym.tasks.task import OBSERVATION_NAMES, control_interval, course_keeping_task, observation_scales
 
 ID = "shipgym/CourseKeeping-v0"
@@ -283,7 +288,94 @@ def test_wrong_batches(mariner):
         engine.step(np.zeros((3, 1)))
     with pytest.raises(InputError, match="nan found in lane 1"):
         engine.step([[0.0], [np.nan]])
+    pool = Randomisation(speed_range=(0.8, 1.0))
+    with pytest.raises(InputError, match="several lanes' ships and a pool of ships"):
+        Engine([mariner, mariner], 2, randomisation=pool)
+    with pytest.raises(InputError, match="models: of several structures"):
+        Engine([mariner, shipgym.load_model("kvlcc2")], 2)
+    for lanes, message in (
+        ([0.0, 1.0], "lanes: float64 of shape"),
+        ([0], r"lanes: int64 of shape \(1,\) found, expected 2 whole"),
+        ([0, 2], "lanes: 0 to 2 found, expected 0 to 1"),
+        ([-1, 0], "lanes: -1 to 0 found"),
+    ):
+        with pytest.raises(InputError, match=message):
+            engine.copy_lanes(engine, lanes)
     with pytest.raises(InputError, match="num_envs: 0"):
         Engine(mariner, 0)
     with pytest.raises(InputError, match="3 found, expected 1 or one for each of 2"):
         Engine([mariner] * 3, 2)
+
+
+SHIP = Ship(160.0, 8.0, 0.6, 0.05, 0.0, 1.5, np.inf, 8.0)
+small = st.floats(-0.6, 0.6)
+
+
+def interval(**given):
+    return Interval(**dict.fromkeys(Interval._fields, 0.0) | {"dt": 0.5} | given)
+
+
+@given(small, small, small, st.booleans())
+def test_costs_of_steering_are_squares_by_their_scales(delta, before, heel, outside):
+    """In 30 degrees of rudder, 30 degrees of it a ship length sailed (20 s), 15 degrees of heel."""
+    weights = Weights(rudder_weight=0.2, rudder_rate_weight=0.03, roll_weight=0.4, roll_scale_deg=15.0)
+    weights = weights._replace(envelope_weight=0.7)
+    motion = Motion(*[0.0] * 7, heel, 0.0, delta, 0.0)
+    found = steering_reward(
+        motion, interval(rudder_before=before, extrapolating=float(outside)), SHIP, weights
+    )
+    scale = np.pi / 6
+    assert found.rudder == pytest.approx(-0.2 * (delta / scale) ** 2)
+    assert found.rudder_rate == pytest.approx(-0.03 * ((delta - before) / 0.5 * 20.0 / scale) ** 2)
+    assert found.roll == pytest.approx(-0.4 * (heel / (np.pi / 12)) ** 2)
+    assert found.envelope == (-0.7 if outside else 0.0)
+
+
+@given(st.floats(-30.0, 30.0), st.floats(-1.0, 1.0))
+def test_the_integral_gathers_small_errors_up_to_its_bound(integral, error):
+    """Up to 10 degrees; its bound is 10 degrees for the time to sail 10 ship lengths, 200 s."""
+    bound = np.radians(10.0) * 200.0
+    gathered = integral + (0.5 * error if abs(error) <= np.radians(10.0) else 0.0)
+    found = integrated(integral, error, interval(), SHIP, Weights())
+    assert found == pytest.approx(np.clip(gathered, -bound, bound))
+
+
+def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
+    """Changes evenly up to 30 degrees to both sides, after 100 to 300 steps; listed ones on the step."""
+    settings = course_keeping.Settings(change_interval_steps=200)
+    state = course_keeping.State(1.0, 0.0, 3.0, 0.25, 0.1)
+    with np.errstate(over="ignore"):
+        drawn = [
+            course_keeping.changed(state, 50.0, settings, Random(np.uint64(key), np.uint64(0)))
+            for key in range(2000)
+        ]
+    changes = np.degrees([one.course - 1.0 for one in drawn])
+    waits = np.array([one.next_change - 50.0 for one in drawn])
+    for values, low, high in ((changes, -30.0, 30.0), (waits, 100.0, 300.0)):
+        assert low <= values.min() < low + 0.01 * (high - low)
+        assert high - 0.01 * (high - low) < values.max() <= high
+        assert values.mean() == pytest.approx(0.5 * (low + high), abs=4.0 * (high - low) / np.sqrt(12 * 2000))
+    assert abs(np.corrcoef(changes, waits)[0, 1]) < 4.0 / np.sqrt(2000)
+    assert {(one.changes, one.integral, one.heading_error) for one in drawn} == {(4.0, 0.25, 0.1)}
+    listed = settings._replace(course_changes_deg=np.array([5.0, -7.0]))
+    for number, degrees in ((0.0, 5.0), (1.0, -7.0), (2.0, 0.0)):
+        with np.errstate(over="ignore"):
+            found = course_keeping.changed(
+                state._replace(changes=number), 50.0, listed, Random(np.uint64(1), np.uint64(0))
+            )
+        assert found.course == pytest.approx(1.0 + np.radians(degrees))
+        assert found.next_change == 250.0
+    assert course_keeping.due(None, state._replace(next_change=9.0), interval(steps=9.0), SHIP, settings)
+    assert not course_keeping.due(None, state._replace(next_change=9.0), interval(steps=8.0), SHIP, settings)
+
+
+def test_a_step_is_charged_for_its_error_and_control_is_lost_beyond_the_largest():
+    settings = course_keeping.Settings()
+    for error, lost in ((0.4, False), (-1.57, False), (1.58, True), (-1.58, True)):
+        motion = Motion(0.0, 0.0, 0.3, 8.0, *[0.0] * 7)
+        state = course_keeping.State(0.3 + error, 9.0, 1.0, 0.0, 0.0)
+        after, reward, failed, arrived = course_keeping.step(motion, state, interval(), SHIP, settings)
+        assert after.heading_error == pytest.approx(error)
+        assert reward.heading == pytest.approx(-((error / (np.pi / 6)) ** 2))
+        assert (failed, arrived) == (lost, False)
+    assert course_keeping.worst_cost(settings) == pytest.approx(9.0)

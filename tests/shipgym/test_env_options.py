@@ -9,7 +9,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE
+from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE, Randomisation
 from shipgym.sea import Waves, Weather, Wind
 from shipgym.ships import Envelope
 from shipgym.tasks.steering import ROLL_SCALE
@@ -70,6 +70,22 @@ def test_noise_of_the_position_shows_in_the_cross_track_error():
     k = env.observation_names.index("cross_track")
     wrong = seen[:, k] * env.observation_scales[k] - infos["cross_track"]
     assert np.std(wrong) == pytest.approx(2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count))
+
+
+def test_the_course_to_steer_is_that_of_the_position_shown():
+    """So satellite noise reaches it: what remains of the heading error's noise is the compass's alone."""
+    count, lookahead, length = 4000, 0.2, 160.93
+    env = many(count, PATH, noise=2.0, lookahead=lookahead, waypoints=[[0.0, 0.0], [-3000.0, 4000.0]])
+    env.reset(seed=0)
+    seen, *_, infos = env.step(idle(env))
+    shown = dict(zip(env.observation_names, (seen * env.observation_scales).T, strict=True))
+    wrong = np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"]) - infos["heading_error"]
+    ahead = lookahead * length
+    of_position = np.arctan2(infos["cross_track"], ahead) - np.arctan2(shown["cross_track"], ahead)
+    margin = 5.0 / np.sqrt(2 * count)
+    assert np.std(of_position) > np.std(wrong - of_position)
+    compass = 2.0 * SEA_TRIAL["psi"].noise
+    assert np.std(wrong - of_position) == pytest.approx(compass, rel=margin)
 
 
 def test_noise_is_only_shown_and_none_is_none():
@@ -322,3 +338,36 @@ def test_weights_and_scales_are_settings():
     rudder = env.physical_state()["delta"]
     assert info["reward_heading"] == pytest.approx(-((info["heading_error"] / np.radians(10.0)) ** 2))
     assert info["reward_rudder"] == pytest.approx(-2.0 * (rudder / np.radians(10.0)) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"speed_range": 0.8}, "speed_range: 0.8 found, expected the least and the largest, two numbers"),
+        ({"speed_range": (0.8,)}, "expected the least and the largest, two numbers"),
+        ({"speed_range": (0.0, 1.0)}, "speed_range: the least: 0 found"),
+        ({"loading_range": (1.2, 0.9)}, "loading_range: the largest: 0.9 found"),
+        ({"loading_range": (0.9, 1.1), "model": "kvlcc2"}, "the equations of 'kvlcc2' are not a table"),
+        ({"ensemble": "kvlcc2"}, "ensemble: 'kvlcc2' found, expected a list of models"),
+        ({"model_uncertainty": "prior"}, "model_uncertainty: 'prior' found"),
+    ],
+)
+def test_ranges_that_are_none_are_refused(options, message):
+    with pytest.raises(InputError, match=message):
+        make(**options)
+
+
+def test_an_approach_speed_turns_the_shaft_in_proportion_and_load_divides_what_forces_do():
+    tanker, mariner = shipgym.load_model("tanker"), shipgym.load_model("mariner")
+    slower = Randomisation(speed_range=(0.5, 0.9)).ships(tanker, [Weather()])
+    parts = np.array([ship.particulars["speed"] for ship, _ in slower]) / tanker.particulars["speed"]
+    shafts = np.array([ship.service_shaft_speed for ship, _ in slower]) / tanker.service_shaft_speed
+    np.testing.assert_allclose(shafts, parts)
+    np.testing.assert_allclose(np.unique(parts.round(9)), np.linspace(0.5, 0.9, N_SPEEDS))
+    loaded = [ship for ship, _ in Randomisation(loading_range=(0.8, 1.25)).ships(mariner, [Weather()])]
+    loads = np.array([mariner.coefficients["N_d"] / ship.coefficients["N_d"] for ship in loaded])
+    assert len(loaded) == POOL_SIZE
+    assert 0.8 <= loads.min() < 0.82
+    assert 1.23 < loads.max() <= 1.25
+    for ship, load in zip(loaded[:3], loads, strict=False):
+        assert ship.coefficients == pytest.approx({k: v / load for k, v in mariner.coefficients.items()})

@@ -61,6 +61,44 @@ def test_random_steps_stay_within_angle_and_time(tanker):
     assert 10.0 < orders.max() <= 15.0
 
 
+def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
+    """A clock of half of it, periods of 20 to 2, rudder steps of 0.5 to 4, shaft steps of 5 to 15."""
+    travel = tanker.particulars["length"] / tanker.particulars["speed"]
+    times = {"seed": 2, "duration": 400.0 * travel, "dt": 0.05 * travel}
+
+    def held(trial, channel):
+        changes = np.flatnonzero(np.diff(trial[channel])) + 1
+        return np.diff(trial.t[changes]) / travel
+
+    binary = prbs_rudder(tanker, **times)
+    assert np.abs(binary["delta_command"]).max() == pytest.approx(np.radians(10.0))
+    assert held(binary, "delta_command").min() == pytest.approx(0.5)
+    waves = multi_sine_rudder(tanker, **times)["delta_command"][:-1]
+    assert np.abs(waves).max() == pytest.approx(np.radians(10.0))
+    strong = np.flatnonzero(np.abs(np.fft.rfft(waves)) > 1e-6 * len(waves))
+    assert (400.0 / strong.max(), 400.0 / strong.min()) == (2.0, 20.0)
+    steps = random_rudder_steps(tanker, **times)
+    assert np.degrees(np.abs(steps["delta_command"]).max()) == pytest.approx(20.0, abs=0.5)
+    shortest, longest = held(steps, "delta_command").min(), held(steps, "delta_command").max()
+    assert (shortest, longest) == (pytest.approx(0.5, abs=0.15), pytest.approx(4.0, abs=0.15))
+    shaft = shaft_speed_steps(tanker, **times | {"duration": 900.0 * travel})
+    orders = shaft["n_command"] / tanker.service_shaft_speed
+    assert (orders.min(), orders.max()) == (pytest.approx(0.5, abs=0.03), pytest.approx(1.1, abs=0.03))
+    shortest, longest = held(shaft, "n_command").min(), held(shaft, "n_command").max()
+    assert (shortest, longest) == (pytest.approx(5.0, abs=0.3), pytest.approx(15.0, abs=0.3))
+    assert np.all(shaft["delta_command"] == 0.0)
+
+
+def test_the_multi_sine_of_least_crest_is_taken(tanker):
+    """Of 32 draws of phases; of one draw alone it is up to half as much again."""
+    waves = [
+        multi_sine_rudder(tanker, seed=seed, duration=3000.0, dt=5.0)["delta_command"][:-1]
+        for seed in range(5)
+    ]
+    crests = [np.abs(wave).max() / wave.std() for wave in waves]
+    assert max(crests) < 2.6
+
+
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])
 def test_half_the_shaft_speed_gives_half_the_ship_s_speed(name):
     """Resistance and thrust both grow with the square of speed at a given advance ratio."""

@@ -164,3 +164,20 @@ def test_what_cannot_be_a_reference_is_refused(bare: ShipModel, tanker: ShipMode
         register_structure("grey-box", {"r": "r, delta"})
     with pytest.raises(InputError, match="expected 'acceleration'"):
         replace(grey_box(tanker), quantity="force")
+
+
+def test_the_reference_ship_of_the_regression_is_the_one_that_sails(bare: ShipModel) -> None:
+    """Without terms the box accelerates as its converted reference ship, at several states."""
+    rng = np.random.default_rng(0)
+    channels = {
+        "u": rng.uniform(4.0, 8.0, 6), "v": rng.uniform(-1.0, 1.0, 6), "r": rng.uniform(-0.01, 0.01, 6),
+        "delta": rng.uniform(-0.5, 0.5, 6), "n": rng.uniform(1.0, 2.0, 6),
+    }  # fmt: skip
+    box = bare.dynamics
+    found = box.converted_accelerations(channels, bare.particulars, bare.service_shaft_speed)
+    states = np.zeros((6, len(bare.state_names)))
+    for name in ("u", "v", "r", "delta"):
+        states[:, bare.state_names.index(name)] = channels[name]
+    rates = bare.derivatives(states, np.stack([channels["delta"], channels["n"]], axis=-1))
+    for q in "uvr":
+        np.testing.assert_allclose(found[q], rates[:, bare.state_names.index(q)], rtol=1e-9)

@@ -71,6 +71,36 @@ def test_random_paths_keep_their_bounds_and_their_seed():
     assert np.all(np.abs(one.turns) <= np.radians(60.0) + 1e-12)
 
 
+def test_random_paths_differ_and_are_drawn_evenly():
+    """Means of even distributions within 4 standard errors, and their ends reached."""
+    rng = np.random.default_rng(0)
+    paths = [random_path(rng, 6, (300.0, 900.0), 60.0) for _ in range(400)]
+    lengths, turns = (
+        np.concatenate(one) for one in zip(*((p.lengths, p.turns[:-1]) for p in paths), strict=True)
+    )
+    first = np.array([path.courses[0] for path in paths])
+    for drawn, low, high in ((lengths, 300.0, 900.0), (turns, -np.pi / 3, np.pi / 3), (first, -np.pi, np.pi)):
+        margin = (high - low) / np.sqrt(12.0 * drawn.size)
+        assert drawn.mean() == pytest.approx(0.5 * (low + high), abs=4.0 * margin)
+        assert drawn.std() == pytest.approx((high - low) / np.sqrt(12.0), rel=0.05)
+        assert drawn.max() > high - 0.02 * (high - low)
+        assert drawn.min() < low + 0.02 * (high - low)
+    assert not paths[0].waypoints[0].any()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((0, (300.0, 900.0), 60.0), "n_legs: 0 found"),
+        ((2, (0.0, 900.0), 60.0), "leg_length: 0 found"),
+        ((2, (900.0, 300.0), 60.0), "the least length first"),
+    ],
+)
+def test_a_random_path_that_cannot_be_drawn_is_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        random_path(np.random.default_rng(0), *arguments)
+
+
 @given(st.floats(-1e4, 1e4))
 def test_wrapped_is_the_same_direction(angle):
     assert -np.pi <= wrapped(angle) < np.pi
@@ -86,6 +116,7 @@ def test_wrapped_is_the_same_direction(angle):
         ("north", "at least 2 rows"),
         ([[0.0, 0.0], [0.0, 0.0]], "row 1 repeats"),
         ([[0.0, 0.0], [np.nan, 1.0]], "row 1 is"),
+        ([[0.0, 0.0], [1.0, 0.0], [1.0, -1.01e8]], "row 2 is .* expected m within 1e\\+08 of the origin"),
     ],
 )
 def test_a_path_that_is_none_is_refused(waypoints, message):

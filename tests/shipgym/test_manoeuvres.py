@@ -106,6 +106,27 @@ def test_imo_limits_between_10_and_30_seconds_per_length():
     assert overshoot_limits_deg(35.0) == (20.0, 40.0)
 
 
+def test_imo_limits_are_those_of_the_resolution(mariner):
+    """MSC.137(76), annex, 5.3; L/V of the Mariner is 20.9 s."""
+    criteria = manoeuvres.imo_assessment(mariner)
+    second = 160.93 / 7.7175
+    assert {name: (c.limit, c.source.rpartition(" ")[2]) for name, c in criteria.items()} == {
+        "advance": (4.5, "5.3.1"),
+        "tactical_diameter": (5.0, "5.3.1"),
+        "initial_turning": (2.5, "5.3.2"),
+        "overshoot_1_10_10": (pytest.approx(5.0 + 0.5 * second), "5.3.3.1"),
+        "overshoot_2_10_10": (pytest.approx(17.5 + 0.75 * second), "5.3.3.2"),
+        "overshoot_1_20_20": (25.0, "5.3.3.3"),
+        "stopping": (15.0, "5.3.4"),
+    }
+    assert criteria["stopping"].passed is None
+    assert "cannot be ordered astern" in criteria["stopping"].note
+    stop = manoeuvres.imo_assessment(load_model("tanker"))["stopping"]
+    assert stop.value == pytest.approx(8.95, abs=0.01)
+    assert stop.passed
+    assert "ahead only" in manoeuvres.imo_assessment(load_model("container"))["stopping"].note
+
+
 def test_imo_assessment_of_mariner(mariner):
     """The toolbox's Mariner turns too wide at 35 deg (6.65 L to port) and is steady otherwise."""
     criteria = manoeuvres.imo_assessment(mariner)
@@ -155,6 +176,11 @@ def test_what_a_trial_lacks_is_named():
     trial = Trial([0, 1, 2], {"psi": [0, 0, 0.0]})
     with pytest.raises(InputError, match="'delta' is missing"):
         manoeuvres.zigzag_indices(trial)
+    with pytest.raises(InputError, match="'delta' is missing, it shows when the rudder moved"):
+        manoeuvres.zigzag_indices(Trial(np.arange(5.0), {"psi": np.zeros(5)}))
+    turn = manoeuvres.turning_circle(load_model("mariner"), 35)
+    with pytest.raises(InputError, match="length is not known; give length in m"):
+        manoeuvres.turning_indices(Trial(turn.t, {name: turn[name] for name in turn.channels}))
     with pytest.raises(InputError, match="'x' is missing"):
         manoeuvres.turning_indices(trial)
 

@@ -43,6 +43,17 @@ def test_clarke_gives_the_kvlcc2_added_masses_within_20_per_cent():
     assert by_clarke["N_rdot"] == pytest.approx(-0.011 * draught_by_length, rel=0.2)
 
 
+def test_clarkes_regressions_are_those_printed():
+    """L/B 100/15, B/T 3, CB 0.7, by -pi (T/L)^2: Clarke, Gedling & Hine 1983, worked out."""
+    scale = -math.pi * 0.05**2
+    assert clarke_added_masses(100.0, 15.0, 5.0, 0.7) == pytest.approx(
+        {
+            "Y_vdot": scale * (1.0 + 0.336 - 0.11475), "Y_rdot": scale * (0.1005 - 0.0297),
+            "N_vdot": scale * (0.165 - 0.123), "N_rdot": scale * (1.0 / 12.0 + 0.0357 - 0.0495),
+        }
+    )  # fmt: skip
+
+
 def test_what_is_given_is_kept_and_what_is_estimated_is_marked():
     ship = Particulars.from_mapping(KVLCC2 | {"added_mass": {"Y_vdot": -0.0145}})
     completed = ship.completed()
@@ -146,3 +157,12 @@ def test_what_no_ship_has_is_refused(values, message):
         Particulars.from_mapping(KVLCC2 | values, "ship.toml: [ship]")
     assert str(caught.value).startswith("ship.toml: [ship]")
     assert message in str(caught.value)
+
+
+def test_inertia_is_about_midship():
+    """The gyradius is about the centre of gravity, which stands xg forward (Steiner)."""
+    ship = Particulars(length=100.0, mass=8e6, xg=5.0, yaw_gyradius=25.0, water_density=1000.0)
+    unit = 0.5 * 1000.0 * 100.0**3
+    assert ship.mass_prime == pytest.approx(8e6 / unit)
+    assert ship.xg_prime == pytest.approx(0.05)
+    assert ship.inertia_prime == pytest.approx(8e6 * (25.0**2 + 5.0**2) / (unit * 100.0**2))

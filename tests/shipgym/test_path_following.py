@@ -6,17 +6,18 @@ from itertools import pairwise
 import gymnasium
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError
-from shipgym.engine.motion import Motion
+from shipgym.engine.motion import Motion, Ship, ground_velocity
 from shipgym.envs.engine import Engine
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.tasks import path_following
+from shipgym.tasks.contract import Interval, Readings
 from shipgym.tasks.guidance import Path, line_of_sight, wrapped
-from shipgym.tasks.path_following import TURN_HORIZON
+from shipgym.tasks.path_following import TURN_HORIZON, Settings, leg_from, observe
 from shipgym.tasks.task import path_following_task, ship_of
 
 ID = "shipgym/PathFollowing-v0"
@@ -246,6 +247,38 @@ def test_a_current_sets_the_ship_off_and_course_error_shows_it():
         for _ in range(30):
             one.step(np.zeros(1, dtype=np.float32))
     assert env.physical_state()["y"] - calm.physical_state()["y"] == pytest.approx(30.0, abs=0.1)
+
+
+SHIP = Ship(LENGTH, SPEED, 0.6, 0.05, 0.0, 1.5, np.inf, SPEED)
+angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
+
+
+@given(angles, angles, st.floats(0.5, 8.0), speeds, speeds, speeds)
+def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(leg, psi, u, v, north, east):
+    """Worked with vectors north and east: way through the water, turned by the heading, and the current."""
+    motion = Motion(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    ahead, aside = ground_velocity(motion, north, east)
+    over_ground = (u + 1j * v) * np.exp(1j * psi) + north + 1j * east
+    assert (ahead + 1j * aside) * np.exp(1j * psi) == pytest.approx(over_ground, abs=1e-9)
+    state = leg_from(0, 0.0, np.array([0.0, 0.0, 2000.0 * np.cos(leg), 2000.0 * np.sin(leg)]))
+    assert (state.length, state.cosine, state.sine) == pytest.approx((2000.0, np.cos(leg), np.sin(leg)))
+    assert state.leg_course == pytest.approx(leg)
+    assume(abs(over_ground) > 0.01)
+    readings = Readings(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, psi, ahead, aside)
+    seen = observe(readings, state, Interval(1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0), SHIP, Settings())
+    across = np.imag((30.0 - 40.0j) * np.exp(-1j * leg))
+    assert seen.cross_track == pytest.approx(across, abs=1e-9)
+    course = leg - np.arctan2(across, 2.5 * LENGTH)
+    off = np.exp(1j * course) / over_ground
+    error = seen.course_error_cos + 1j * seen.course_error_sin
+    assert error == pytest.approx(off / abs(off), abs=1e-6)
+
+
+def test_a_ship_without_way_has_no_course_over_ground():
+    readings = Readings(0.0, 0.0, 0.3, *[0.0] * 7, 0.3, 0.0, 0.0)
+    state = leg_from(0, 0.0, np.array([0.0, 0.0, 900.0, 900.0]))
+    seen = observe(readings, state, Interval(1.0, 0.0, *[0.0] * 5), SHIP, Settings())
+    assert (seen.course_error_sin, seen.course_error_cos) == (0.0, 0.0)
 
 
 MIRRORED = (

@@ -1,7 +1,11 @@
 """What `import shipgym` gives, and what it costs."""
 
+import importlib
+import inspect
+import json
 import subprocess
 import sys
+from pathlib import Path
 
 import gymnasium
 import pytest
@@ -9,6 +13,29 @@ import pytest
 import shipgym
 import shipgym.manoeuvres
 import shipgym.sea
+
+DEFAULTS = Path(__file__).with_name("defaults.json")
+PUBLIC = ("shipgym", "shipgym.manoeuvres", "shipgym.sea", "shipgym.ships", "identification", "agents")
+
+
+def defaults():
+    """Default of each argument of what is public, by package, name and argument."""
+    found = {}
+    for package in map(importlib.import_module, PUBLIC):
+        for name in sorted(set(package.__all__) - {"ShipVecEnv"}):  # which loads torch
+            given = getattr(package, name)
+            if not callable(given) or (inspect.isclass(given) and issubclass(given, Exception)):
+                continue
+            parameters = inspect.signature(given).parameters.values()
+            own = {p.name: p.default for p in parameters if isinstance(p.default, int | float | str | tuple)}
+            if own:
+                found[f"{package.__name__}.{name}"] = json.loads(json.dumps(own, default=repr))
+    return found
+
+
+def test_defaults_are_those_that_users_have():
+    """Recorded by `python tests/shipgym/test_public_names.py`, where one is changed on purpose."""
+    assert defaults() == json.loads(DEFAULTS.read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize("package", [shipgym, shipgym.sea, shipgym.manoeuvres])
@@ -34,3 +61,7 @@ def test_the_import_registers_environments_and_loads_nothing_that_compiles():
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
     assert "shipgym/CourseKeeping-v0" in gymnasium.registry
+
+
+if __name__ == "__main__":
+    DEFAULTS.write_text(json.dumps(defaults(), indent=1) + "\n", encoding="utf-8")

@@ -9,7 +9,10 @@ from shipgym import InputError
 from shipgym.envs.rendering import (
     CORRIDOR,
     CURRENT,
+    FAINT,
+    GRID,
     HULL,
+    INK,
     ORDER,
     PATH,
     RUDDER,
@@ -161,3 +164,101 @@ def test_videos_are_recorded(tmp_path):
             env.step(np.zeros(1, dtype=np.float32))
         env.close()
     assert [path.suffix for path in (tmp_path / "videos").iterdir()] == [".mp4"]
+
+
+class Recorder:
+    """A brush that keeps what it is asked to draw, by colour."""
+
+    def __init__(self):
+        self.texts, self.drawn = [], []
+
+    def __getattr__(self, kind):
+        return lambda *what, **how: self.drawn.append((kind, *what))
+
+    def text(self, text, at, colour, anchor="left", small=False):
+        self.texts.append((text, at, anchor))
+
+    def of(self, kind, colour):
+        return [what[2:] for what in self.drawn if what[:2] == (kind, colour)]
+
+
+@pytest.fixture
+def sketch(renderer, monkeypatch):
+    """What is drawn of a scene."""
+
+    def draw(scene):
+        recorder = Recorder()
+        monkeypatch.setattr(renderer, "_brush", recorder)
+        renderer.draw(scene)
+        return recorder
+
+    return draw
+
+
+def test_readouts_stand_beside_their_names_line_by_line(sketch):
+    scene = replace(SHIP, readouts={"speed": "7.5 m/s", "step": "12"}, wind=(9.96, 0.5), current=(0.456, 1.0))
+    left = [one for one in sketch(scene).texts if one[2] == "left" and one[1][0] == 18.0]
+    right = [one for one in sketch(scene).texts if one[2] == "right"]
+    assert [text for text, *_ in left] == ["speed", "step", "wind", "current"]
+    assert [text for text, *_ in right] == ["7.5 m/s", "12", "10.0 m/s", "0.46 m/s"]
+    heights = [at[1] for _, at, _ in left]
+    assert heights == [at[1] for _, at, _ in right]
+    assert np.all(np.diff(heights) >= 16.0)
+
+
+def test_the_gauge_shows_the_rudder_as_part_of_its_limit(sketch):
+    for rudder, part in ((0.0, 0.0), (17.5, 0.5), (-35.0, -1.0), (50.0, 1.0)):
+        found = sketch(replace(SHIP, rudder=np.radians(rudder)))
+        (_, (tip, height), _) = next(one for one in found.of("line", RUDDER) if one[2] == 5)
+        assert tip == pytest.approx(SIZE / 2 + 90.0 * part)
+        assert height > 0.9 * SIZE
+        texts = [text for text, *_ in found.texts]
+        assert {"port 35", "stbd 35", f"rudder {rudder:+.1f} deg"} <= set(texts)
+
+
+def test_the_compass_points_where_things_come_from_and_go_to(sketch):
+    """Wind towards the middle from its side, current outward, the order's mark outside the circle."""
+    found = sketch(replace(SHIP, heading=0.0, course_order=np.pi / 2, wind=(5.0, np.pi), current=(1.0, 0.0)))
+    middle = np.array([SIZE - 70.0, 70.0])
+    letters = {text: np.array(at) - middle for text, at, _ in found.texts if text in tuple("NESW")}
+    for letter, (x, y) in {"N": (0, -1), "E": (1, 0), "S": (0, 1), "W": (-1, 0)}.items():
+        np.testing.assert_allclose(letters[letter], np.array([x, y]) * 37.0, atol=1e-9)
+    ((tail, tip),) = found.of("arrow", WIND)
+    assert np.hypot(*(np.array(tail) - middle)) == pytest.approx(64.0)
+    assert tail[1] > tip[1] > 70.0  # from the south
+    ((tail, tip),) = found.of("arrow", CURRENT)
+    assert tip[1] < tail[1] < 70.0  # to the north
+    mark = np.mean(found.of("polygon", ORDER)[0][0], axis=0) - middle
+    assert mark[0] > 50.0
+    assert mark[1] == pytest.approx(0.0, abs=1e-9)
+    ((_, needle),) = found.of("arrow", HULL)
+    np.testing.assert_allclose(np.array(needle) - middle, [0.0, -30.0], atol=1e-9)
+    ticks = [np.hypot(*(np.array(end) - middle)) for start, end in found.of("line", FAINT)[:12]]
+    np.testing.assert_allclose(ticks, 47.0)
+
+
+def test_grid_and_scale_have_the_same_round_distance(sketch):
+    """14 ship lengths across: lines every 200 m for a ship of 160 m, as long as the bar that says so."""
+    found = sketch(SHIP)
+    (bar,) = found.of("line", INK)
+    assert "200 m" in [text for text, *_ in found.texts]
+    assert bar[1][0] - bar[0][0] == pytest.approx(200.0 / METRES)
+    lines = found.of("line", GRID)
+    down = sorted(start[1] for start, end in lines if start[1] == end[1])
+    across = sorted(start[0] for start, end in lines if start[0] == end[0])
+    for offsets, centre, sign in ((down, 5000.0, -1.0), (across, -300.0, 1.0)):
+        np.testing.assert_allclose(np.diff(offsets), 200.0 / METRES)
+        metres = centre + sign * METRES * (np.array(offsets) - SIZE / 2)
+        np.testing.assert_allclose(metres / 200.0, np.round(metres / 200.0), atol=1e-6)
+        assert offsets[0] <= 0.0
+        assert offsets[-1] >= SIZE
+
+
+def test_a_corridor_is_drawn_around_its_path(sketch):
+    path = np.array([[5000.0, -300.0], [5400.0, -300.0]])
+    found = sketch(replace(SHIP, waypoints=path, corridor=50.0))
+    ((strip,),) = found.of("polygon", CORRIDOR)
+    width = np.ptp(np.array(strip)[:, 0]) * METRES
+    assert width == pytest.approx(100.0)
+    assert [radius for _, radius in found.of("circle", CORRIDOR)] == [pytest.approx(50.0 / METRES)] * 2
+    assert len(found.of("circle", PATH)) == 2

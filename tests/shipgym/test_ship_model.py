@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 
 import shipgym
 from shipgym import InputError, ShipModel, UnstableModelError
+from shipgym.engine.envelope import Envelope as EngineEnvelope
+from shipgym.engine.envelope import Four, Triangle, envelope_distance, outside_range
+from shipgym.engine.motion import Motion
 from shipgym.ships import Envelope
 from shipgym.ships.simulate import open_loop
 
@@ -205,3 +208,37 @@ def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):
     assert distances.max() == pytest.approx(1.0)
     away = envelope.centre + 3.0 * (points[distances.argmax()] - envelope.centre)
     assert envelope.distance(*away) == pytest.approx(3.0)
+
+
+def test_what_cannot_be_simulated_or_sampled_is_refused():
+    mariner = shipgym.load_model("mariner")
+    for dt in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(InputError, match="expected a step in s above 0"):
+            mariner.simulate(np.zeros((5, 1)), dt)
+    for state in (np.zeros(3), np.full(len(mariner.state_names), np.nan)):
+        with pytest.raises(InputError, match="finite numbers for x, y, psi, u, v, r, delta"):
+            mariner.simulate(np.zeros((5, 1)), 1.0, state)
+    with pytest.raises(InputError, match="'mariner' has no covariance"):
+        mariner.sample(2, 0)
+    trial = mariner.simulate(np.zeros((5, 1)), 1.0)
+    for name in ("psi", "u", "v", "r", "delta"):
+        rest = {one: trial[one] for one in trial.channels if one != name}
+        with pytest.raises(InputError, match=f"channel '{name}' is missing, it is needed to predict"):
+            open_loop(mariner, shipgym.Trial(trial.t, rest))
+
+
+corner = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
+
+
+@given(corner, st.lists(st.floats(-1.0, 1.0), min_size=10, max_size=10))
+def test_distance_and_range_of_a_state_are_those_of_the_matrix_and_of_the_box(state, numbers):
+    W = np.zeros((4, 4))
+    W[np.triu_indices(4)] = numbers
+    centre, low, high = (0.1, -0.2, 0.3, 0.0), (-1.0, -0.5, -1.5, -0.7), (1.0, 0.5, 1.5, 0.7)
+    data = EngineEnvelope(Four(*low), Four(*high), Four(*centre), Triangle(*numbers))
+    u, v, r, delta = state
+    motion = Motion(0.0, 0.0, 0.0, u, v, r, 0.0, 0.0, 0.0, delta, 0.0)
+    expected = np.linalg.norm(W @ (np.array(state) - centre))
+    assert envelope_distance(motion, data) == pytest.approx(expected, abs=1e-12)
+    inside = all(a <= x <= b for a, x, b in zip(low, state, high, strict=True))
+    assert outside_range(motion, data) == (not inside)

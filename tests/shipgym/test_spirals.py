@@ -126,5 +126,7 @@ def test_what_a_trial_lacks_is_named():
         manoeuvres.spiral_from_trial(still)
     with pytest.raises(InputError, match="no pull-out found"):
         manoeuvres.pull_out_indices(still)
+    with pytest.raises(InputError, match="rudder angles go one way only"):
+        manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.1, -1.0]), "direct"))
     with pytest.raises(InputError, match="turns to both sides"):
         manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.5, 0.1]), "direct"))

@@ -112,3 +112,15 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
 def test_wrong_arguments(name, call, message):
     with pytest.raises(InputError, match=message):
         call(load_model(name))
+
+
+@pytest.mark.parametrize(
+    ("indices", "needed"),
+    [(stopping_indices, ("u", "v", "x", "y", "psi")), (acceleration_indices, ("u", "v"))],
+)
+def test_what_a_trial_lacks_is_named(indices, needed):
+    t = np.arange(5.0)
+    for missing in needed:
+        channels = {name: 1.0 + t for name in needed if name != missing}
+        with pytest.raises(InputError, match=f"channel '{missing}' is missing"):
+            indices(Trial(t, channels, length=50.0))

@@ -260,3 +260,40 @@ def test_nomoto_is_recovered_from_its_own_linear_form():
     gain, time = 0.031, 30.2487
     found = nomoto(virtual_ship("nomoto", c_r=-1.0 / time, c_d=gain / time))
     np.testing.assert_allclose([found.K, found.T], [gain, time], rtol=1e-6)
+
+
+def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
+    table = get_structure("nomoto2")
+    assert table.regressed == ("r",)
+    assert table.regression_names("r") == table.names("r") + table.names("q")
+    assert table.state_names == ("x", "y", "psi", "u", "v", "r", "q", "delta")
+    assert get_structure("nomoto").regression_names("r") == get_structure("nomoto").names("r")
+
+
+@pytest.mark.parametrize(
+    ("name", "equations", "message"),
+    [
+        ("nomoto", {"r": "r, delta"}, "name 'nomoto' found, which is another structure's"),
+        ("kvlcc2", {"r": "r, delta"}, "name 'kvlcc2' found, which is another structure's"),
+        ("grey-box", {"r": "r, delta"}, "name 'grey-box' found, which is another structure's"),
+        ("mine", {"r": 3}, "equations.r: 3 found, expected formulas such as"),
+        ("mine", {"r": ["r", "delta"]}, "equations.r: 'r' found, expected a formula in one text, or Terms"),
+    ],
+)
+def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, message):
+    with pytest.raises(InputError, match=message):
+        shipgym.register_structure(name, equations)
+    assert "mine" not in STRUCTURES
+
+
+def test_a_grey_box_is_no_structure_by_itself():
+    with pytest.raises(InputError, match="'grey-box' found, which is a reference ship and a table of terms"):
+        get_structure("grey-box")
+
+
+def test_structures_are_listed_by_the_names_of_their_sources():
+    names = set(shipgym.ships.list_structures())
+    assert {f"zhu-{k}" for k in range(1, 11)} <= names
+    assert {"abkowitz", "cubic", "nomoto", "nomoto2", "norrbin", "surge", "steering5", "steering7"} <= names
+    assert {"linear-steering", "mmg4dof", "pmm18", "pmm38", "surge-perturbed"} <= names
+    assert "zhu-11" not in names

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 
 import shipgym
 from shipgym import InputError, Trial, load_model
@@ -190,3 +191,16 @@ def test_a_balance_at_the_centre_of_gravity_is_moved_to_midship(mariner, tmp_pat
 def test_wrong_arguments(mariner, call, message):
     with pytest.raises(InputError, match=message):
         call(mariner)
+
+
+def test_the_track_is_the_integral_of_the_velocity():
+    """Over a cycle of yaw with drift: velocities turned by the heading, summed along the way."""
+    mariner = load_model("mariner")
+    trial = towing_tank.yaw_with_drift(mariner, 0.5, 8.0, period_s=200.0, tank=Tank(samples=400, cycles=1))
+    way = (trial["u"] + 1j * trial["v"]) * np.exp(1j * trial["psi"])
+    track = cumulative_trapezoid(way, trial.t, initial=0.0)
+    np.testing.assert_allclose(trial["x"] + 1j * trial["y"], track, atol=0.05)
+    assert np.ptp(trial["y"]) > 50.0
+    np.testing.assert_allclose(
+        trial["psi"], cumulative_trapezoid(trial["r"], trial.t, initial=0.0), atol=1e-4
+    )

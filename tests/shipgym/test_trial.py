@@ -650,3 +650,21 @@ def test_channels_derived_from_the_tank_s_positions_agree_with_its_own(tmp_path)
     assert derived.derived == {"u", "v", "r"}
     for name, tolerance in {"u": 1e-3, "v": 1e-3, "r": 4e-4}.items():  # 0.1 % of u, 1 % of v and r
         assert np.sqrt(np.mean((derived[name] - measured[name]) ** 2)) < tolerance
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit", "largest"),
+    [
+        ("u", "m/s", 50.0), ("v", "m/s", 50.0), ("r", "deg/s", 60.0), ("p", "deg/s", 360.0),
+        ("phi", "deg", 180.0), ("delta", "deg", 90.0), ("delta_command", "deg", 90.0), ("n", "rps", 200.0),
+        ("n_command", "rps", 200.0),
+    ],
+)  # fmt: skip
+def test_what_no_ship_does_begins_at_its_limit(tmp_path, channel, unit, largest):
+    """In the unit of the limit: up to it a value passes, 1 % more does not."""
+    columns = {"t": "t", channel: {"column": channel, "unit": unit}}
+    path = write(tmp_path / "run.csv", {"t": T, channel: np.full(T.size, -largest)})
+    assert Trial.from_csv(path, columns)[channel][0] == pytest.approx(-largest * si_factor(channel, unit))
+    path = write(tmp_path / "more.csv", {"t": T, channel: np.full(T.size, 1.01 * largest)})
+    with pytest.raises(InputError, match=rf"{channel} = .* found, expected at most"):
+        Trial.from_csv(path, columns)

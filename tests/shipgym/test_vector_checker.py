@@ -100,3 +100,11 @@ def test_rows_that_are_other_ships_are_named():
 
     with pytest.raises(InputError, match="row 0 shows"):
         check_vector_env(Right, tanker, n_steps=5)
+
+
+def test_a_single_ship_is_enough_of_a_batch():
+    class Alone(Right):
+        def __init__(self):
+            SyncVectorEnv.__init__(self, [single], autoreset_mode=self.mode)
+
+    check_vector_env(Alone, n_steps=5)

@@ -182,3 +182,26 @@ def test_workers_of_other_processes():
     ours, _ = vector(COURSE, 2).reset(seed=4)
     np.testing.assert_array_equal(seen, ours)
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"reset_mask": np.zeros(3, dtype=np.bool_)}, "reset_mask is False in all rows"),
+        ({"reset_mask": np.ones(2, dtype=np.bool_)}, "expected a bool array of 3"),
+        ({"reset_mask": np.ones(3, dtype=np.int64)}, "expected a bool array of 3"),
+        ({"reset_mask": [True] * 3}, "expected a bool array of 3"),
+        ({"mask": np.ones(3, dtype=np.bool_)}, "Did you mean 'reset_mask'"),
+    ],
+)
+def test_a_mask_that_says_nothing_is_refused(options, message):
+    envs = gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=3, model="mariner")
+    envs.reset(seed=0)
+    with pytest.raises(InputError, match=message):
+        envs.reset(options=options)
+
+
+def test_an_unknown_mode_is_refused():
+    for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
+        with pytest.raises(InputError, match=f"{name}: '{value}' found, expected"):
+            gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value})

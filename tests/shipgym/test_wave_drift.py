@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
-from shipgym.sea.drift import added_resistance, reflection_coefficients
+from shipgym.sea.drift import added_resistance, end_angle, reflection_coefficients
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.mobility import mobility_matrix, roll_inertia
 from shipgym.sea.waves import draught_attenuation
@@ -41,6 +41,41 @@ def test_added_resistance_peaks_where_model_tests_have_it(ship, froude, peak, at
     lengths, curve = head_sea_curve(ship, froude)
     assert curve.max() == pytest.approx(peak, rel=0.15)
     assert lengths[np.argmax(curve)] == pytest.approx(at, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    ("ship", "omega", "expected"),
+    [
+        (S175, 0.35, [2377.198, 2219.951, 143.2162, 43.28321, 288.3504, 68.41627]),
+        (S175, 0.5, [120590.6, 117177.9, 21183.12, 3694.124, 12731.17, 11403.04]),
+        (S175, 0.8, [71929.49, 84009.93, 146427.4, 88832.96, 17073.15, 12750.02]),
+        (KVLCC2, 0.35, [273021.3, 262928.6, 86164.03, 2219.593, 10982.83, -2151.524]),
+        (KVLCC2, 0.5, [328523.7, 339018.4, 640982.9, 230369.0, 42751.31, 14362.18]),
+        (KVLCC2, 0.8, [307547.7, 314728.1, 467820.5, 111276.0, -45473.85, 34603.28]),
+    ],
+)
+def test_added_resistance_is_that_of_the_procedure(ship, omega, expected):
+    """ITTC 7.5-04-01-01.1, appendix G, at service speed, N/m2: worked out apart, equation by equation.
+
+    Waves from 0, 0.15, 1, 2, 2.6 and pi rad from the bow: all branches of its parts.
+    """
+    chi = np.array([0.0, 0.15, 1.0, 2.0, 2.6, np.pi])
+    np.testing.assert_allclose(added_resistance(omega, chi, ship, ship.speed), expected, rtol=1e-5)
+
+
+def test_the_ends_of_the_hulls_are_as_blunt_as_holtrop_and_kerlen_say():
+    assert np.degrees(end_angle(S175)) == pytest.approx(9.7372, abs=1e-4)
+    assert np.degrees(end_angle(KVLCC2)) == pytest.approx(25.8442, abs=1e-4)
+
+
+def test_speed_and_breadth_count_within_the_formulas_range_only():
+    """Froude numbers up to 0.4, a beam of twice the draught at least."""
+    fast, faster = (np.sqrt(GRAVITY * S175.length) * froude for froude in (0.4, 0.6))
+    assert added_resistance(0.5, 0.3, S175, fast) == added_resistance(0.5, 0.3, S175, faster)
+    assert added_resistance(0.5, 0.3, S175, 0.95 * fast) != added_resistance(0.5, 0.3, S175, fast)
+    deep, deeper = (replace(S175, draught=S175.beam / ratio) for ratio in (2.0, 1.6))
+    long = 0.25  # rad/s: waves too long to be reflected
+    assert added_resistance(long, 0.3, deep, 8.0) == added_resistance(long, 0.3, deeper, 8.0)
 
 
 def test_short_waves_are_resisted_by_reflection_as_in_model_tests():

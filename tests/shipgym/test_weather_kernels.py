@@ -8,14 +8,31 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.linalg import expm
+from scipy.signal import bilinear, lfilter
 
 import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
+from shipgym.engine.motion import Motion
 from shipgym.envs.engine import Engine
-from shipgym.sea import AIR_DENSITY, Current, Waves, Weather, Wind, gust_filter, wave_motion, wind_curves
+from shipgym.instruments import bridge
+from shipgym.sea import (
+    AIR_DENSITY,
+    Current,
+    Waves,
+    Weather,
+    Wind,
+    gust_filter,
+    open_sea,
+    wave_motion,
+    wind_curves,
+)
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.mobility import mobility_matrix
+from shipgym.sea.open_sea import Sea, SeaParameters
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.simulate import open_loop, simulate
 from shipgym.tasks.task import course_keeping_task
@@ -214,6 +231,140 @@ def test_numbers_of_the_generator_are_normal():
     assert np.mean(white**4) == pytest.approx(3.0, abs=4.0 * np.sqrt(96.0 / n))
     assert np.mean(np.abs(white) > 3.0) == pytest.approx(0.0027, abs=4.0 * np.sqrt(0.0027 / n))
     assert abs(np.mean(white[1:] * white[:-1])) < 4.0 / np.sqrt(n)
+
+
+NO_SINES, NO_COSINES = open_sea.Sines(*[0.0] * 6), open_sea.Cosines(*[0.0] * 7)
+NO_FILTER = open_sea.Filter(1.0, 0.0, 0.0)
+
+
+def parameters(**given):
+    """A sea of 10 s waves, lightly damped, without anything else but what is given."""
+    w, damping = 0.628, 0.1
+    none = {
+        name: NO_FILTER if name in ("current", "gust", "drift") else 0.0 for name in SeaParameters._fields
+    } | {
+        name: NO_COSINES if name.endswith(("surge", "variance")) else NO_SINES
+        for name in SeaParameters._fields[12:]
+    }
+    waves = {"wave_frequency": w, "wave_number": w * w / 9.81, "wave_damping": damping}
+    return SeaParameters(**none | waves | {"wave_ringing": np.sqrt(1 - damping**2), "still_air": 0.0} | given)
+
+
+angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
+
+
+@given(angle, st.lists(few, min_size=7, max_size=7))
+def test_series_over_an_angle_are_fouriers(angle, a):
+    cosine, sine, k = np.cos(angle), np.sin(angle), np.arange(1, 7)
+    expected = a[0] + np.cos(k * angle) @ a[1:]
+    assert open_sea.cosine_series(cosine, open_sea.Cosines(*a)) == pytest.approx(expected, abs=1e-9)
+    sines = open_sea.sine_series(cosine, sine, open_sea.Sines(*a[1:]))
+    assert sines == pytest.approx(np.sin(k * angle) @ a[1:], abs=1e-9)
+
+
+@given(st.floats(0.0, 2.0))
+def test_an_oscillator_in_waves_steps_exactly(turn):
+    """Its transition is the matrix exponential; its noise keeps both variances at 1."""
+    p = parameters()
+    p11, p12, p22, n11, n12, n22 = open_sea.ring(turn, p)
+    transition = np.array([[p11, p12], [-p12, p22]])
+    exact = expm(turn * np.array([[0.0, 1.0], [-1.0, -2.0 * p.wave_damping]]))
+    np.testing.assert_allclose(transition, exact, atol=2e-7)
+    noise = np.array([[n11, n12], [0.0, n22]])
+    np.testing.assert_allclose(noise @ noise.T, np.eye(2) - exact @ exact.T, atol=2e-6)
+    stepped = open_sea.oscillated(0.3, -0.7, 0.5, 1.1, (p11, p12, p22, n11, n12, n22))
+    np.testing.assert_allclose(stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6)
+
+
+@given(angle, angle, few, few, st.floats(0.0, 15.0), few)
+def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
+    """Worked with vectors north and east: the air that the ship meets, and the waves from the bow."""
+    coefficients = {
+        "wind_surge": open_sea.Cosines(0.2, -0.5, *[0.0] * 5), "wind_sway": open_sea.Sines(0.9, *[0.0] * 5),
+        "wind_yaw": open_sea.Sines(0.0, 0.3, *[0.0] * 4),
+        "drift_surge": open_sea.Cosines(-0.4, 0.1, *[0.0] * 5),
+        "drift_sway": open_sea.Sines(0.7, *[0.0] * 5), "drift_yaw": open_sea.Sines(0.0, 0.2, *[0.0] * 4),
+        "wind_roll": open_sea.Sines(0.6, *[0.0] * 5), "drift_roll": open_sea.Sines(0.8, *[0.0] * 5),
+    }  # fmt: skip
+    current, waves_from = 0.7 - 0.4j, blows + 0.5
+    sea = Sea(**dict.fromkeys(Sea._fields, 0.0) | {
+        "wind_north": np.cos(blows), "wind_east": np.sin(blows), "waves_north": np.cos(waves_from),
+        "waves_east": np.sin(waves_from), "current_north": current.real, "current_east": current.imag,
+        "gust": gust, "drift": 0.25,
+    })  # fmt: skip
+    motion = Motion(0.0, 0.0, psi, u, v, *[0.0] * 6)
+    p = parameters(wind_speed=speed, still_air=0.01, **coefficients)
+    found = open_sea.push(motion, sea, p)
+    met = (speed + gust) * np.exp(1j * blows) + current + (u + 1j * v) * np.exp(1j * psi)
+    assume(abs(met) > 1e-3)
+    felt, size = np.angle(met) - psi, abs(met) ** 2
+    bow = waves_from - psi
+    assert found.u == pytest.approx(
+        size * (0.2 - 0.5 * np.cos(felt)) + 0.01 * u * abs(u) + 1.25 * (-0.4 + 0.1 * np.cos(bow)), abs=1e-6
+    )
+    assert found.v == pytest.approx(size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow), abs=1e-6)
+    assert found.r == pytest.approx(
+        size * 0.3 * np.sin(2.0 * felt) + 1.25 * 0.2 * np.sin(2.0 * bow), abs=1e-6
+    )
+    assert found.p == pytest.approx(size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow), abs=1e-6)
+    assert (found.north, found.east) == (current.real, current.imag)
+    ahead = u * np.cos(bow) + v * np.sin(bow)
+    met_at = max(abs(0.628 + 0.628**2 / 9.81 * ahead), 0.0628)
+    assert open_sea.encounter_frequency(motion, sea, p) == pytest.approx(met_at)
+
+
+def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
+    """Notch (s^2 + 0.2 w s + w^2) / (s^2 + 1.4 w s + w^2), its frequency kept (Fossen 11.1.2)."""
+    turn, signal = 0.4, np.random.default_rng(0).standard_normal(200)
+    w = 2.0 * np.tan(0.5 * turn)
+    b, a = bilinear([1.0, 0.2 * w, w * w], [1.0, 1.4 * w, w * w], fs=1.0)
+    rest = np.concatenate([np.zeros(2), signal - signal[0]])
+    expected = signal - (lfilter(b, a, rest)[2:] + signal[0])
+    memory, taken = bridge.Notch(0.0, 0.0, 0.0, 0.0), []
+    for k, value in enumerate(signal):
+        memory = bridge.notched(value, turn, k == 0, memory)
+        taken.append(memory.taken_1)
+    np.testing.assert_allclose(taken, expected, atol=1e-12)
+
+
+def test_a_sea_begins_and_goes_on_as_it_always_was():
+    """Over 3,000 episodes every process has its deviation and mean, at the beginning and 2 s later."""
+    p = parameters(
+        current_speed=0.8, current_towards=2.0, wind_from=np.nan, waves_from=np.nan,
+        current=open_sea.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3), gust=open_sea.Filter(0.8, 2.0 * 0.6, 2.0),
+        drift=open_sea.Filter(0.6, 0.5 * 0.8, 0.5), heading_variance=open_sea.Cosines(0.04, *[0.0] * 6),
+        roll_variance=open_sea.Cosines(0.09, *[0.0] * 6),
+    )  # fmt: skip
+    motion, n = Motion(0.0, 0.0, 0.3, 5.0, *[0.0] * 7), 3000
+    begun, later = [], []
+    with np.errstate(over="ignore"):
+        for key in range(n):
+            word = random.stream(np.uint64(key), np.uint64(0))
+            begun.append(open_sea.begin_sea(motion, word, p))
+            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + open_sea.BEGIN_WORDS, p))
+    first, second = np.array(begun), np.array(later)
+    expected = {
+        "current_north": (0.8 * np.cos(2.0), 0.3), "current_east": (0.8 * np.sin(2.0), 0.3),
+        "gust": (0.0, 2.0),
+        "drift": (0.0, 0.5), "heading_1": (0.0, 1.0), "heading_2": (0.0, 1.0), "roll_1": (0.0, 1.0),
+        "roll_2": (0.0, 1.0), "psi_wave": (0.0, 0.2), "phi_wave": (0.0, 0.3),
+        "wind_north": (0.0, np.sqrt(0.5)), "wind_east": (0.0, np.sqrt(0.5)),
+    }  # fmt: skip
+    for name, (mean, deviation) in expected.items():
+        k = Sea._fields.index(name)
+        for values in (first[:, k], second[:, k]):
+            assert values.mean() == pytest.approx(mean, abs=4.0 * deviation / np.sqrt(n)), name
+            assert values.std() == pytest.approx(deviation, rel=4.0 / np.sqrt(2 * n)), name
+    by_name = dict(zip(Sea._fields, first.T, strict=True)), dict(zip(Sea._fields, second.T, strict=True))
+    for name, kept in (("current_north", 0.9), ("gust", 0.8), ("drift", 0.6)):
+        found = np.corrcoef(by_name[0][name], by_name[1][name])[0, 1]
+        assert found == pytest.approx(kept, abs=4.0 / np.sqrt(n)), name
+    np.testing.assert_array_equal(by_name[0]["wind_north"], by_name[0]["waves_north"])
+    met = np.array([open_sea.encounter_frequency(motion, sea, p) for sea in later])
+    np.testing.assert_allclose(by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_1"], rtol=1e-9)
+    np.testing.assert_allclose(by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_1"], rtol=1e-9)
+    columns = second[:, [Sea._fields.index(name) for name in list(expected)[:8]]]
+    assert np.abs(np.corrcoef(columns.T) - np.eye(8)).max() < 5.0 / np.sqrt(n)
 
 
 def test_a_simulation_is_a_function_of_its_seed(mariner):

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Wind, load_model
-from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
+from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves, wind_tables
 from shipgym.sea.estimates import weather_particulars
-from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names
+from shipgym.sea.gusts import GaussMarkov
+from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names, isherwood_coefficients
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
@@ -56,6 +57,39 @@ def test_isherwood_worked_by_hand():
     assert at(curves, 60)[0] == pytest.approx(CX_60 * frontal)
     assert at(curves, 90)[1] == pytest.approx(-CY_90 * lateral)
     assert at(curves, 90)[2] == pytest.approx(-CN_90 * lateral * length)
+    assert at(curves, 90)[3] == pytest.approx(at(curves, 90)[1] * 9.0)  # heels about the waterline
+    house = 0.15 * 0.07 * 175.0**2
+    CY_130 = 1.014 + 0.191 * 2.0 * frontal / beam**2 - 0.280 * perimeter / length - 0.69 * 94.0 / length
+    assert at(curves, 130)[1] == pytest.approx(-(CY_130 + 0.44 * house / lateral) * lateral)
+
+
+def test_isherwoods_superstructure_is_felt_on_the_quarter_only():
+    hull = {"length": 180.0, "beam": 25.4, "lateral_area": 2700.0, "frontal_area": 600.0, "perimeter": 234.5}
+    bare, housed = (
+        isherwood_coefficients(**hull, bow_to_centroid=94.0, masts=2.0, superstructure_area=area)
+        for area in (0.0, 0.5 * 2700.0)
+    )
+    angles = np.arange(0, 181, 10)
+    more = dict(zip(angles.tolist(), (housed[1] - bare[1]).round(12).tolist(), strict=True))
+    assert {angle: value for angle, value in more.items() if value} == {
+        120: 0.17, 130: 0.22, 140: 0.19, 150: 0.135
+    }  # fmt: skip
+    np.testing.assert_array_equal(bare[0], housed[0])
+    np.testing.assert_array_equal(bare[2], housed[2])
+
+
+def test_published_tables_keep_their_numbers():
+    """Sums of the columns of Isherwood's three tables and of Blendermann's."""
+    found = [
+        table.sum(axis=0).round(6).tolist() for table in (wind_tables._CX, wind_tables._CY, wind_tables._CN)
+    ]
+    assert found == [
+        [6.664, -13.63, 0.929, -0.633, -2.477, 4.63, 0.115],
+        [11.104, 7.43, 1.686, 0.003, -1.283, -7.54, 1.43],
+        [2.3069, 2.589, -0.2483, 0.086, 0.4644, -6.981],
+    ]
+    sums = np.sum(list(BLENDERMANN.values()), axis=0)
+    assert sums.round(6).tolist() == [14.65, 10.35, 10.525, 9.0, 24.8]
 
 
 @pytest.mark.parametrize("coefficients", coefficient_names())
@@ -106,6 +140,28 @@ def test_estimates_are_marked_and_given_areas_are_used():
     assert 330.0 * 9.2 < estimated.lateral_area < 1.5 * 330.0 * 9.2
 
 
+def test_what_is_not_known_above_the_water_is_estimated_as_documented():
+    """KVLCC2, 320 x 58 x 20.8 m, CB 0.81: a house of 48 x 22.4 m stands at 0.42 L aft, 0.6 B wide."""
+    ship = weather_particulars(KVLCC2)
+    deck, house = 20.8 * (1.3 - 1.05 * 0.81), 48.0 * 22.4
+    assert ship.length_overall == pytest.approx(1.03 * 320.0)
+    assert ship.frontal_area == pytest.approx(58.0 * (deck + 0.6 * 22.4))
+    assert ship.lateral_area == pytest.approx(329.6 * deck + house)
+    assert ship.lateral_centroid == pytest.approx(-0.42 * 320.0 * house / (329.6 * deck + house))
+    height = (329.6 * deck * deck / 2.0 + house * (deck + 11.2)) / (329.6 * deck + house)
+    assert ship.lateral_centroid_height == pytest.approx(height)
+    assert ship.metacentric_height == pytest.approx(2.9)
+    factor = 0.373 + 0.023 * 58.0 / 20.8 - 0.043 * 3.2  # below 0.3, which counts
+    assert factor < 0.3
+    assert ship.roll_period == pytest.approx(2.0 * 0.3 * 58.0 / np.sqrt(2.9))
+    fine = weather_particulars(Particulars(length=120.0, beam=20.0, draught=5.0, block_coefficient=0.6))
+    assert fine.lateral_centroid == 0.0  # the house amidships
+    factor = 0.373 + 0.023 * 4.0 - 0.043 * 1.2
+    assert fine.roll_period == pytest.approx(2.0 * factor * 20.0 / np.sqrt(1.0))
+    boat = weather_particulars(Particulars(length=12.0, beam=4.0, draught=1.0, block_coefficient=0.5))
+    assert boat.roll_period == pytest.approx(2.0 * (0.373 + 0.092 - 0.043) * 4.0 / np.sqrt(0.2))
+
+
 def test_a_table_of_ones_own_is_followed():
     table = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0), (0.0, 1.2, 0.0))
     curves = wind_curves(S175, table)
@@ -140,6 +196,14 @@ def test_gusts_are_as_strong_as_over_a_rough_sea():
     assert gust_filter(Wind(15.0, gust=False)).standard_deviation == 0.0
 
 
+def test_time_constants_of_gusts_are_those_of_their_most_energetic_frequency():
+    """T = 1 / (2 pi f): 165.4 m and 110.3 m by the wind speed for Harris and Davenport."""
+    for speed in (5.0, 20.0):
+        assert gust_filter(Wind(speed)).time_constant == pytest.approx(165.4 / speed, rel=1e-3)
+        davenport = gust_filter(Wind(speed, spectrum="davenport")).time_constant
+        assert davenport == pytest.approx(110.3 / speed, rel=1e-3)
+
+
 @pytest.mark.parametrize(("spectrum", "bound"), [("harris", 0.18), ("davenport", 0.21), ("norsok", 0.65)])
 @pytest.mark.parametrize("speed", [5.0, 10.0, 25.0])
 def test_the_filter_has_the_energy_of_the_spectrum_where_it_is(spectrum, bound, speed):
@@ -162,3 +226,10 @@ def test_a_simulated_gust_has_the_spectrum_of_the_filter():
     low = (f > 0) & (f < 0.1)  # well below the Nyquist frequency of 1 Hz
     np.testing.assert_allclose(density[low], gust.spectrum(f[low]), rtol=0.25)
     assert density[low].sum() == pytest.approx(gust.spectrum(f[low]).sum(), rel=0.03)
+
+
+def test_the_spectrum_of_a_process_holds_its_variance_and_halves_at_its_corner():
+    process = GaussMarkov(30.0, 2.0)
+    f = np.concatenate([[0.0], np.geomspace(1e-7, 1e4, 200_000)])
+    assert np.trapezoid(process.spectrum(f), f) == pytest.approx(4.0, rel=1e-4)
+    assert process.spectrum(1.0 / (2.0 * np.pi * 30.0)) == pytest.approx(0.5 * process.spectrum(0.0))

@@ -1,0 +1,176 @@
+"""Figures of the pages draw the numbers that they are given."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from agents.benchmarking import page_figures
+from agents.verification import figures
+from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from shipgym import Trial
+from shipgym.manoeuvres import Criterion, IndexInterval
+
+
+def traces(figure, name):
+    return [trace for trace in figure.data if trace.name == name]
+
+
+def only(figure, name):
+    (trace,) = traces(figure, name)
+    return trace
+
+
+def test_criteria_are_drawn_in_per_cent_of_their_limits():
+    drawn = IndexInterval(3.6, np.array([3.6, 4.95, np.nan]), np.zeros(3, dtype=bool))
+    figure = figures.criteria_figure(
+        {
+            "advance": Criterion(3.6, 4.5, True, "ship lengths", "5.3.1", drawn),
+            "stopping": Criterion(None, 15.0, None, "ship lengths", "5.3.4"),
+        }
+    )
+    first, second = traces(figure, "models drawn")
+    np.testing.assert_allclose(first.x, [80.0, 110.0], rtol=1e-6)
+    assert np.abs(np.array(first.y)).max() < 0.25
+    assert len(second.x) == 0
+    model = only(figure, "identified model")
+    np.testing.assert_allclose(model.x, [80.0, 80.0])
+    np.testing.assert_allclose(np.mean(model.y), 0.0, atol=1e-12)
+    assert list(only(figure, "IMO limit").x) == [100.0, 100.0]
+    assert list(figure.layout.yaxis.range) == [1.5, -0.5]
+    assert list(figure.layout.yaxis.ticktext) == [figures.CRITERIA[name] for name in ("advance", "stopping")]
+
+
+def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
+    t = np.arange(4.0)
+    zigzag = Trial(t, {"psi": np.radians(t), "delta": np.radians(-2.0 * t)})
+    circle = Trial(t, {"x": 50.0 * t, "y": 100.0 * t})
+    headings = np.radians(np.stack([t + k for k in range(21)]))
+    paths = (np.stack([10.0 * t, 20.0 * t], axis=-1),)
+    found = ManoeuvreUncertainty({}, np.zeros(21, dtype=bool), zigzag, headings, circle, paths)
+    figure = figures.manoeuvres_figure(found, 50.0)
+    np.testing.assert_allclose(only(figure, "rudder").y, -2.0 * t, rtol=1e-6)
+    heading, track = traces(figure, "identified model")
+    np.testing.assert_allclose(heading.y, t, rtol=1e-6)
+    np.testing.assert_allclose((track.x, track.y), (2.0 * t, t), rtol=1e-6)
+    single = only(figure, "single draws")
+    np.testing.assert_allclose((single.x, single.y), ([0, 0.4, 0.8, 1.2, np.nan], [0, 0.2, 0.4, 0.6, np.nan]))
+    band = only(figure, "5 to 95 % of draws")
+    np.testing.assert_allclose(band.x, [0, 1, 2, 3, 3, 2, 1, 0])
+    np.testing.assert_allclose(band.y, [19, 20, 21, 22, 4, 3, 2, 1], rtol=1e-6)
+
+
+def test_steps_and_costs_are_those_of_each_autopilot():
+    t = np.arange(3.0)
+    heading = np.radians([[0.0, 10.0, 20.0], [0.0, 12.0, 22.0], [0.0, 8.0, 18.0]])
+    figure = figures.steps_figure(t, {"pid": (heading, -heading), "lq": (heading[:1], heading[:1])}, 20.0)
+    above, below = [trace for trace in traces(figure, "pid") if trace.fill is None]
+    np.testing.assert_allclose(above.y, [0.0, 10.0, 20.0], rtol=1e-6)
+    np.testing.assert_allclose(below.y, [0.0, -10.0, -20.0], rtol=1e-6)
+    assert len(traces(figure, "pid")) == 4  # with the bands of the draws
+    assert len(traces(figure, "lq")) == 2
+    course = only(figure, "set course")
+    assert (list(course.x), list(course.y)) == ([0.0, 2.0], [20.0, 20.0])
+    boxes = figures.costs_figure({"pid": np.array([1.0, 2.0]), "lq": np.array([0.5])})
+    assert [(box.name, list(box.x)) for box in boxes.data] == [("pid", [1.0, 2.0]), ("lq", [0.5])]
+
+
+def result(**summary):
+    costs = {"pid": np.array([[1.0, 2.0]]), "oracle": np.array([[0.5, 25.0]])}
+    entries = [
+        {"name": "oracle", "score": {"value": 1.0, "low": None, "high": None}, "relative_cost": 1.0},
+        {"name": "pid", "score": {"value": 0.25, "low": 0.125, "high": 0.5}, "relative_cost": 1.5},
+        {"name": "lq", "score": {"value": None, "low": None, "high": None}, "relative_cost": None},
+    ]
+    return SimpleNamespace(
+        ranking=["oracle", "pid", "lq"],
+        summary={"reference": "x", "ranking": entries, "tasks": {"calm": costs}} | summary,
+        figures=lambda name, task: costs[name],
+    )
+
+
+def test_scores_are_drawn_with_their_intervals():
+    figure = page_figures.scores_figure(result())
+    assert [trace.name for trace in figure.data] == ["oracle", "pid"]
+    pid = only(figure, "pid")
+    assert (pid.x[0], pid.error_x.array[0], pid.error_x.arrayminus[0]) == (0.25, 0.25, 0.125)
+    oracle = only(figure, "oracle")
+    assert (oracle.x[0], oracle.error_x.array[0], oracle.error_x.arrayminus[0]) == (1.0, 0.0, 0.0)
+    assert sorted(shape.x0 for shape in figure.layout.shapes) == [0.0, 1.0]
+    assert figure.layout.xaxis.title.text.startswith("score")
+    unscored = page_figures.scores_figure(result(reference=None))
+    assert [trace.x[0] for trace in unscored.data] == [1.0, 1.5]
+    assert not unscored.layout.shapes
+    assert unscored.layout.xaxis.title.text.startswith("cost relative")
+
+
+def test_costs_have_a_logarithmic_axis_where_they_differ_much():
+    figure = page_figures.costs_figure(result(), "calm")
+    assert [(box.name, list(box.x)) for box in figure.data] == [("oracle", [0.5, 25.0]), ("pid", [1.0, 2.0])]
+    assert figure.layout.xaxis.type == "log"
+    marks = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
+    np.testing.assert_allclose(figure.layout.xaxis.tickvals, marks)
+    near = result()
+    near.figures = lambda name, task: np.array([[1.0, 19.0]])
+    assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
+    near.figures = lambda name, task: np.array([[0.0, 900.0]])
+    assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
+
+
+def test_profiles_are_shares_in_per_cent_and_styles_differ():
+    profile = {"thresholds": [0.0, 0.5, 1.0], "shares": {"pid": [1.0, 0.5, 0.25]}}
+    figure = page_figures.profile_figure(profile, ["pid", "lq"])
+    (curve,) = figure.data
+    assert (curve.name, list(curve.x), list(curve.y)) == ("pid", [0.0, 0.5, 1.0], [100.0, 50.0, 25.0])
+    names = ["oracle", *(f"c{k}" for k in range(2 * len(page_figures.COLOURS)))]
+    styles = page_figures.styles(names)
+    assert styles["oracle"] == (page_figures.INK, "solid")
+    assert len(set(styles.values())) == len(names)
+    assert styles["c0"] == (page_figures.COLOURS[0], page_figures.DASHES[0])
+
+
+def episode(**changes):
+    n = 1000
+    states = {
+        "x": np.linspace(0.0, 100.0, n + 1), "y": np.linspace(0.0, 50.0, n + 1),
+        "psi": np.linspace(3.0, 3.3, n + 1), "delta": np.full(n + 1, np.radians(5.0)),
+        "set_point": np.full(n + 1, -3.0),
+    }  # fmt: skip
+    given = {
+        "n_steps": n, "dt": 0.5, "states": states, "info": {"cross_track": np.full(n + 1, 7.0)},
+        "waypoints": np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]), "corridor": 20.0,
+    }  # fmt: skip
+    return SimpleNamespace(**given | changes)
+
+
+def test_tracks_are_drawn_with_the_corridor_beside_them():
+    figure = page_figures.tracks_figure({"pid": episode()}, ["pid"])
+    track = only(figure, "pid")
+    assert len(track.x) == page_figures.SAMPLES + 1
+    assert (track.x[0], track.x[-1], track.y[0], track.y[-1]) == (0.0, 50.0, 0.0, 100.0)
+    assert list(only(figure, "path").x) == [0.0, 0.0, 60.0]
+    along, across, disc = traces(figure, "corridor")
+    np.testing.assert_allclose(
+        np.stack([along.x, along.y]), [[20, 20, -20, -20], [0, 100, 100, 0]], atol=1e-5
+    )
+    np.testing.assert_allclose(
+        np.stack([across.x, across.y]), [[0, 60, 60, 0], [80, 80, 120, 120]], atol=1e-5
+    )
+    np.testing.assert_allclose(np.hypot(np.array(disc.x), np.array(disc.y) - 100.0), 20.0, rtol=1e-5)
+    free = page_figures.tracks_figure({"pid": episode(waypoints=None)}, ["pid"])
+    assert [trace.name for trace in free.data] == ["pid"]
+
+
+def test_histories_are_cross_track_errors_or_headings_and_rudders():
+    figure = page_figures.histories_figure({"pid": episode()}, ["pid"])
+    error, rudder = traces(figure, "pid")
+    assert (error.x[-1], set(error.y)) == (500.0, {7.0})
+    np.testing.assert_allclose(rudder.y, 5.0, rtol=1e-6)
+    assert sorted(shape.y0 for shape in figure.layout.shapes) == [-20.0, 20.0]
+    figure = page_figures.histories_figure({"pid": episode(waypoints=None)}, ["pid"])
+    heading, _ = traces(figure, "pid")
+    assert (heading.y[0], heading.y[-1]) == pytest.approx(tuple(np.degrees([3.0, 3.3])))
+    course = only(figure, "ordered course")
+    np.testing.assert_allclose(course.y, np.degrees(2.0 * np.pi - 3.0), rtol=1e-6)  # beside the heading
+    assert course.x[-1] == 500.0
+    assert not figure.layout.shapes

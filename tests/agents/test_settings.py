@@ -1,0 +1,191 @@
+"""Settings and plans of learning: what is allowed, where a value comes from, what is refused."""
+
+import pytest
+
+from agents.suites.suite import load_suite
+from agents.training.plan import (
+    Given,
+    Plan,
+    check_same,
+    first_difference,
+    make_plan,
+    read_environment,
+    training_options,
+)
+from agents.training.settings import (
+    ALGORITHMS,
+    SACSettings,
+    changed,
+    load_settings,
+    make_settings,
+    parsed_settings,
+    present_names,
+    read_settings_file,
+)
+from shipgym import InputError
+
+FREE = {"base": "none", "authority": 1.0}
+#: The least and the largest value that is allowed, and the nearest that is not.
+BOUNDS = [
+    ("ppo", "total_steps", 1, 0), ("sac", "ships", 1, 0), ("ppo", "learning_rate", 1.0, 1.1),
+    ("ppo", "learning_rate", 1e-9, 0.0), ("ppo", "gamma", 0.0, -0.01), ("ppo", "gamma", 1.0, 1.01),
+    ("ppo", "frame_stack", 1, 0), ("ppo", "action_repeat", 1, 0), ("ppo", "reward_scale", 1e-9, 0.0),
+    ("ppo", "n_epochs", 1, 0), ("ppo", "gae_lambda", 0.0, -0.01), ("ppo", "gae_lambda", 1.0, 1.01),
+    ("ppo", "clip_range", 1e-9, 0.0), ("ppo", "ent_coef", 0.0, -0.1), ("ppo", "vf_coef", 1e-9, 0.0),
+    ("ppo", "log_std_init", -10.0, -10.1), ("ppo", "log_std_init", 3.0, 3.1),
+    ("ppo", "log_std_end", -10.0, -10.1), ("ppo", "log_std_end", 3.0, 3.1), ("ppo", "batch_size", 2, 1),
+    ("ppo", "net_arch", [1], [0]), ("ppo", "evaluate_every", 1, 0), ("ppo", "max_grad_norm", 1e-9, 0.0),
+    ("sac", "learning_starts", 0, -1), ("sac", "train_freq", 1, 0), ("sac", "gradient_steps", 1, 0),
+    ("sac", "tau", 1.0, 1.1), ("sac", "tau", 1e-9, 0.0), ("sac", "critic_arch", [1], [0]),
+    ("sac", "target_entropy", 1.0, 1.1), ("sac", "ent_coef", 0.0, -0.1), ("td3", "policy_delay", 1, 0),
+    ("td3", "action_noise", 1e-9, 0.0), ("td3", "target_policy_noise", 0.0, -0.1),
+    ("td3", "target_noise_clip", 0.0, -0.1), ("tqc", "n_critics", 1, 0), ("tqc", "n_quantiles", 3, 2),
+    ("tqc", "top_quantiles_to_drop", 0, -1), ("tqc", "top_quantiles_to_drop", 24, 25),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("algorithm", "name", "allowed", "beyond"), BOUNDS)
+def test_settings_reach_to_their_bounds_and_no_further(algorithm, name, allowed, beyond):
+    usual = load_settings(algorithm)
+    kept = changed(usual, {name: allowed})
+    assert getattr(kept, name) == (tuple(allowed) if isinstance(allowed, list) else allowed)
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected|top_quantiles_to_drop: 2 found"):
+        changed(usual, {name: beyond})
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"net_arch": "64"}, r"net_arch: '64' found, expected widths of layers, such as \[64, 64\]"),
+        ({"net_arch": 64}, "expected widths of layers"),
+        ({"ent_coef": "auto_x"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
+        ({"ent_coef": "auto_-1"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
+        ({"ent_coef": "otto"}, "ent_coef: 'otto'"),
+        ({"target_entropy": "auto_1"}, "target_entropy: 'auto_1'"),
+        ({"schedule": "liner"}, "Did you mean 'linear'"),
+        ({"activation": "elu"}, "activation: 'elu' found, expected one of"),
+        ({"ships": 10, "buffer_size": 9}, "buffer_size: 9 found, expected one for each of 10 ships"),
+        ({"authority": 2.1, "base": "lq"}, "authority: 2.1 found"),
+        ({"authority": 0.0, "base": "lq"}, "authority: 0 found"),
+        ({"total_steps": 1.5}, "total_steps: 1.5"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        changed(load_settings("sac", given=FREE), given)
+
+
+def test_words_stand_for_numbers_where_they_may():
+    assert (
+        changed(load_settings("sac"), {"ent_coef": "auto_0.1", "target_entropy": "auto"}).ent_coef
+        == "auto_0.1"
+    )
+    assert changed(load_settings("sac"), {"ent_coef": "auto"}).ent_coef == "auto"
+    assert changed(load_settings("ppo"), {"reward_scale": "running"}).reward_scale == "running"
+    kept = changed(load_settings("ppo"), {"log_std_end": "learned", "gamma": 1})
+    assert (kept.log_std_end, kept.gamma, type(kept.gamma)) == ("learned", 1.0, float)
+
+
+def test_a_value_comes_from_the_nearest_table():
+    """Residual tables for the rudder alone, the task's before the suite's, what is given before all."""
+    scratch, residual = load_settings("ppo", given=FREE), load_settings("ppo")
+    assert (scratch.total_steps, scratch.n_steps, scratch.reward_scale) == (1_000_000, 64, 100.0)
+    assert (residual.base, residual.n_steps, residual.clip_range) == ("lq", 256, 0.2)
+    assert load_settings("ppo", "path-following").base == "ilos"
+    assert load_settings("ppo", action="rudder-shaft") == scratch
+    assert load_settings("ppo", task=load_suite().tasks[0].name).base == "tuned"
+    assert load_settings("ppo", task="no task of the suite") == residual
+    assert load_settings("ppo", given={"gamma": 0.5, "n_steps": 128}).gamma == 0.5
+    for algorithm, kind in ALGORITHMS.items():
+        table = load_settings(algorithm).to_dict()
+        assert type(make_settings(algorithm, table)) is kind
+        assert make_settings(algorithm, table).to_dict() == table
+        del table["gamma"]
+        with pytest.raises(InputError, match=f"settings of {algorithm}: 'gamma' is missing"):
+            make_settings(algorithm, table)
+
+
+def test_settings_of_the_command_line_and_of_files(tmp_path):
+    found = parsed_settings(["gamma=0.9", "net_arch = [8, 8]", "base=lq", 'schedule="linear"', "note=a=b"])
+    assert found == {"gamma": 0.9, "net_arch": [8, 8], "base": "lq", "schedule": "linear", "note": "a=b"}
+    for wrong in ("gamma", "=0.9"):
+        with pytest.raises(InputError, match=r"expected name=value, such as --set gamma=0\.98"):
+            parsed_settings([wrong])
+    assert present_names({"history": 2, "hold": 3, "gamma": 1}) == {
+        "frame_stack": 2,
+        "action_repeat": 3,
+        "gamma": 1,
+    }
+    path = tmp_path / "mine.toml"
+    path.write_text("hold = 3\ngamma = 1\n")
+    assert read_settings_file(path, "ppo") == {"action_repeat": 3, "gamma": 1.0}
+    path.write_text("gamma = \n")
+    with pytest.raises(InputError, match=r"mine\.toml: not TOML"):
+        read_settings_file(path, "ppo")
+    path.write_bytes(b"\xff\xfe")
+    with pytest.raises(InputError, match="cannot be read as text"):
+        read_settings_file(path, "ppo")
+
+
+def test_the_first_difference_of_two_configurations_is_told():
+    one = {"a": 1, "b": {"c": 2, "d": [3]}}
+    assert first_difference(one, one) is None
+    assert first_difference(one | {"b": {"c": 2, "d": [4]}}, one) == "b.d is [3] there, [4] here"
+    assert first_difference(one | {"e": 5}, one) == "e is None there, 5 here"
+    assert first_difference({"b": one["b"]}, one) == "a is 1 there, None here"
+    with pytest.raises(InputError, match=r"run: a run of another configuration: b.c is 2 there, 0 here"):
+        check_same(one | {"b": {"c": 0, "d": [3]}}, one, "run")
+    check_same(one, one, "run")
+
+
+def test_environments_are_known_by_short_name_and_by_id():
+    assert read_environment("course-keeping") == ("course-keeping", {})
+    assert read_environment("shipgym/PathFollowing-v0") == ("path-following", {})
+    assert read_environment("shipgym/CourseKeepingDiscrete-v0") == (
+        "course-keeping",
+        {"action": "rudder-discrete"},
+    )
+
+
+def test_what_is_not_given_is_as_it_was():
+    """A run that is resumed: seed, threads, model and options of the stored one where none are given."""
+    first = make_plan(
+        Given(
+            "ppo", model="kvlcc2", options={"episode_steps": 50}, settings={"gamma": 0.8}, seed=3, threads=2
+        )
+    )
+    assert (first.seed, first.randomise, first.threads, first.training_seed) == (3, False, 2, 3000)
+    assert Plan.from_configuration(first.configuration(), 2) == first
+    again = make_plan(Given("ppo"), first)
+    assert again == first
+    other = make_plan(Given("ppo", model="mariner", seed=0, randomise=True, settings={"n_epochs": 1}), first)
+    assert (other.task.model, other.seed, other.randomise, other.threads) == ("mariner", 0, True, 2)
+    assert other.task.options == first.task.options
+    assert (other.settings.gamma, other.settings.n_epochs) == (0.8, 1)
+    assert type(make_plan(Given("sac", settings=FREE), first).settings) is SACSettings
+    assert training_options(first) == first.task.options
+    assert training_options(other)["speed_range"] == (0.8, 1.1)
+    assert make_plan(Given("ppo")).configuration()["task"] == ""
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"seed": 800}, "seed: 800 found, expected 0 to 799"),
+        ({"seed": -1}, "seed: -1 found"),
+        ({"threads": 0}, "threads: 0 found"),
+        ({"settings": {"ships": 1001, "batch_size": 1001}}, "ships: 1001 found, expected at most 1000"),
+        ({"options": {"action": "rudder-shaft"}, "model": "kvlcc2", "settings": {"base": "lq"}},
+         "base: 'lq' found with action 'rudder-shaft', expected 'none', or action 'rudder'"),
+    ],
+)  # fmt: skip
+def test_plans_that_cannot_be_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        make_plan(Given("ppo", **arguments))
+    assert make_plan(Given("ppo", seed=799, threads=1)).training_seed == 799_000
+
+
+def test_a_plan_has_the_settings_of_its_algorithm():
+    plan = make_plan(Given("ppo"))
+    with pytest.raises(InputError, match="settings: PPOSettings found, expected SACSettings for sac"):
+        Plan("sac", plan.task, plan.settings)

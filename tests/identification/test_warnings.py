@@ -1,0 +1,106 @@
+"""Metrics of predictions and what a user is warned of, from fits that are made up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.validation.prediction import trial_metrics
+from identification.validation.warnings import exactly_collinear, model_warnings, undetermined, why_unstable
+from shipgym import ShipModel, Trial
+
+
+def trial(offset: float = 0.0, **settings: Any) -> Trial:
+    t = np.arange(50.0)
+    names = ("u", "v", "r", "psi")
+    return Trial(
+        t, {name: np.sin(0.1 * t) + k + offset * (k + 1) for k, name in enumerate(names)}, **settings
+    )
+
+
+def test_errors_are_root_mean_squares_by_channel(mariner: ShipModel) -> None:
+    found = trial_metrics(mariner, trial(use="validate"), trial(0.5))
+    assert (found["use"], found["diverged"]) == ("validate", False)
+    assert found["rmse"] == pytest.approx({"u": 0.5, "v": 1.0, "r": 1.5, "psi": 2.0})
+    assert found["overshoot_1_deg"] is None
+    lost = trial_metrics(mariner, trial(), None)
+    assert lost["diverged"]
+    assert set(lost["rmse"].values()) == {None}
+    bare = Trial(np.arange(50.0), {"psi": np.ones(50)})
+    assert trial_metrics(mariner, bare, trial())["rmse"]["u"] is None
+
+
+def fit(model: ShipModel, heading: float = 0.01, use: str = "validate", **changes: Any) -> Any:
+    """What the warnings read of a fit."""
+    equation = SimpleNamespace(dropped=(), condition_number=10.0, collinear_pairs=())
+    given = {
+        "model": model, "stable": True, "predictions": {"runs/a.csv": 1}, "diagnostics": {"r": equation},
+        "metrics": {"trials": {"runs/a.csv": {"use": use, "rmse": {"psi": heading}}}},
+    }  # fmt: skip
+    return SimpleNamespace(**given | changes)
+
+
+def given(model: ShipModel, **provenance: Any) -> ShipModel:
+    """The ship with nothing estimated."""
+    known = replace(model.particulars, estimated=frozenset())
+    return replace(model, particulars=known, provenance={"trials": [], **provenance})
+
+
+def test_nothing_is_warned_of_where_nothing_is_odd(mariner: ShipModel) -> None:
+    assert model_warnings(fit(given(mariner))) == []
+    assert why_unstable(fit(given(mariner))) is None
+
+
+def test_each_cause_has_its_warning(mariner: ShipModel) -> None:
+    ship = given(mariner)
+    wrong = replace(ship, coefficients=ship.coefficients | {"N_d": -ship.coefficients["N_d"]})
+    assert "turns to port: likely a wrong rudder_positive" in model_warnings(fit(wrong))[0]
+    (held,) = model_warnings(fit(given(mariner, guard={"rejected": ["turning circle", "other"]})))
+    assert held.startswith("the fit by itself ran away (turning circle)")
+    (derived,) = model_warnings(fit(given(mariner, trials=[{"derived": ["v", "u"]}, {"derived": ["u"]}])))
+    assert derived.startswith("not measured but derived from other channels: u, v;")
+    (unseen,) = model_warnings(fit(ship, use="fit"))
+    assert unseen.startswith('no trial is marked use = "validate"')
+    some = replace(ship.particulars, estimated=frozenset({"mass", "Y_vdot"}))
+    assert model_warnings(fit(replace(ship, particulars=some))) == [
+        "estimated, not given in the ship file: Y_vdot, mass"
+    ]
+
+
+def test_a_lost_heading_is_told_with_its_trial_and_cause(mariner: ShipModel) -> None:
+    (lost,) = model_warnings(fit(given(mariner), heading=np.radians(33.0)))
+    assert "on a.csv (33 deg): likely the model is taken beyond the manoeuvres" in lost
+    limit = float(lost.partition("by more than ")[2].partition(" deg")[0])
+    assert model_warnings(fit(given(mariner), heading=np.radians(1.02 * limit)))
+    assert not model_warnings(fit(given(mariner), heading=np.radians(0.98 * limit)))
+    assert not model_warnings(fit(given(mariner), heading=None))  # type: ignore[arg-type]
+    unstable = given(mariner)
+    unstable = replace(
+        unstable, coefficients=unstable.coefficients | {"N_v": 3.0 * mariner.coefficients["N_v"]}
+    )
+    assert "unstable on a straight course" in model_warnings(fit(unstable, heading=1.0))[-1]
+
+
+def test_terms_that_cannot_be_separated_are_named(mariner: ShipModel) -> None:
+    dropped = SimpleNamespace(dropped=(("a", "b"), ("c",)), condition_number=1e9, collinear_pairs=())
+    pair = SimpleNamespace(dropped=(), condition_number=1.1e8, collinear_pairs=(("a", "b", 1.0),))
+    found = fit(mariner, diagnostics={"r": dropped, "v": pair, "x": dropped})
+    assert [line.partition(":")[0] for line in undetermined(found)] == ["yaw", "x"]
+    assert undetermined(found)[0].endswith("was left out: a, b; c")
+    (line,) = exactly_collinear(found)
+    assert line.startswith("sway: exactly collinear in the data: a and b; only combinations")
+    almost = SimpleNamespace(dropped=(), condition_number=0.9e8, collinear_pairs=(("a", "b", 1.0),))
+    assert exactly_collinear(fit(mariner, diagnostics={"v": almost})) == []
+
+
+def test_why_a_model_must_not_be_used(mariner: ShipModel) -> None:
+    away = why_unstable(fit(mariner, predictions={"runs/a.csv": 1, "runs/b.csv": None, "c.csv": None}))
+    assert away == "its simulation runs away on 2 of the recorded trials, b.csv first"
+    marked = fit(given(mariner, guard={"rejected": ["rudder +35 deg"]}), stable=False)
+    assert why_unstable(marked) == "its simulation runs away (rudder +35 deg)"
+    bare = fit(replace(mariner, provenance=None), stable=False)
+    assert why_unstable(bare) == "its simulation runs away (in a standard manoeuvre)"

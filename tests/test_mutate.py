@@ -1,0 +1,72 @@
+"""Faults are put where a module has them, and every module has tests that stand beside it."""
+
+import ast
+from pathlib import Path
+
+import mutate
+import pytest
+
+SOURCE = '''"""A docstring -1."""
+from typing import NamedTuple
+
+LIMIT: "float | None" = 2.5
+
+
+def half(x: "int | None", go: bool = True) -> float | None:
+    """Half of x + 1."""
+    if x is None or not go:
+        raise ValueError("none")
+    y = x / 2 - 1
+    return y if y < LIMIT else -LIMIT
+'''
+EXPECTED = {
+    "sign": {"y = x * 2 - 1", "y = x / 2 + 1", "return y if y < LIMIT else LIMIT"},
+    "constant": {'LIMIT: "float | None" = 2.75', "y = x / 3 - 1", "y = x / 2 - 2"},
+    "condition": {
+        "if not x is None or not go:", "if x is None and not go:", "if x is None or  go:",
+        "return y if not y < LIMIT else -LIMIT",
+    },
+    "comparison": {"if x is not None or not go:", "return y if y >= LIMIT else -LIMIT"},
+    "dropped": {"pass"},
+    "return": {"return None"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", EXPECTED)
+def test_faults_of_a_kind_are_where_the_module_has_them(kind, tmp_path, monkeypatch):
+    monkeypatch.setattr(mutate, "ROOT", tmp_path)
+    (tmp_path / f"{kind}.py").write_text(SOURCE)
+    found = set()
+    for fault in mutate.faults(f"{kind}.py", kind):
+        changed = fault.applied(SOURCE)
+        ast.parse(changed)
+        pairs = zip(SOURCE.splitlines(), changed.splitlines(), strict=True)
+        (after,) = (b.strip() for a, b in pairs if a != b)
+        found.add(after)
+        assert SOURCE.splitlines()[fault.line - 1] not in changed.splitlines()
+    assert found == EXPECTED[kind]
+
+
+def test_every_module_has_tests_that_stand_beside_it():
+    modules = mutate.chosen(list(mutate.PACKAGES))
+    assert len(modules) > 200
+    missing = {
+        test for module in modules for test in mutate.beside(module) if not (mutate.ROOT / test).is_file()
+    }
+    assert not missing
+    assert mutate.beside("shipgym/sea/wind.py") == ["tests/shipgym/test_wind.py"]
+
+
+def test_what_is_drawn_follows_from_the_seed():
+    modules = mutate.chosen(["shipgym/sea", "identification/estimators/l_curve.py"])
+    first, again, other = (list(mutate.drawn(modules, 5, seed)) for seed in (1, 1, 2))
+    assert first == again != other
+    assert len(set(first)) == 5
+
+
+def test_a_copy_of_the_tree_is_what_is_changed(tmp_path):
+    copy = mutate.copied(tmp_path)
+    name = "shipgym/sea/wind.py"
+    assert (copy / name).read_bytes() == (mutate.ROOT / name).read_bytes()
+    assert Path(copy / "pyproject.toml").is_file()
+    assert not (copy / ".git").exists()
