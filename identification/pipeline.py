@@ -22,8 +22,9 @@ from identification.simulation_error.prior import with_prior
 from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
+from identification.uncertainty.model_error import model_error, without_trial
 from identification.validation.diagnostics import diagnose
-from identification.validation.guarded_fit import GuardedFit, guarded_fit
+from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.particulars import Particulars
@@ -80,6 +81,10 @@ def identify(
     fit, refined = _fitted(chosen, asked, problem)
     covariance = _covariance(fit, problem.samples, problem.blank, refined, asked.uncertainty)
     provenance = _provenance(asked, chosen, fit, refined, problem)
+    if asked.model_error:
+        error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
+        covariance = error.factor**2 * covariance
+        provenance["model_error"] = error.report
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
@@ -142,6 +147,32 @@ def _covariance(
     return coefficient_covariance(
         covariance, blank.table.acceleration_matrix(ship, blank.service_shaft_speed)
     )
+
+
+def _left_out(
+    fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
+) -> list[ShipModel]:
+    """The models, with covariance, that the fit would have given without each of the trials."""
+    count, blank = len(problem.used), problem.blank
+    if refined is None or refined.covariance is None:
+        without = [without_trial(fit.estimators, problem.samples, i) for i in range(count)]
+        return [
+            replace(
+                with_coefficients(fit.model, estimators),
+                covariance=_covariance(replace(fit, estimators=estimators), rows, blank, None, "analytic"),
+            )
+            for estimators, rows in without
+        ]
+    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
+    values, most = np.array(list(fit.model.coefficients.values())), count / max(count - 1, 1)
+    return [
+        replace(
+            fit.model,
+            coefficients=dict(zip(fit.model.coefficients, (values - change).tolist(), strict=True)),
+            covariance=most * covariance,
+        )
+        for change in (most * np.linalg.solve(matrix, part.sum(axis=0)) for part in refined.influences)
+    ]
 
 
 def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:

@@ -59,7 +59,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
     from agents.identifying import identify_ship
     from agents.output import check_folder, whole_folder
     from identification.result import FILES
-    from identification.validation.warnings import why_unstable
+    from identification.validation.warnings import held_out_error, why_unstable
 
     check_folder(out, FILES)
     with err.status("identifying"):
@@ -73,6 +73,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
         if instability is None:
             console.print(result.summary(), markup=False, soft_wrap=True)
             console.print(prediction_table(result))
+            console.print(held_out_error(result), soft_wrap=True)
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     _check_stable(result)
 

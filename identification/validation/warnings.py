@@ -66,6 +66,36 @@ def model_warnings(fit: Fit) -> list[str]:
     return found
 
 
+def held_out_error(fit: Fit) -> str:
+    """The worst errors on the trials held out, of heading and of an index, in one sentence."""
+    unseen = {n: found for n, found in fit.metrics["trials"].items() if found["use"] == "validate"}
+    if not unseen:
+        return "No trial was held out."
+    lost = [PurePath(name).name for name, found in unseen.items() if found["diverged"]]
+    if lost:
+        return f"On {lost[0]}, held out, the model runs away."
+    headings = {
+        name: found["rmse"]["psi"] for name, found in unseen.items() if found["rmse"]["psi"] is not None
+    }
+    told = []
+    if headings:
+        worst = max(headings, key=lambda name: headings[name])
+        told.append(f"heading {np.degrees(headings[worst]):.2g} deg rms ({PurePath(worst).name})")
+    indices = [
+        (abs(pair["predicted"] / pair["measured"] - 1.0), name, key)
+        for name, found in unseen.items()
+        for key, pair in found.items()
+        if isinstance(pair, dict) and pair.get("measured") and pair.get("predicted") is not None
+    ]
+    if indices:
+        error, name, key = max(indices)
+        words = key.removesuffix("_deg").removesuffix("_lengths").replace("_", " ")
+        told.append(f"{words} {100.0 * error:.2g} % ({PurePath(name).name})")
+    return (
+        f"Worst errors on trials held out: {', '.join(told)}." if told else "No trial held out has a heading."
+    )
+
+
 def undetermined(fit: Fit) -> list[str]:
     """For each equation the terms that the data cannot separate, of directions that the fit left out."""
     return [
@@ -109,10 +139,10 @@ def _why_lost(model: ShipModel) -> str:
     try:
         stable = is_course_stable(model)
     except InputError:
-        stable = False
+        return "the model has no straight course"
     if stable:
         return "likely the model is taken beyond the manoeuvres that it was fitted to"
-    return "a ship that is unstable on a straight course magnifies small errors"
+    return "the model, which need not be like the ship in this, is unstable on a straight course and magnifies errors"
 
 
 def _steers_to_port(model: ShipModel) -> bool:
