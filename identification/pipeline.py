@@ -22,7 +22,7 @@ from identification.simulation_error.prior import with_prior
 from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
-from identification.uncertainty.model_error import model_error, without_trial
+from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
@@ -154,6 +154,8 @@ def _left_out(
 ) -> list[ShipModel]:
     """The models, with covariance, that the fit would have given without each of the trials."""
     count, blank = len(problem.used), problem.blank
+    if count < FEWEST_TRIALS:
+        return []
     if refined is None or refined.covariance is None:
         without = [without_trial(fit.estimators, problem.samples, i) for i in range(count)]
         return [
@@ -212,6 +214,7 @@ def _evaluated(
         stable=stable,
         metrics={
             "stable": stable,
+            "instability": None if stable else _why_unstable(model.provenance or {}),
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
@@ -223,6 +226,12 @@ def _evaluated(
         settings=call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )
+
+
+def _why_unstable(provenance: Mapping[str, Any]) -> str:
+    """The trials that the model runs away on, or the simulations of the guard."""
+    lost = [f"trial {name!r}, open loop" for name in provenance.get("runs_away_on", [])]
+    return "runs away: " + "; ".join(lost or provenance["guard"].get("rejected", []))
 
 
 def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:

@@ -1,11 +1,14 @@
 """How often the 95 % intervals of the standard indices hold the truth, on ships of other equations.
 
-python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]     prints the table of docs/certainty.md
+    python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]
 
-Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is put through sea trials with the
-noise of sensors: zigzags 10/10 and 20/20 to both sides, and for half of the cases a 35 degree turn to starboard too.
-She is identified by structures that are not hers. The indices of models drawn are compared with her own: advance and
-tactical diameter to both sides, overshoots and initial turning of the zigzags.
+prints the table of docs/certainty.md.
+
+Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is put through sea
+trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides, and for half of the cases a 35
+degree turn to starboard too. She is identified by structures that are not hers. The indices of models drawn
+are compared with her own: advance and tactical diameter to both sides, overshoots and initial turning of
+the zigzags.
 """
 
 from __future__ import annotations
@@ -38,7 +41,8 @@ STRUCTURES = ("abkowitz", "cubic")
 OWN = {"mariner": "abkowitz"}  # the structure that a ship is made of
 TRIALS = ("zigzags", "zigzags and turn")
 INDICES = (
-    "advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg", "overshoot_2_deg", "initial_turning_lengths",
+    "advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg", "overshoot_2_deg",
+    "initial_turning_lengths",
 )  # fmt: skip
 
 
@@ -130,8 +134,8 @@ def table(rows: Sequence[dict[str, object]]) -> str:
         groups[f"**all, {kind}**"] = [row for row in rows if row["trials"] == kind]
     groups["**all**"] = list(rows)
     lines = [
-        "| ship, trials | models | factor | noise only, % | with model error, % | of these zigzags, turns, % | "
-        "half-width, % | draws run away, % |",
+        "| ship, trials | models | factor | noise only, % | with model error, % | "
+        "of these zigzags, turns, % | half-width, % | draws run away, % |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, group in groups.items():
@@ -142,8 +146,9 @@ def table(rows: Sequence[dict[str, object]]) -> str:
         width, lost = (100.0 * np.mean([row[f"all {one}"] for row in known]) for one in ("width", "ran away"))
         unstable = f" ({len(group) - len(known)} unstable)" if len(known) < len(group) else ""
         lines.append(
-            f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | {share(known, 'noise')} | "
-            f"{share(known, 'all')} | {share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
+            f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
+            f"{share(known, 'noise')} | {share(known, 'all')} | "
+            f"{share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
             f"{width:.0f} | {lost:.0f} |"
         )
     return "\n".join(lines)

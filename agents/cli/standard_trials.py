@@ -62,8 +62,8 @@ def standard_trials(
     `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the
     draws; `progress`: told the number of draws done; `water_depth`: m, for ships that know shallow water.
     Raises InputError for water that is too shallow, or shallow water in a ship that knows none;
-    UnstableModelError if the ship itself runs away in every manoeuvre; where she does in some, or an index cannot
-    be read, these are in `refused` and the others stay.
+    UnstableModelError if the ship itself runs away in every manoeuvre; where she does in some, or an index
+    cannot be read, these are in `refused` and the others stay.
     """
     families = families_of(model, water_depth)
     manoeuvres = {name: one for family in families.values() for name, one in family.items()}

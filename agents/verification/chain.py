@@ -60,9 +60,10 @@ def build_autopilot(
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
     The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the model is
-    unstable or refused only the first two, and no file of an autopilot that is refused. It is written whole or not at all. `ship_file`: the ship file (TOML) with its
-    trials; `out`: folder of the results; an earlier report there is replaced, anything else is refused;
-    `draws`: number of models drawn from the coefficient covariance, at least 2; `seed`: of the draws and of
+    unstable or refused only the first two, and no file of an autopilot that is refused. It is written whole
+    or not at all. `ship_file`: the ship file (TOML) with its trials; `out`: folder of the results; an
+    earlier report there is replaced, anything else is refused; `draws`: number of models drawn from the
+    coefficient covariance, at least 2; `seed`: of the draws and of
     the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
     `agents`: files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`);
     `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the

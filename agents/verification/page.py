@@ -12,8 +12,8 @@ import shipgym
 from agents.controllers.controller import Controller
 from agents.verification.figures import (
     costs_figure,
-    criterion_name,
     criteria_figure,
+    criterion_name,
     manoeuvres_figure,
     steps_figure,
 )

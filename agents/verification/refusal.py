@@ -27,8 +27,8 @@ FALLBACK = "a 20/20 zigzag to both sides"
 def why_refused(fit: Fit) -> str | None:
     """Why nothing may be designed on a stable model, with the trial that would help; None where it may.
 
-    Its steering at low frequency has another sign than in the trials, or a damping derivative has, significantly,
-    a sign that no ship has.
+    Its steering at low frequency has another sign than in the trials, or a damping derivative has,
+    significantly, a sign that no ship has.
     """
     model = fit.model
     try:
@@ -83,7 +83,7 @@ def helpful_trial(fit: Fit) -> str:
 
 
 def lost_control(terminated: NDArray[np.bool_]) -> str | None:
-    """Why an autopilot is refused that loses control of too many of the models drawn; None where it may pass."""
+    """Why an autopilot that loses control of too many models drawn is refused; None where it is not."""
     share = float(np.mean(terminated))
     if share <= MOST_LOST:
         return None

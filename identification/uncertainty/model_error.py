@@ -1,8 +1,9 @@
 """What a structure misses: by how much trials left out are worse predicted than the covariance says.
 
-The covariance of a regression says what noise does to the coefficients, not what the equations cannot do. So each
-trial is left out in turn and predicted, motion and indices of the manoeuvre, by the model of the others and by
-models drawn from its covariance; standard errors are scaled until these errors are of size one.
+The covariance of a regression says what noise does to the coefficients, not what the equations cannot do.
+So each trial is left out in turn and predicted, motion and indices of the manoeuvre, by the model of the
+others and by models drawn from its covariance; standard errors are scaled until these errors are of size
+one.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -56,7 +58,8 @@ def without_trial(
 ) -> tuple[Estimators, Samples]:
     """Estimators as if fitted without a trial, and the rows of the others.
 
-    Exact for linear estimators that keep their directions and penalty: the normal equations less the rows left out.
+    Exact for linear estimators that keep their directions and penalty: the normal equations less the rows
+    left out.
     """
     errors = residuals(estimators, samples)
     out, kept = samples.trial == trial, samples.trial != trial
@@ -76,13 +79,15 @@ def without_trial(
 def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ModelError:
     """The factor on the standard errors at which trials left out have errors of size one, never below 1.
 
-    `models`: each identified without the trial of the same place, with its covariance. The root mean square of
-    the factors that motion and indices ask for, times Student's t with as many degrees of freedom as trials over
-    the normal's: of few trials the scatter itself is uncertain. `DEFAULT` for fewer than three trials, or where
-    fewer can be predicted.
+    `models`: each identified without the trial of the same place, with its covariance. The root mean square
+    of the factors that motion and indices ask for, times Student's t with as many degrees of freedom as
+    trials over the normal's: of few trials the scatter itself is uncertain. `DEFAULT` for fewer than three
+    trials, whose models are not looked at, or where fewer can be predicted.
     """
-    if len(models) < FEWEST_TRIALS:
-        return _assumed(f"{len(models)} trials, too few to leave one out")
+    if len(trials) < FEWEST_TRIALS:
+        return _assumed(
+            f"{len(trials)} {'trial' if len(trials) == 1 else 'trials'}, too few to leave one out"
+        )
     motion: list[list[Error]] = []
     indices: list[Error] = []
     for model, trial in zip(models, trials, strict=True):
@@ -93,7 +98,7 @@ def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ModelEr
             indices += _index_errors(own, drawn, trial, clean)
     if len(motion) < FEWEST_TRIALS:
         return _assumed(f"only {len(motion)} of {len(models)} trials can be predicted when they are left out")
-    sizes = [scale_of(errors) for errors in (sum(motion, []), indices) if errors]
+    sizes = [scale_of(errors) for errors in (list(chain.from_iterable(motion)), indices) if errors]
     few = float(student.ppf(0.975, len(motion))) / NORMAL
     factor = max(1.0, few * float(np.sqrt(np.mean(np.square(sizes)))))
     report = {
@@ -145,7 +150,7 @@ def _shifted(trial: Trial, name: str, change: float) -> Trial:
 
 
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:
-    """Of each index of a zigzag or a turning circle; what is read at samples is uncertain by a part of a step."""
+    """Of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
     read = _reader(own, clean)
     if read is None:
         return []
@@ -175,7 +180,7 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
 
 
 def _reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:
-    """From a run of the trial's manoeuvre to its indices, None where there are none; None for other manoeuvres."""
+    """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres."""
     length = model.particulars["length"]
     heading = switch_heading_deg(trial) if trial.kind == "zigzag" else None
 
@@ -193,7 +198,7 @@ def _reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | N
 
 
 def smoothed(trial: Trial) -> Trial:
-    """The trial with heading and velocities without noise, whose extremes are otherwise those of the noise."""
+    """The trial without the noise of heading and velocities, which extremes would be read from."""
     names = [name for name in ("psi", "u", "v", "r") if name in trial]
     return Trial(
         trial.t,

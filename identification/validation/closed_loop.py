@@ -1,7 +1,7 @@
 """A measured zigzag sailed again by a model, its rudder reversed at the headings at which it was reversed.
 
-Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10 zigzag by two degrees, because
-the rudder is reversed when the measured ship got there, not the simulated one.
+Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10 zigzag by two degrees,
+because the rudder is reversed when the measured ship got there, not the simulated one.
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by th
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
 
-    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts. None where the model runs
-    away or a heading is never reached, without a reversal, and for a model whose state is not recorded.
+    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts. None where the
+    model runs away or a heading is never reached, without a reversal, and for a model whose state is not
+    recorded.
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
@@ -62,7 +63,7 @@ def _leg(
     time: tuple[float, float],
     target: float | None,
 ) -> tuple[Floats, Floats]:
-    """Times and states from begin and measured duration of a leg, until the heading is reached where one is given.
+    """Times and states of a leg from its begin and measured duration, up to a heading where one is given.
 
     Neither holds a row where it is never reached.
     """

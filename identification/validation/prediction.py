@@ -32,8 +32,8 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
 
     `model`: gives the ship's length; `trial`: as measured; `prediction`: from `predict`. Returns `use`,
     `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, of overshoots also
-    `closed_loop` (the rudder reversed at the measured headings, `closed_loop`), None where the manoeuvre has no
-    such index or never got there.
+    `closed_loop` (the rudder reversed at the measured headings, `closed_loop`), None where the manoeuvre
+    has no such index or never got there.
     """
     metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None}
     metrics["rmse"] = {

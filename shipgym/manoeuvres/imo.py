@@ -217,7 +217,7 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
 
 
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
-    """A trial of a standard manoeuvre, with the angle at the rudder's limit where that is less than 35 deg."""
+    """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
     full = min(TURN_DEG, model.steering.rudder_limit_deg)
     return (
         f"{full:g} deg turn"
@@ -245,7 +245,7 @@ def _decided(criterion: Criterion, manoeuvre: str, outside: bool) -> Criterion:
     criterion, drawn = replace(criterion, manoeuvre=manoeuvre), criterion.drawn
     why = "it is outside the envelope of the trials" if outside else None
     if why is None and drawn is not None and len(drawn.values):
-        failed = np.mean(~(drawn.values <= criterion.limit) & ~drawn.ran_away)
+        failed = float(np.mean(~(drawn.values <= criterion.limit) & ~drawn.ran_away))
         if max(criterion.share_passed or 0.0, failed) < SURE:
             why = "the models drawn lie on both sides of the limit"
     if why is None:

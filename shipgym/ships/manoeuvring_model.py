@@ -43,8 +43,6 @@ class ManoeuvringModel:
         if self.own_table is None and self.structure not in PRINTED | SHIPPED_EQUATIONS.keys():
             # another process lacks what is registered
             object.__setattr__(self, "own_table", get_dynamics(self.structure))
-        if not isinstance(self.particulars, Particulars):  # a mapping, as `identify` takes it
-            object.__setattr__(self, "particulars", Particulars.from_mapping(self.particulars))
         self.particulars.require("speed")
         names = self.dynamics.coefficient_names
         missing = [name for name in names if name not in self.coefficients]
