@@ -19,6 +19,7 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -30,11 +31,14 @@ if str(ROOT) not in sys.path:
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import identify  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
-from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
+from shipgym.manoeuvres import Manoeuvre, turning_circle, zigzag  # noqa: E402
 from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of  # noqa: E402
 from shipgym.trials.sensors import Sensors  # noqa: E402
 from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
+
+Value = TypeVar("Value")
+Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
 STRUCTURES = ("abkowitz", "cubic")
@@ -79,10 +83,34 @@ def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
     ]
 
 
-def indices_of(found: dict[str, dict[str, IndexInterval]]) -> dict[tuple[str, str], IndexInterval]:
-    """The indices that are compared, by manoeuvre and name."""
+def standard_tests(ship: ShipModel) -> dict[str, Manoeuvre]:
+    """The manoeuvres whose indices are compared."""
+    return {name: one for name, one in imo_manoeuvres(ship).items() if "stop" not in name}
+
+
+def true_indices(ship: ShipModel) -> Key[float]:
+    """Indices of a ship, by manoeuvre and name."""
+    found = {run: attempt(one.evaluate, ship)[0] for run, one in standard_tests(ship).items()}
+    return {
+        (run, name): indices[name] for run, indices in found.items() for name in INDICES if name in indices
+    }
+
+
+def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
+    """The same indices of a model, with their intervals over models drawn from its covariance."""
+    tests = standard_tests(model)
+    own = {run: one.no_indices for run, one in tests.items()}
+    found = intervals_of(own, model.sample(draws, seed), {run: one.evaluate for run, one in tests.items()})
     return {
         (run, name): one for run, indices in found.items() for name, one in indices.items() if name in INDICES
+    }
+
+
+def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
+    """Whether each interval holds the truth."""
+    return {
+        key: one.interval is not None and one.interval[0] <= truth[key] <= one.interval[1]
+        for key, one in found.items()
     }
 
 
@@ -100,23 +128,13 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
     if not result.stable:
         return row | {"unstable": True}
     factor = result.model.provenance["model_error"]["factor"]
-    tests = {key: one for key, one in imo_manoeuvres(ship).items() if "stop" not in key}
-    truth = {key: attempt(one.evaluate, ship)[0] for key, one in tests.items()}
+    truth = true_indices(ship)
     for label, size in (("noise", factor**-2), ("all", 1.0)):
-        model = replace(result.model, covariance=size * result.model.covariance)
-        own = {key: one.no_indices for key, one in tests.items()}
-        evaluated = {key: one.evaluate for key, one in tests.items()}
-        found = indices_of(intervals_of(own, model.sample(draws, 1), evaluated))
-        row[label] = {
-            key: (one.interval is not None and one.interval[0] <= truth[key[0]][key[1]] <= one.interval[1])
-            for key, one in found.items()
-        }
+        found = index_intervals(replace(result.model, covariance=size * result.model.covariance), draws)
+        row[label] = holds(found, truth)
         row[f"{label} ran away"] = float(np.mean([one.ran_away.mean() for one in found.values()]))
-        row[f"{label} width"] = float(
-            np.median(
-                [np.ptp(one.interval) / 2.0 / truth[k[0]][k[1]] for k, one in found.items() if one.interval]
-            )
-        )
+        widths = [np.ptp(one.interval) / 2.0 / truth[key] for key, one in found.items() if one.interval]
+        row[f"{label} width"] = float(np.median(widths))
     return row | {"factor": factor}
 
 
