@@ -136,11 +136,11 @@ def build(folder: Path) -> None:
 
 
 def coverage(model: ShipModel) -> str:
-    """A row of docs/identified_models.md: true derivatives and indices inside the 95 % intervals of a model."""
+    """A row of docs/identified_models.md: true derivatives and indices inside a model's 95 % intervals."""
     ship = shipgym.load_model(model.name.partition("-")[0])
     known = "-"
     if ship.structure == model.structure:
-        errors = np.array([model.coefficients[name] - ship.coefficients[name] for name in model.coefficients])
+        errors = np.subtract(*(list(one.coefficients.values()) for one in (model, ship)))
         inside = np.abs(errors) <= NORMAL * np.sqrt(np.diag(model.covariance))
         known = f"{inside.sum()} of {len(inside)}"
     held = holds(index_intervals(model, DRAWS), true_indices(ship))
