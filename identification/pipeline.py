@@ -83,8 +83,8 @@ def identify(
     provenance = _provenance(asked, chosen, fit, refined, problem)
     if asked.model_error:
         error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
-        covariance = error.factor**2 * covariance
-        provenance["model_error"] = error.report
+        covariance = error["factor"] ** 2 * covariance
+        provenance["model_error"] = error
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -45,14 +44,6 @@ MEDIAN = 0.455  # median of a squared standard normal number
 INDICES = ("initial_turning_lengths", *ZIGZAG, "advance_lengths", "tactical_diameter_lengths")
 
 
-@dataclass(frozen=True)
-class ModelError:
-    """By how much standard errors are scaled, and why."""
-
-    factor: float  # at least 1
-    report: dict[str, Any]  # for the provenance
-
-
 def without_trial(
     estimators: Mapping[str, Estimator], samples: Samples, trial: int
 ) -> tuple[Estimators, Samples]:
@@ -76,42 +67,38 @@ def without_trial(
     return found, samples.select(kept)
 
 
-def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> ModelError:
+def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[str, Any]:
     """The factor on the standard errors at which trials left out have errors of size one, never below 1.
 
     `models`: each identified without the trial of the same place, with its covariance. The root mean square
     of the factors that motion and indices ask for, times Student's t with as many degrees of freedom as
     trials over the normal's: of few trials the scatter itself is uncertain. `DEFAULT` for fewer than three
-    trials, whose models are not looked at, or where fewer can be predicted.
+    trials, whose models are not looked at, or where fewer can be predicted. Returns `factor`, `how` it was
+    found, and what it is made of, for the provenance.
     """
     if len(trials) < FEWEST_TRIALS:
-        return _assumed(
-            f"{len(trials)} {'trial' if len(trials) == 1 else 'trials'}, too few to leave one out"
-        )
-    motion: list[list[Error]] = []
+        return _assumed(f"too few trials to leave one out ({len(trials)})")
+    motion: list[Error] = []
     indices: list[Error] = []
+    predicted = 0
     for model, trial in zip(models, trials, strict=True):
         own, drawn, clean = replace(model, covariance=None), model.sample(DRAWS, 0), smoothed(trial)
         found = _motion_errors(own, drawn, trial, clean)
         if found:
-            motion.append(found)
+            predicted += 1
+            motion += found
             indices += _index_errors(own, drawn, trial, clean)
-    if len(motion) < FEWEST_TRIALS:
-        return _assumed(f"only {len(motion)} of {len(models)} trials can be predicted when they are left out")
-    sizes = [scale_of(errors) for errors in (list(chain.from_iterable(motion)), indices) if errors]
-    few = float(student.ppf(0.975, len(motion))) / NORMAL
-    factor = max(1.0, few * float(np.sqrt(np.mean(np.square(sizes)))))
-    report = {
-        "factor": factor,
-        "how": "trials left out in turn",
-        "trials": len(motion),
-        "for_few_trials": few,
-    }
-    return ModelError(factor, report | dict(zip(("motion", "indices"), sizes, strict=False)))
+    if predicted < FEWEST_TRIALS:
+        return _assumed(f"only {predicted} of {len(models)} trials can be predicted when they are left out")
+    sizes = {name: scale_of(of) for name, of in (("motion", motion), ("indices", indices)) if of}
+    few = float(student.ppf(0.975, predicted)) / NORMAL
+    factor = max(1.0, few * float(np.sqrt(np.mean(np.square(list(sizes.values()))))))
+    how = "trials left out in turn"
+    return {"factor": factor, "how": how, "trials": predicted, "for_few_trials": few, **sizes}
 
 
-def _assumed(why: str) -> ModelError:
-    return ModelError(DEFAULT, {"factor": DEFAULT, "how": f"assumed: {why}"})
+def _assumed(why: str) -> dict[str, Any]:
+    return {"factor": DEFAULT, "how": f"assumed: {why}"}
 
 
 def scale_of(errors: Sequence[Error]) -> float:
@@ -122,7 +109,9 @@ def scale_of(errors: Sequence[Error]) -> float:
         return float(np.mean(square / (np.exp(2.0 * log_factor) * variance + noise))) - 1.0
 
     low, high = np.log(SMALLEST), -np.log(SMALLEST)
-    return SMALLEST if excess(low) <= 0.0 else float(np.exp(brentq(excess, low, high)))
+    if excess(low) <= 0.0 or excess(high) >= 0.0:
+        return SMALLEST if excess(low) <= 0.0 else 1.0 / SMALLEST
+    return float(np.exp(brentq(excess, low, high)))
 
 
 def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:

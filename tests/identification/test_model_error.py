@@ -66,7 +66,7 @@ def test_the_covariance_in_the_model_is_the_scaled_one(mariner: ShipModel, noisy
 
 def test_too_few_trials_have_the_documented_factor(cao_fit: IdentificationResult) -> None:
     error = cao_fit.model.provenance["model_error"]
-    assert error == {"factor": DEFAULT, "how": "assumed: 1 trial, too few to leave one out"}
+    assert error == {"factor": DEFAULT, "how": "assumed: too few trials to leave one out (1)"}
 
 
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipModel) -> None:
