@@ -22,8 +22,9 @@ from identification.simulation_error.prior import with_prior
 from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
+from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
-from identification.validation.guarded_fit import GuardedFit, guarded_fit
+from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.particulars import Particulars
@@ -80,6 +81,10 @@ def identify(
     fit, refined = _fitted(chosen, asked, problem)
     covariance = _covariance(fit, problem.samples, problem.blank, refined, asked.uncertainty)
     provenance = _provenance(asked, chosen, fit, refined, problem)
+    if asked.model_error:
+        error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
+        covariance = error["factor"] ** 2 * covariance
+        provenance["model_error"] = error
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
@@ -144,6 +149,34 @@ def _covariance(
     )
 
 
+def _left_out(
+    fit: GuardedFit, problem: Problem, refined: Refined | None, covariance: Floats
+) -> list[ShipModel]:
+    """The models, with covariance, that the fit would have given without each of the trials."""
+    count, blank = len(problem.used), problem.blank
+    if count < FEWEST_TRIALS:
+        return []
+    if refined is None or refined.covariance is None:
+        without = [without_trial(fit.estimators, problem.samples, i) for i in range(count)]
+        return [
+            replace(
+                with_coefficients(fit.model, estimators),
+                covariance=_covariance(replace(fit, estimators=estimators), rows, blank, None, "analytic"),
+            )
+            for estimators, rows in without
+        ]
+    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
+    values, most = np.array(list(fit.model.coefficients.values())), count / max(count - 1, 1)
+    return [
+        replace(
+            fit.model,
+            coefficients=dict(zip(fit.model.coefficients, (values - change).tolist(), strict=True)),
+            covariance=most * covariance,
+        )
+        for change in (most * np.linalg.solve(matrix, part.sum(axis=0)) for part in refined.influences)
+    ]
+
+
 def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
     """The origin of a fit and its outcome, for the model's provenance."""
     return {
@@ -181,6 +214,7 @@ def _evaluated(
         stable=stable,
         metrics={
             "stable": stable,
+            "instability": None if stable else _why_unstable(model.provenance or {}),
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
@@ -192,6 +226,12 @@ def _evaluated(
         settings=call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )
+
+
+def _why_unstable(provenance: Mapping[str, Any]) -> str:
+    """The trials that the model runs away on, or the simulations of the guard."""
+    lost = [f"trial {name!r}, open loop" for name in provenance.get("runs_away_on", [])]
+    return "runs away: " + "; ".join(lost or provenance["guard"].get("rejected", []))
 
 
 def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:

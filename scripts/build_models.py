@@ -10,9 +10,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+from certainty import holds, index_intervals, true_indices
+
 import shipgym
 from identification import IdentificationResult, identify
-from shipgym import Trial
+from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.catalogue import LIBRARY
 from shipgym.trials.sensors import Sensors
@@ -22,6 +25,7 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 STEP = 0.25  # simulation, s
 SAMPLING = 1.0  # the logger, s
 DURATION = 900.0  # s
+DRAWS, NORMAL = 100, 1.96  # models drawn from each; standard errors of a 95 % interval
 #: Rudder and heading, degrees, and whether port first.
 KVLCC2_ZIGZAGS = ((10, 10, False), (10, 10, True), (20, 20, False), (20, 20, True))
 CONTAINER_ZIGZAGS = ((10, 10, False), (20, 20, False), (20, 10, True), (35, 30, True))
@@ -120,12 +124,28 @@ MODELS = (
 
 
 def build(folder: Path) -> None:
-    """Write every identified model into a folder."""
+    """Write every identified model into a folder, and print how often their intervals hold the truth."""
     folder.mkdir(parents=True, exist_ok=True)
+    rows = []
     for make in MODELS:
         result = make()
         result.model.save(folder / f"{result.model.name}.json")
         print(result.summary())
+        rows.append(coverage(result.model))
+    print("| name | factor | derivatives | indices |\n| --- | --- | --- | --- |", *rows, sep="\n")
+
+
+def coverage(model: ShipModel) -> str:
+    """A row of docs/identified_models.md: true derivatives and indices inside a model's 95 % intervals."""
+    ship = shipgym.load_model(model.name.partition("-")[0])
+    known = "-"
+    if ship.structure == model.structure:
+        errors = np.subtract(*(list(one.coefficients.values()) for one in (model, ship)))
+        inside = np.abs(errors) <= NORMAL * np.sqrt(np.diag(model.covariance))
+        known = f"{inside.sum()} of {len(inside)}"
+    held = holds(index_intervals(model, DRAWS), true_indices(ship))
+    factor = model.provenance["model_error"]["factor"]
+    return f"| `{model.name}` | {factor:.2f} | {known} | {sum(held.values())} of {len(held)} |"
 
 
 if __name__ == "__main__":

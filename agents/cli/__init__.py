@@ -125,7 +125,7 @@ def trials_command(
 
 def _print_trials(found: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
-    from agents.cli.terminal import criteria_table, manoeuvre_table, warn
+    from agents.cli.terminal import criteria_notes, criteria_table, manoeuvre_table, warn
     from agents.cli.terminal import out as console
 
     console.print(manoeuvre_table(found.indices, found.water))
@@ -134,9 +134,8 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
         console.print(criteria_table(found.criteria))
     else:
         console.print("The IMO criteria are made for deep water: leave --depth out to assess them.")
-    for name, criterion in found.criteria.items():
-        if criterion.note:
-            console.print(f"{name}: {criterion.note}", soft_wrap=True)
+    for note in criteria_notes(found.criteria):
+        console.print(note, soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
     if page is not None:
@@ -168,7 +167,7 @@ def autopilot_command(
     """The whole chain: identify, predict, design PID and LQ, run them on drawn models, write a report.
 
     Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
-    model is unstable; the report then says so.
+    model is unstable, or no autopilot designed on it can be trusted; the report then says why.
     """
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine
@@ -183,23 +182,35 @@ def autopilot_command(
 
 
 def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
-    """Print the result of the chain; fail for an unstable model."""
-    from agents.cli.terminal import criteria_table, prediction_table, print_json, ranking_table, warn
+    """Print the result of the chain; fail for an unstable model, and where every design is refused."""
+    from agents.cli.terminal import (
+        criteria_notes,
+        criteria_table,
+        prediction_table,
+        print_json,
+        ranking_table,
+        warn,
+    )
     from agents.cli.terminal import out as console
-    from identification.validation.warnings import model_warnings
+    from identification.validation.warnings import held_out_error, model_warnings
 
     if as_json:
         print_json({**result.metrics, "report": str(report)})
     elif result.verification is not None:
         found = result.verification.manoeuvres
+        console.print(held_out_error(result.identification), soft_wrap=True)
         console.print(prediction_table(result.identification))
         console.print()
         console.print(criteria_table(found.criteria))
+        for note in criteria_notes(found.criteria):
+            console.print(note, soft_wrap=True)
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
         console.print(ranking_table(result))
         console.print()
     if not result.stable:
         fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
+    if result.refusal is not None:
+        fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
     for warning in model_warnings(result.identification):
         warn(warning)
     for name, reason in (result.verification.refused if result.verification else {}).items():

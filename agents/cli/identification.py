@@ -59,7 +59,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
-    from identification.validation.warnings import why_unstable
+    from identification.validation.warnings import held_out_error, why_unstable
 
     with whole_folder(out, FILES) as draft, err.status("identifying"):
         result = identify_ship(read, settings)
@@ -71,6 +71,7 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
         if instability is None:
             console.print(result.summary(), soft_wrap=True)
             console.print(prediction_table(result))
+            console.print(held_out_error(result), soft_wrap=True)
         console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     _check_stable(result)
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.errors import InputError, ManoeuvreError
+from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres import Criterion, IndexInterval, Manoeuvre
 from shipgym.manoeuvres.imo import imo_criteria
 from shipgym.manoeuvres.intervals import intervals_of
@@ -62,20 +62,24 @@ def standard_trials(
     `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the
     draws; `progress`: told the number of draws done; `water_depth`: m, for ships that know shallow water.
     Raises InputError for water that is too shallow, or shallow water in a ship that knows none;
-    UnstableModelError if the ship itself runs away.
+    UnstableModelError if the ship itself runs away in every manoeuvre; where she does in some, or an index
+    cannot be read, these are in `refused` and the others stay.
     """
     families = families_of(model, water_depth)
     manoeuvres = {name: one for family in families.values() for name, one in family.items()}
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
+    lost: Exception | None = None
     for name, manoeuvre in manoeuvres.items():
         own[name] = manoeuvre.no_indices
         try:
             sailed[name] = manoeuvre.sail(model)
             own[name] = asdict(manoeuvre.indices(sailed[name]))
-        except (InputError, ManoeuvreError) as error:
-            refused[name] = str(error)
+        except (InputError, ManoeuvreError, UnstableModelError) as error:
+            refused[name], lost = str(error), error
+    if not sailed and lost is not None:
+        raise lost
     drawn = model.sample(draws, seed) if draws and model.covariance is not None else []
     evaluated = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
     found = intervals_of(own, drawn, evaluated, progress)

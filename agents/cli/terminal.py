@@ -151,7 +151,7 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
     table.add_column("use")
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
         table.add_column(heading, justify="right")
-    table.add_column("measured -> predicted", no_wrap=True)
+    table.add_column("measured -> predicted\n(rudder reversed at headings)", no_wrap=True)
     for name, metrics in result.metrics["trials"].items():
         rmse = metrics["rmse"]
         angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
@@ -193,9 +193,10 @@ def _indices(metrics: Mapping[str, Any]) -> str:
         "tactical_diameter_lengths": "diameter",
     }
     return "\n".join(
-        f"{text} {_number(metrics[name]['measured'], 2)} -> {_number(metrics[name]['predicted'], 2)}"
+        f"{text} {_number(found['measured'], 2)} -> {_number(found['predicted'], 2)}"
+        + (f" ({_number(found['closed_loop'], 2)})" if "closed_loop" in found else "")
         for name, text in names.items()
-        if metrics.get(name) is not None
+        if (found := metrics.get(name)) is not None
     )
 
 
@@ -216,29 +217,38 @@ def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str 
 def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     """IMO criteria, with interval and probability of passing where there are models drawn."""
     drawn = any(criterion.share_passed is not None for criterion in criteria.values())
-    headings = (
-        "criterion", ">value", ">95 % interval", ">limit", "unit", "verdict", ">draws that pass", "paragraph"
-    )  # fmt: skip
-    shown = [one for one in headings if drawn or one not in (">95 % interval", ">draws that pass")]
-    table = plain_table("IMO criteria, resolution MSC.137(76)", *shown)
+    measured = any(criterion.measured is not None for criterion in criteria.values())
+    headings = {
+        "criterion": True, ">measured": measured, ">value": True, ">95 % interval": drawn, ">limit": True,
+        "unit": True, "verdict": True, ">probability": drawn, "manoeuvre": True, "paragraph": True,
+    }  # fmt: skip
+    table = plain_table(
+        "IMO criteria, resolution MSC.137(76)", *(one for one, shown in headings.items() if shown)
+    )
     for name, criterion in criteria.items():
+        probability = criterion.probability
         cells = [
-            _number(criterion.value, 2),
-            _number(criterion.limit, 2),
-            criterion.unit,
-            _verdict(criterion),
-        ]
-        if drawn:
-            cells.insert(1, _interval(criterion.interval))
-            share = criterion.share_passed
-            cells.append("-" if share is None else f"{100.0 * share:.1f} %")
-        table.add_row(name, *cells, criterion.source.rpartition(" ")[2])
+            name, _number(criterion.measured, 2), _number(criterion.value, 2), _interval(criterion.interval),
+            _number(criterion.limit, 2), criterion.unit, _verdict(criterion),
+            "-" if probability is None else f"{100.0 * probability:.1f} %",
+            criterion.manoeuvre, criterion.source.rpartition(" ")[2],
+        ]  # fmt: skip
+        table.add_row(*(cell for cell, shown in zip(cells, headings.values(), strict=True) if shown))
     return table
+
+
+def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
+    """What is to be said of criteria below their table: why one is not decided, and draws without a value."""
+    notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
+    lost = {name: "" if one.drawn is None else one.drawn.lost_in_words for name, one in criteria.items()}
+    return notes + [
+        f"{name}: {words}, which are not in its interval" for name, words in lost.items() if words
+    ]
 
 
 def _verdict(criterion: Criterion) -> str | Text:
     if criterion.passed is None:
-        return "not assessable"
+        return Text("not decided", "yellow") if criterion.manoeuvre else "not assessable"
     return Text("passes", "green") if criterion.passed else Text("fails", "red")
 
 

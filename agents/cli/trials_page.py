@@ -7,7 +7,7 @@ from typing import Any
 
 from agents import output
 from agents.cli.standard_trials import StandardTrials
-from agents.verification.figures import CRITERIA
+from agents.verification.figures import criterion_name
 from shipgym.files import write_text
 from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
@@ -36,7 +36,7 @@ def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
         model=model,
         water=found.water,
         draws=found.draws,
-        criteria={CRITERIA[name]: criterion for name, criterion in found.criteria.items()},
+        criteria={criterion_name(name, one): one for name, one in found.criteria.items()},
         sections=[_section(name, family, found) for name, family in found.families.items() if family],
     )
     write_text(page, path)

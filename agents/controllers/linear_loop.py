@@ -158,7 +158,8 @@ def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) 
     if largest >= 1.0:
         raise InputError(
             f"{name}: the closed loop is unstable with these gains (largest sampled pole {largest:.4f}, "
-            f"expected below 1); choose a lower bandwidth, or a shorter control interval"
+            "expected below 1); choose a shorter control interval dt, and a lower frequency (PID) or a "
+            "larger rate_weight_s2 (LQ) in from_model"
         )
     nyquist = np.pi / ship.dt
     omega = np.geomspace(SLOWEST * nyquist, 0.999 * nyquist, FREQUENCIES)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,11 +20,14 @@ from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import monte_carlo
+from agents.verification.refusal import helpful_trial, lost_control, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from identification import IdentificationResult
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
+from shipgym.manoeuvres.imo import with_measured
 from shipgym.plots import graph_objects
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import nomoto
@@ -56,9 +60,10 @@ def build_autopilot(
     """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
 
     The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the model is
-    unstable only the first two. It is written whole or not at all. `ship_file`: the ship file (TOML) with its
-    trials; `out`: folder of the results; an earlier report there is replaced, anything else is refused;
-    `draws`: number of models drawn from the coefficient covariance, at least 2; `seed`: of the draws and of
+    unstable or refused only the first two, and no file of an autopilot that is refused. It is written whole
+    or not at all. `ship_file`: the ship file (TOML) with its trials; `out`: folder of the results; an
+    earlier report there is replaced, anything else is refused; `draws`: number of models drawn from the
+    coefficient covariance, at least 2; `seed`: of the draws and of
     the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
     `agents`: files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`);
     `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the
@@ -87,7 +92,7 @@ def _write(result: AutopilotResult, folder: Path) -> None:
     if result.verification is not None:
         result.model.save(folder / "model.json")
         for pilot in result.verification.pilots:
-            if pilot.design is not None:  # the others are files already
+            if pilot.design is not None and pilot.key not in result.verification.refused:
                 pilot.design.save(folder / f"{pilot.key}.json")
     write_report(result, folder / "report.html")
 
@@ -112,15 +117,34 @@ def examine(
     identification = identify_trials(ship, trials, arguments)
     _tell(progress, "identifying", 1, 1)
     instability = why_unstable(identification)
+    refusal = why_refused(identification) if instability is None else None
     verification = None
-    if instability is None:
+    if instability is None and refusal is None:
         for guest, agent in zip(guests, agents, strict=True):
             _check_fits(guest, identification.model, f"agent '{agent}'")
         try:
             verification = verify(identification.model, draws, seed, progress, where, guests)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
-    return AutopilotResult(ship, identification.trials, identification, instability, verification)
+    if verification is not None:
+        verification, refusal = _decided(verification, identification)
+    return AutopilotResult(ship, identification.trials, identification, instability, verification, refusal)
+
+
+def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verification, str | None]:
+    """A verification with what the trials measured, and why no design is given, if none is."""
+    criteria = with_measured(found.manoeuvres.criteria, fit.model, fit.trials)
+    found = replace(found, manoeuvres=replace(found.manoeuvres, criteria=criteria))
+    designed = [pilot for pilot in found.pilots if pilot.design is not None]
+    lost = {pilot.key: why for pilot in designed if (why := lost_control(pilot.episodes.terminated))}
+    if not lost:
+        return found, None
+    remedy = helpful_trial(fit)
+    refused = {**found.refused, **{key: f"{why}; run {remedy}" for key, why in lost.items()}}
+    refusal = None
+    if len(lost) == len(designed):
+        refusal = f"{', '.join(key.upper() for key in lost)}: {lost[designed[0].key]}; run {remedy}"
+    return replace(found, refused=refused), refusal
 
 
 def verify(

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from identification.report.predictions import RUDDER
 from shipgym.manoeuvres import Criterion
+from shipgym.manoeuvres.intervals import LEVELS
 from shipgym.plots import (
     LIMIT,
     MEASURED,
@@ -32,22 +33,26 @@ if TYPE_CHECKING:
 Floats = NDArray[np.float64]
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
-BAND = (0.05, 0.95)
 
 CRITERIA = {
-    "advance": "Advance (35° turn)",
-    "tactical_diameter": "Tactical diameter (35° turn)",
-    "initial_turning": "Initial turning (10° rudder)",
-    "overshoot_1_10_10": "First overshoot (10/10)",
-    "overshoot_2_10_10": "Second overshoot (10/10)",
-    "overshoot_1_20_20": "First overshoot (20/20)",
+    "advance": "Advance",
+    "tactical_diameter": "Tactical diameter",
+    "initial_turning": "Initial turning",
+    "overshoot_1_10_10": "First overshoot",
+    "overshoot_2_10_10": "Second overshoot",
+    "overshoot_1_20_20": "First overshoot",
     "stopping": "Track reach, full astern stop",
 }
 
 
+def criterion_name(name: str, criterion: Criterion) -> str:
+    """A criterion in words, with its manoeuvre."""
+    return CRITERIA[name] + (f" ({criterion.manoeuvre})" if criterion.manoeuvre else "")
+
+
 def band(t: Floats, values: Floats, name: str, colour: str, showlegend: bool = False) -> list[Any]:
-    """The range from 5 to 95 per cent of `values`, shape (n_draws, n_samples), as a filled band."""
-    low, high = np.quantile(values, BAND, axis=0)
+    """The 95 % interval of `values`, shape (n_draws, n_samples), as a filled band."""
+    low, high = np.quantile(values, LEVELS, axis=0)
     go = graph_objects()
     return [
         go.Scatter(
@@ -74,6 +79,9 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
                 marker={"color": translucent(MODEL, 0.3), "size": 5},
             )
         )  # fmt: skip
+        if criterion.measured is not None:
+            told = [100.0 * criterion.measured / criterion.limit] * 2
+            figure.add_trace(line(told, [row - 0.32, row + 0.32], "measured", RUDDER, 2.2, showlegend=False))
         if criterion.value is not None:
             nominal = [100.0 * criterion.value / criterion.limit] * 2
             figure.add_trace(
@@ -84,7 +92,7 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
     ends = [-0.5, len(criteria) - 0.5]
     figure.add_trace(line([100.0, 100.0], ends, "IMO limit", LIMIT, 1.8, line_dash="dash"))
     figure.update_layout(layout(46 * len(criteria) + 100, left=190, hovermode="closest"))
-    names = [CRITERIA[name] for name in criteria]
+    names = [criterion_name(name, one) for name, one in criteria.items()]
     names_axis = axis(tickvals=list(range(len(names))), ticktext=names, range=ends[::-1], showgrid=False)
     label(figure, axis("per cent of the limit", rangemode="tozero", ticksuffix=" %"), names_axis)
     return figure
@@ -96,7 +104,7 @@ def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
     run = found.zigzag
     if len(found.zigzag_headings):
         figure.add_traces(
-            band(run.t, np.degrees(found.zigzag_headings), "5 to 95 % of draws", MODEL, True), rows=1, cols=1
+            band(run.t, np.degrees(found.zigzag_headings), "95 % of draws", MODEL, True), rows=1, cols=1
         )
     figure.add_trace(line(run.t, np.degrees(run["delta"]), "rudder", RUDDER, 1.2), row=1, col=1)
     figure.add_trace(line(run.t, np.degrees(run["psi"]), "identified model", MODEL, 2.0), row=1, col=1)

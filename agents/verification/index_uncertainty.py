@@ -29,7 +29,7 @@ PATHS_KEPT = 40  # turning circles of draws that a report draws
 class ManoeuvreUncertainty:
     """Standard manoeuvres of a model and of its draws."""
 
-    #: by the names of `imo_assessment`, each with its interval over the draws; those that can be assessed
+    #: by the names of `imo_assessment`, each with its interval over the draws; those that her equations allow
     criteria: dict[str, Criterion]
     unstable: NDArray[np.bool_]  # draws that run away in one of the manoeuvres, shape (n_draws,)
     zigzag: Trial  # 20/20 zigzag of the identified model
@@ -83,7 +83,7 @@ def uncertainty_of(
         }
         for name, test in imo_manoeuvres(model).items()
     }
-    criteria = {name: one for name, one in imo_criteria(model, found).items() if one.passed is not None}
+    criteria = {name: one for name, one in imo_criteria(model, found).items() if one.drawn is not None}
     unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
     unstable |= np.concatenate([part["lost"] for part in parts])
     headings, paths = (np.concatenate([part[name] for part in parts]) for name in ("headings", "paths"))

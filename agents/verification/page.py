@@ -11,19 +11,18 @@ import numpy as np
 import shipgym
 from agents.controllers.controller import Controller
 from agents.verification.figures import (
-    BAND,
-    CRITERIA,
     costs_figure,
     criteria_figure,
+    criterion_name,
     manoeuvres_figure,
     steps_figure,
 )
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from identification.report.view import fit_view, trial_figures
+from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
 from shipgym.pages import NONE, render
 
-SURE = 0.95  # probability of passing from which on a criterion counts as met
 SIGNALS = {
     "heading_error": ("heading error", "rad/rad"),
     "yaw_rate": ("yaw rate", "s"),
@@ -48,6 +47,8 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
         found=None if found is None else verification_view(found) | {"length": _length(result)},
         figures=figures,
         instability=result.instability,
+        refusal=result.refusal,
+        held_out=held_out_error(result.identification),
         software=provenance.get("software", f"shipgym {shipgym.__version__}"),
         ship_file=result.ship.path.name,
         settings=[str(provenance.get(key, NONE)) for key in ("structure", "method", "samples")],
@@ -64,17 +65,17 @@ def verification_view(found: Verification) -> dict[str, Any]:
     designed = {pilot.name: pilot.design for pilot in _by_name(found) if pilot.design is not None}
     criteria = _criteria(found)
     first, *others = found.pilots
-    doubtful = any(one["share"] < SURE for one in criteria) or bool(found.manoeuvres.unstable.any())
+    met = sum(one["passed"] is True for one in criteria)
     return {
         "headline": headline(found),
-        "certain": not doubtful and not pilots[0]["lost"],
+        "certain": met == len(criteria) and not found.manoeuvres.unstable.any() and not pilots[0]["lost"],
         "draws": found.draws,
         "seed": found.seed,
         "unstable": int(found.manoeuvres.unstable.sum()),
         "course_unstable": int(found.course_unstable.sum()),
         "criteria": criteria,
-        "sure": sum(one["share"] >= SURE for one in criteria),
-        "least": min(criteria, key=lambda one: one["share"]),
+        "met": met,
+        "missed": sum(one["passed"] is False for one in criteria),
         "nomoto": found.nomoto,
         "pilots": pilots,
         "designs": designed,
@@ -90,17 +91,17 @@ def verification_view(found: Verification) -> dict[str, Any]:
 def headline(found: Verification) -> str:
     """The verdict in two or three sentences."""
     criteria = found.manoeuvres.criteria
-    missed = [CRITERIA[name].lower() for name, one in criteria.items() if not one.passed]
-    unsure = [
-        CRITERIA[name].lower()
-        for name, one in criteria.items()
-        if one.passed and (one.share_passed or 0.0) < SURE
-    ]
+    names = {name: criterion_name(name, one).lower() for name, one in criteria.items()}
+    missed = [names[name] for name, one in criteria.items() if one.passed is False]
+    open_ones = [names[name] for name, one in criteria.items() if not one.decided]
     imo = f"The model is stable but misses the IMO criterion of {', '.join(missed)}."
     if not missed:
-        imo = "The model is stable and meets all IMO criteria."
-    if unsure:
-        imo += f" Not certain: {', '.join(unsure)}."
+        which = (
+            "meets all IMO criteria" if not open_ones else "misses no IMO criterion that these trials decide"
+        )
+        imo = f"The model is stable and {which}."
+    if open_ones:
+        imo += f" Not decided by these trials: {', '.join(open_ones)}."
     unstable = int(found.manoeuvres.unstable.sum())
     if unstable:
         imo += f" {unstable} of {found.draws} models drawn run away in a manoeuvre."
@@ -114,14 +115,14 @@ def headline(found: Verification) -> str:
 
 def _criteria(found: Verification) -> list[dict[str, Any]]:
     """A row for each criterion."""
-    rows = []
-    for name, one in found.manoeuvres.criteria.items():
-        low, high = (None, None) if one.drawn is None else one.drawn.quantiles(*BAND)
-        rows.append({
-            "name": CRITERIA[name], "source": one.source, "passed": one.passed, "value": one.value,
-            "low": low, "high": high, "limit": one.limit, "unit": one.unit, "share": one.share_passed or 0.0,
-        })  # fmt: skip
-    return rows
+    return [
+        {
+            "name": criterion_name(name, one), "source": one.source, "passed": one.passed, "value": one.value,
+            "measured": one.measured, "interval": one.interval, "limit": one.limit, "unit": one.unit,
+            "probability": one.probability, "note": one.note, "drawn": one.drawn,
+        }
+        for name, one in found.manoeuvres.criteria.items()
+    ]  # fmt: skip
 
 
 def _pilot(pilot: Pilot) -> dict[str, Any]:
@@ -131,18 +132,18 @@ def _pilot(pilot: Pilot) -> dict[str, Any]:
         "name": pilot.name,
         "lost": int(np.sum(episodes.terminated)),
         "cost": float(np.mean(episodes.cost)),
-        "cost_95": float(np.quantile(episodes.cost, BAND[1])),
+        "cost_95": float(np.quantile(episodes.cost, 0.95)),
         "heading": float(np.mean(episodes.heading_rmse_deg)),
-        "heading_95": float(np.quantile(episodes.heading_rmse_deg, BAND[1])),
+        "heading_95": float(np.quantile(episodes.heading_rmse_deg, 0.95)),
         "rudder_travel": float(np.mean(episodes.rudder_travel_deg_min)),
         "extrapolating": float(np.mean(episodes.extrapolating)),
     }
 
 
-def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[float | None]]]:
-    """Name, unit and gains of the designed autopilots for each signal that one of them acts on."""
+def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[tuple[str, float] | None]]]:
+    """Signal, unit, and of each design the gain on it by its name, with the sign that it has in the file."""
     gains = [
-        {signal: sign * design.gains[gain] for gain, (signal, sign) in design.feedback.items()}
+        {signal: (gain, design.gains[gain]) for gain, (signal, _) in design.feedback.items()}
         for design in designs
     ]
     return [

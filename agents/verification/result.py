@@ -67,7 +67,8 @@ class AutopilotResult:
     trials: tuple[Trial, ...]  # in the order of the file
     identification: IdentificationResult  # the model and its predictions
     instability: str | None  # why the model must not be used; None where it is stable
-    verification: Verification | None  # none where the model is unstable
+    verification: Verification | None  # none where the model is unstable or refused
+    refusal: str | None = None  # why no autopilot is given although the model is stable, and what would help
 
     @property
     def model(self) -> ShipModel:
@@ -77,7 +78,7 @@ class AutopilotResult:
     @property
     def stable(self) -> bool:
         """Whether the model can be used."""
-        return self.verification is not None
+        return self.instability is None
 
     @property
     def metrics(self) -> dict[str, Any]:
@@ -87,6 +88,7 @@ class AutopilotResult:
             **result.metrics,
             "stable": self.stable,
             "instability": self.instability,
+            "refusal": self.refusal,
             "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
         }
         if self.verification is not None:

@@ -20,6 +20,7 @@ from rich.table import Table
 
 from identification.regression.samples import Samples, build_samples
 from identification.text import as_text
+from identification.validation.guard import hard_turn_features
 from shipgym.checks import check_choice
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
@@ -58,7 +59,7 @@ class Advice:
     criterion : str
         "c", "D" or "E".
     coefficient : str
-        That which "c" shrinks: by default the least certain one.
+        That which "c" shrinks.
     trials : tuple of TrialInformation
         Of the trials so far.
     before : dict of str to float
@@ -197,7 +198,8 @@ def advise(
         What to shrink: the standard error of one coefficient, the volume or the longest axis of the
         ellipsoid.
     coefficient : str, optional
-        Of "c"; by default that of the largest relative standard error.
+        Of "c"; by default the one whose standard error changes the accelerations of a hard turn most, so that
+        a coefficient near zero is not taken for uncertain.
     number : int
         How many to choose; the same one may be chosen again.
 
@@ -221,7 +223,7 @@ def advise(
     total = np.sum([trial.information for trial in known], axis=0)
     size = _size(model, total)
     before = dict(zip(names, _errors(total, size).tolist(), strict=True))
-    worst = max(before, key=lambda name: before[name]) if coefficient is None else coefficient
+    worst = _most_felt(model, size * np.array(list(before.values()))) if coefficient is None else coefficient
     steps: list[dict[str, float]] = []
     chosen: list[str] = []
     for _ in range(number):
@@ -231,6 +233,19 @@ def advise(
         total = total + offers[chosen[-1]]
     after = dict(zip(names, _errors(total, size).tolist(), strict=True))
     return Advice(criterion, worst, known, before, tuple(steps), tuple(chosen), after)
+
+
+def _most_felt(model: ShipModel, errors: Floats) -> str:
+    """The coefficient whose error, shape (n_coefficients,), changes the accelerations of a hard turn most."""
+    table = _table(model)
+    sizes = hard_turn_features(table, model.particulars, model.service_shaft_speed)
+    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
+    values, felt, first = matrix @ np.array(list(model.coefficients.values())), np.zeros(len(errors)), 0
+    for q in table.regressed:
+        rows = slice(first, first + len(sizes[q]))
+        felt = np.maximum(felt, np.abs(matrix[rows]).T @ sizes[q] / (np.abs(values[rows]) @ sizes[q]))
+        first = rows.stop
+    return list(model.coefficients)[int(np.argmax(felt * errors))]
 
 
 def _gains(

@@ -79,7 +79,7 @@ class RMSVM(LinearRegressor):
     coef_ : array of shape (n_features,)
         Of the features as given.
     inverse_moment_, covariance_ : array of shape (n_features, n_features)
-        Of the ridge regression of the same strength: an SVR has none of its own.
+        Of the ridge regression of the same strength, at C = 0 of the weakest: an SVR has none of its own.
     n_features_in_ : int
         Number of features.
     """
@@ -114,11 +114,9 @@ class RMSVM(LinearRegressor):
         features: Floats = checked[0]
         target = np.asarray(checked[1], dtype=np.float64)
         weight = 1.0 if self.C is None else float(self.C)
-        if weight == NO_CORRECTION:
+        self._fit(features, target, weight or WEIGHTS[1])
+        if weight == NO_CORRECTION:  # its uncertainty is that of the weakest correction
             self.coef_ = np.zeros(features.shape[1])
-            self.inverse_moment_ = np.zeros((features.shape[1],) * 2)
-        else:
-            self._fit(features, target, weight)
         residual = target - features @ self.coef_
         self.covariance_ = float(np.mean(residual**2)) * self.inverse_moment_
         return self

@@ -19,6 +19,8 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
+LIKE = 0.5  # similarity (a correlation) from which on a reference ship is taken without being named
+
 
 @dataclass(frozen=True)
 class _Widened(GreyBox):
@@ -50,6 +52,13 @@ def chosen_box(
     found: dict[str, float] = {}
     if reference == AUTO:
         reference, found = select_reference(_with_block_coefficient(particulars), recorded)
+        if found[reference] < LIKE:
+            raise InputError(
+                f"reference_model: 'auto' found, but none is like this ship; the best is {reference!r} "
+                f"with a similarity of {found[reference]:.2f}, expected at least {LIKE}; "
+                'choose structure "abkowitz" or "cubic", or name the ship all the same: reference_model = '
+                f'"{reference}"'
+            )
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
 

@@ -7,7 +7,7 @@ from typing import Any
 from identification.fit import Fit
 from identification.report.figures import coefficients_figure, regression_figures
 from identification.report.view import fit_view, trial_figures
-from identification.validation.warnings import undetermined, why_unstable
+from identification.validation.warnings import held_out_error, undetermined, why_unstable
 from shipgym.pages import render
 
 TOLD_ELSEWHERE = ("trials", "particulars", "steering")  # settings that have tables of their own
@@ -29,6 +29,7 @@ def report_page(fit: Fit) -> str:
         fit=fit_view(fit),
         figures=figures,
         instability=instability,
+        held_out=held_out_error(fit),
         undetermined=undetermined(fit),
         settings=[
             (name.replace("_", " "), _shown(value))

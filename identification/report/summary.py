@@ -27,6 +27,11 @@ def summary_table(fit: Fit) -> str:
         f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
     )
     console.print(_coefficients(fit), _inertia(fit), _equations(fit))
+    if "model_error" in provenance:
+        error = provenance["model_error"]
+        console.print(
+            f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']})."
+        )
     for line in undetermined(fit) + exactly_collinear(fit):
         console.print(line, highlight=False)
     if "reference" in fit.metrics:

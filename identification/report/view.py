@@ -101,7 +101,7 @@ def _trial(trial: Trial, name: str) -> dict[str, Any]:
 def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
     """A row of the table of errors, with the manoeuvre's indices by name and unit."""
     indices = [
-        (text, metrics[name]["measured"], metrics[name]["predicted"], unit)
+        (text, metrics[name]["measured"], metrics[name]["predicted"], metrics[name].get("closed_loop"), unit)
         for name, (text, unit) in INDICES.items()
         if metrics.get(name) is not None
     ]

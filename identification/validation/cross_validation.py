@@ -42,6 +42,6 @@ def cross_validate(trials: Sequence[Trial], folds: int | None = None, **argument
     metrics: dict[str, Any] = {}
     for k in range(n):
         held = [trial.name for i, trial in enumerate(used) if i * n // len(used) == k]
-        result = identify(used, hold_out=held, **arguments)
+        result = identify(used, hold_out=held, **{"model_error": False, **arguments})
         metrics |= {name: result.metrics["trials"][name] for name in held}
     return metrics

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle
+from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
 from shipgym.ships import ShipModel, Structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import open_loop
@@ -27,10 +28,6 @@ REVERSALS = (2.5, 5.0, 10.0, 20.0)
 #: Length of a trial manoeuvre, ship lengths at service speed.
 DURATION_LENGTHS = 50.0
 STEP = 0.02  # of the time to sail one ship length
-
-#: No manoeuvre at service power takes a ship beyond these, by service speed and by speed by length.
-LARGEST_SPEED = 1.5
-LARGEST_YAW_RATE = 3.0
 
 #: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
 #: SIMMAN 2008 slows down to 0.37 at r L / U = 0.8 and a drift of 20 degrees.
@@ -117,10 +114,10 @@ def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -
     except UnstableModelError as error:
         return f"ran away after {error.time_s:.0f} s"
     length, speed = model.particulars["length"], model.particulars["speed"]
-    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > LARGEST_SPEED * speed:
+    if trial["u"].min() < min(least_surge, 0.0) or trial["u"].max() > FASTEST * speed:
         return f"surge speed from {trial['u'].min():.3g} to {trial['u'].max():.3g} m/s"
     if np.abs(trial["v"]).max() > speed:
         return f"sway speed of {np.abs(trial['v']).max():.3g} m/s"
-    if np.abs(trial["r"]).max() * length > LARGEST_YAW_RATE * speed:
+    if np.abs(trial["r"]).max() * length > QUICKEST_TURN * speed:
         return f"yaw rate of {np.degrees(np.abs(trial['r']).max()):.3g} deg/s"
     return None

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.validation.closed_loop import closed_loop
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 from shipgym.ships import ShipModel
@@ -30,8 +31,9 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
     """Errors of a prediction and the indices of measurement and prediction by the same function.
 
     `model`: gives the ship's length; `trial`: as measured; `prediction`: from `predict`. Returns `use`,
-    `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, None where the
-    manoeuvre has no such index or never got there.
+    `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, of overshoots also
+    `closed_loop` (the rudder reversed at the measured headings, `closed_loop`), None where the manoeuvre
+    has no such index or never got there.
     """
     metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None}
     metrics["rmse"] = {
@@ -45,6 +47,11 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
     if trial.kind == "zigzag":
         heading = switch_heading_deg(trial)
         indices |= _compared(ZIGZAG, trial, prediction, lambda t: zigzag_indices(t, length, heading))
+        again = None if prediction is None else closed_loop(model, trial)
+        found = None if again is None else zigzag_indices(again, length, heading)
+        for name in ZIGZAG:
+            if indices[name] is not None:
+                indices[name]["closed_loop"] = getattr(found, name, None)
     elif trial.kind == "turning-circle":
         indices |= _compared(TURNING, trial, prediction, lambda t: turning_indices(t, length))
     return metrics | indices

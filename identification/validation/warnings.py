@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import PurePath
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,9 @@ from shipgym.ships import ShipModel
 from shipgym.ships.linear import is_course_stable, steering_state_space
 
 LOST_HEADING = np.radians(10.0)  # rms error beyond which a prediction says nothing
+DRAWS, SURE = 40, 0.95  # models drawn, and the share of them that shows a course instability
+STEADY = 0.02  # change of the shaft speed between and within trials by its mean that a structure may ignore
+WAY = 0.5  # speed by that of service below which a trial starts from rest
 COLLINEAR = 1e8  # condition number beyond which terms are in proportion but for rounding
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 
@@ -49,6 +54,7 @@ def model_warnings(fit: Fit) -> list[str]:
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
             "held back; predictions far from the recorded manoeuvres are doubtful"
         )
+    found += _not_corrected(fit) + _not_refined(provenance) + _shaft_ignored(fit)
     found += exactly_collinear(fit) + _lost_headings(fit)
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
     if derived:
@@ -64,6 +70,36 @@ def model_warnings(fit: Fit) -> list[str]:
         names = ", ".join(sorted(model.particulars.estimated))
         found.append(f"estimated, not given in the ship file: {names}")
     return found
+
+
+def held_out_error(fit: Fit) -> str:
+    """The worst errors on the trials held out, of heading and of an index, in one sentence."""
+    unseen = {n: found for n, found in fit.metrics["trials"].items() if found["use"] == "validate"}
+    if not unseen:
+        return "No trial was held out."
+    lost = [PurePath(name).name for name, found in unseen.items() if found["diverged"]]
+    if lost:
+        return f"On {lost[0]}, held out, the model runs away."
+    headings = {
+        name: found["rmse"]["psi"] for name, found in unseen.items() if found["rmse"]["psi"] is not None
+    }
+    told = []
+    if headings:
+        worst = max(headings, key=lambda name: headings[name])
+        told.append(f"heading {np.degrees(headings[worst]):.2g} deg rms ({PurePath(worst).name})")
+    indices = [
+        (abs(pair["predicted"] / pair["measured"] - 1.0), name, key)
+        for name, found in unseen.items()
+        for key, pair in found.items()
+        if isinstance(pair, dict) and pair.get("measured") and pair.get("predicted") is not None
+    ]
+    if indices:
+        error, name, key = max(indices)
+        words = key.removesuffix("_deg").removesuffix("_lengths").replace("_", " ")
+        told.append(f"{words} {100.0 * error:.2g} % ({PurePath(name).name})")
+    return (
+        f"Worst errors on trials held out: {', '.join(told)}." if told else "No trial held out has a heading."
+    )
 
 
 def undetermined(fit: Fit) -> list[str]:
@@ -87,6 +123,54 @@ def exactly_collinear(fit: Fit) -> list[str]:
     ]
 
 
+def _not_corrected(fit: Fit) -> list[str]:
+    """A grey box whose regularisation left nothing of the correction."""
+    reference = (fit.model.provenance or {}).get("reference", {})
+    if "name" not in reference or any(fit.coefficients.values()):
+        return []
+    likeness = reference.get("similarity", {}).get(reference["name"])
+    like = "" if likeness is None else f", with a similarity of {likeness:.2g}"
+    return [
+        f"the model is the bare reference ship {reference['name']!r}{like}: no correction predicted the "
+        "trials held out better, so C = 0; name another reference_model, add trials, or choose another "
+        "structure"
+    ]
+
+
+def _not_refined(provenance: Mapping[str, Any]) -> list[str]:
+    """A refinement that was given up: the model is then its start."""
+    decision = provenance.get("refinement", {}).get("decision", "refined")
+    if decision == "refined":
+        return []
+    return [
+        f"output-error was {decision}: the model is its start, by tls-svm; give a larger pull, shorter "
+        "segments (segment_lengths), or a structure with fewer terms"
+    ]
+
+
+def _shaft_ignored(fit: Fit) -> list[str]:
+    """Trials of different shaft speed, or from rest, under a structure that knows no shaft."""
+    trials = [trial for trial in fit.trials if trial.use == "fit" and "n" in trial]
+    if "n" in fit.model.command_names or not trials or "u" not in fit.model.table.equations:
+        return []
+    speeds = np.concatenate([trial["n"] for trial in trials])
+    spread = float(np.ptp(np.percentile(speeds, [2.5, 97.5]))) / max(abs(float(np.mean(speeds))), 1e-9)
+    way = WAY * fit.model.particulars["speed"]
+    at_rest = [PurePath(trial.name).name for trial in trials if np.hypot(trial["u"][0], trial["v"][0]) < way]
+    if spread <= STEADY and not at_rest:
+        return []
+    rest = (
+        f", and {', '.join(at_rest)} {'starts' if len(at_rest) == 1 else 'start'} from rest"
+        if at_rest
+        else ""
+    )
+    return [
+        f"the shaft speed varies by {100.0 * spread:.0f} % in the trials{rest}, which structure "
+        f"{fit.model.structure!r} does not know; choose one that does, such as cubic, or "
+        "leave these trials out"
+    ]
+
+
 def _lost_headings(fit: Fit) -> list[str]:
     """The trials whose heading the model does not predict, and the likely cause."""
     errors = {
@@ -107,10 +191,11 @@ def _lost_headings(fit: Fit) -> list[str]:
 def _why_lost(model: ShipModel) -> str:
     """The likely cause of a prediction that lost the heading."""
     try:
-        stable = is_course_stable(model)
+        drawn = [model] if model.covariance is None else [model, *model.sample(DRAWS, 0)]
+        unstable = float(np.mean([not is_course_stable(one) for one in drawn]))
     except InputError:
-        stable = False
-    if stable:
+        return "the model, or one drawn from its covariance, has no straight course"
+    if unstable < SURE:
         return "likely the model is taken beyond the manoeuvres that it was fitted to"
     return "a ship that is unstable on a straight course magnifies small errors"
 

@@ -1,20 +1,27 @@
 """The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from shipgym.checks import check_number
+from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
+from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of, worst
 from shipgym.manoeuvres.registry import Manoeuvre
-from shipgym.manoeuvres.stopping import standard_stops
-from shipgym.manoeuvres.turning import standard_circles
-from shipgym.manoeuvres.zigzags import standard_zigzags
+from shipgym.manoeuvres.stopping import StoppingIndices, standard_stops
+from shipgym.manoeuvres.turning import TURN_DEG, standard_circles, turning_indices
+from shipgym.manoeuvres.zigzags import STANDARD_DEG, standard_zigzags, switch_heading_deg, zigzag_indices
 from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.trial import Trial
 
 DRAWS = 100  # of an identified ship
+SURE = 0.975  # of the draws on one side of a limit, from which on a criterion is decided
+OUTSIDE = 1.15  # distance from the trials' envelope, by its size, from which on a manoeuvre is not theirs
+ANGLE_DEG = 1.0  # by which the rudder and heading of a trial may differ from those of the manoeuvre
+SPEED = 0.1  # likewise its approach speed, by that of service
 STOPPING_LIMIT = 15.0  # ship lengths
 LARGE_DISPLACEMENT = (
     "where large displacement makes 15 lengths impracticable, the Administration may allow up to 20"
@@ -25,14 +32,21 @@ LARGE_DISPLACEMENT = (
 class Criterion:
     """One criterion; the worse of both sides counts."""
 
-    value: float | None  # in `unit`; None where the manoeuvre never got so far
+    value: float | None  # of the model, in `unit`; None where the manoeuvre never got so far
     limit: float  # largest value allowed
-    passed: bool | None  # None where the ship's equations do not allow the test; `note` says why
+    passed: (
+        bool | None
+    )  # None where it is not decided, or the ship's equations do not allow the test: see `note`
     unit: str  # "ship lengths" or "deg"
     source: str  # paragraph of the annex of MSC.137(76)
     # the value over models drawn from the covariance of an identified ship
     drawn: IndexInterval | None = None
     note: str = ""  # remarks
+    #: whether there is a verdict: by a measured trial, or by a model within the envelope of its trials, with
+    #: the interval on one side of the limit
+    decided: bool = True
+    measured: float | None = None  # of a trial that is the manoeuvre; it goes before the model's
+    manoeuvre: str = ""  # such as "35 deg turn", with the rudder's limit where that is less
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -46,11 +60,21 @@ class Criterion:
             return None
         return float(np.mean(self.drawn.values <= self.limit))  # NaN is not
 
+    @property
+    def probability(self) -> float | None:
+        """Of passing: 1 or 0 where it was measured, the share of the draws otherwise; None if not decided."""
+        if not self.decided:
+            return None
+        return self.share_passed if self.measured is None else float(bool(self.passed))
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON knows it."""
         fields: dict[str, Any] = {
+            "manoeuvre": self.manoeuvre,
             "value": self.value,
+            "measured": self.measured,
             "limit": self.limit,
+            "decided": self.decided,
             "passed": self.passed,
             "unit": self.unit,
             "source": self.source,
@@ -58,9 +82,8 @@ class Criterion:
         if self.note:
             fields["note"] = self.note
         if self.drawn is not None and len(self.drawn.values):
-            low, median, high = self.drawn.quantiles(0.05, 0.5, 0.95)
-            fields |= {"probability": self.share_passed, "interval_95": self.interval}
-            fields |= {"quantile_05": low, "median": median, "quantile_95": high}
+            (median,) = self.drawn.quantiles(0.5)
+            fields |= {"probability": self.probability, "interval_95": self.interval, "median": median}
             fields |= {"draws": len(self.drawn.values), "ran_away": self.drawn.n_ran_away}
             fields |= {"without_value": int(np.isnan(self.drawn.values).sum())}
         return fields
@@ -120,14 +143,17 @@ def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
 def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterval]]) -> dict[str, Criterion]:
     """The criteria of a ship from the indices of her standard manoeuvres, by their names.
 
-    A manoeuvre that never got so far fails its criteria.
+    A manoeuvre that never got so far fails its criteria. Of an identified ship a criterion is decided only
+    where the manoeuvre is within the envelope of her trials and the draws are on one side of the limit.
     """
     needed = imo_manoeuvres(model)
+    beyond = {name for name, test in needed.items() if name in found and _outside(model, test)}
     first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
 
     def worst_of(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
-        runs = [run for name, run in found.items() if name in needed and name.startswith(manoeuvre)]
-        return _criterion(runs, index, limit, unit, paragraph)
+        names = [name for name in found if name in needed and name.startswith(manoeuvre)]
+        one = _criterion([found[name] for name in names], index, limit, unit, paragraph)
+        return _decided(one, trial_in_words(model, manoeuvre), bool(beyond & set(names)))
 
     return {
         "advance": worst_of("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
@@ -140,6 +166,92 @@ def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterva
         "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
         "stopping": _stopping(model, found.get("crash stop")),
     }
+
+
+def with_measured(
+    criteria: Mapping[str, Criterion], model: ShipModel, trials: Sequence[Trial]
+) -> dict[str, Criterion]:
+    """The criteria of a ship, decided by her trials where one of them is the manoeuvre; the worst counts.
+
+    `trials`: as recorded; those of another rudder angle, heading or approach speed count for nothing.
+    """
+    found: dict[str, list[float]] = {}
+    for trial in trials:
+        for name, value in _measured(model, trial).items():
+            found.setdefault(name, []).append(value)
+    decided = dict(criteria)
+    for name, values in found.items():
+        if name in criteria:
+            worst_one, passed = max(values), max(values) <= criteria[name].limit
+            decided[name] = replace(criteria[name], measured=worst_one, decided=True, passed=passed, note="")
+    return decided
+
+
+def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
+    """The criteria that a trial measures, by name; none where it is not one of the manoeuvres."""
+    speed, length = model.particulars["speed"], model.particulars["length"]
+    start = float(np.hypot(trial["u"][0], trial["v"][0])) if "u" in trial and "v" in trial else 0.0
+    if trial.kind not in ("zigzag", "turning-circle") or abs(start - speed) > SPEED * speed:
+        return {}
+    values: dict[str, float | None] = {}
+    try:
+        angle = float(np.degrees(np.percentile(np.abs(rudder(trial)), 75)))
+        if trial.kind == "zigzag":
+            heading, indices = switch_heading_deg(trial) or 0.0, zigzag_indices(trial, length)
+            for usual in (
+                one for one in STANDARD_DEG if max(abs(angle - one), abs(heading - one)) <= ANGLE_DEG
+            ):
+                values[f"overshoot_1_{usual:.0f}_{usual:.0f}"] = indices.overshoot_1_deg
+                if usual == STANDARD_DEG[0]:
+                    values["overshoot_2_10_10"] = indices.overshoot_2_deg
+                    values["initial_turning"] = indices.initial_turning_lengths
+        elif abs(angle - min(TURN_DEG, model.steering.rudder_limit_deg)) <= ANGLE_DEG:
+            circle = turning_indices(trial, length)
+            values = {
+                "advance": circle.advance_lengths,
+                "tactical_diameter": circle.tactical_diameter_lengths,
+            }
+    except InputError:  # a channel such as the position is missing
+        return {}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
+    """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
+    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    return (
+        f"{full:g} deg turn"
+        if manoeuvre == "turning circle"
+        else manoeuvre.replace("zigzag ", "") + " zigzag"
+    )
+
+
+def _outside(model: ShipModel, test: Manoeuvre) -> bool:
+    """Whether a manoeuvre leaves the envelope of the trials, in a turn up to 180 degrees of heading."""
+    if model.envelope is None or test.outcome is StoppingIndices:
+        return False
+    try:
+        run = test.sail(model)
+    except (UnstableModelError, ManoeuvreError):
+        return True
+    turned = np.abs(run["psi"] - run["psi"][0]) > np.pi
+    last = int(np.argmax(turned)) if turned.any() else len(run.t)
+    states = (run[c][:last] if c in run else np.zeros(last) for c in ("u", "v", "r", "delta"))
+    return bool(model.envelope.distance(*states).max() > OUTSIDE)
+
+
+def _decided(criterion: Criterion, manoeuvre: str, outside: bool) -> Criterion:
+    """The criterion without verdict where the trials do not decide it, and the trial that would."""
+    criterion, drawn = replace(criterion, manoeuvre=manoeuvre), criterion.drawn
+    why = "it is outside the envelope of the trials" if outside else None
+    if why is None and drawn is not None and len(drawn.values):
+        failed = float(np.mean(~(drawn.values <= criterion.limit) & ~drawn.ran_away))
+        if max(criterion.share_passed or 0.0, failed) < SURE:
+            why = "the models drawn lie on both sides of the limit"
+    if why is None:
+        return criterion
+    note = f"not decided by these trials: {why}; run a {manoeuvre} to both sides"
+    return replace(criterion, passed=None, decided=False, note=note)
 
 
 def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
@@ -173,4 +285,5 @@ def _stopping(model: ShipModel, stop: Mapping[str, IndexInterval] | None) -> Cri
     if "n" not in model.command_names:
         why = "its thrust is inside its surge coefficients, so it cannot be ordered astern"
     note = f"not assessable: {why}"
-    return Criterion(None, STOPPING_LIMIT, None, "ship lengths", "MSC.137(76), annex, 5.3.4", None, note)
+    source = "MSC.137(76), annex, 5.3.4"
+    return Criterion(None, STOPPING_LIMIT, None, "ship lengths", source, note=note, decided=False)

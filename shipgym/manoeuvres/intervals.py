@@ -70,12 +70,13 @@ class IndexInterval:
         text = "-" if self.value is None else f"{self.value:.4g}"
         if self.interval is not None:
             text += f" [{self.interval[0]:.4g}, {self.interval[1]:.4g}]"
-        lost = [
-            f"{count} of {len(self.values)} draws {what}"
-            for count, what in ((self.n_ran_away, "ran away"), (self.n_never_reached, "never got so far"))
-            if count
-        ]
-        return text + (f" ({', '.join(lost)})" if lost else "")
+        return text + (f" ({self.lost_in_words})" if self.lost_in_words else "")
+
+    @property
+    def lost_in_words(self) -> str:
+        """How many draws have no value, which are not in the interval; empty where all have one."""
+        lost = ((self.n_ran_away, "ran away"), (self.n_never_reached, "never got so far"))
+        return ", ".join(f"{count} of {len(self.values)} draws {what}" for count, what in lost if count)
 
 
 def index_intervals(

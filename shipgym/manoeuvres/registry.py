@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from shipgym.checks import check_text
-from shipgym.errors import InputError
+from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.ship_model import ShipModel
-from shipgym.trials.trial import KINDS
+from shipgym.trials.trial import KINDS, Trial
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 LENGTHS = 40.0  # duration of a standard zigzag or turning circle, in times to travel one ship length
 STEPS_PER_LENGTH = 50  # of their simulation
+FASTEST = 1.5  # speed by that of service that no manoeuvre at service power exceeds
+QUICKEST_TURN = 3.0  # likewise the yaw rate by U / L
 SIDES = (("starboard", 1.0), ("port", -1.0))
 
 
@@ -52,8 +54,25 @@ class Manoeuvre:
         return dict.fromkeys(field.name for field in fields(self.outcome))
 
     def evaluate(self, model: ShipModel) -> Any:
-        """The indices of a ship in this manoeuvre."""
-        return self.indices(self.sail(model))
+        """The indices of a ship in this manoeuvre; UnstableModelError where she does what no ship can."""
+        sailed = self.sail(model)
+        if isinstance(sailed, Trial):
+            _check_physical(model, sailed)
+        return self.indices(sailed)
+
+
+def _check_physical(model: ShipModel, trial: Trial) -> None:
+    """Refuse a run beyond every speed and yaw rate of a ship at service power, short of overflow."""
+    speed, length = model.particulars["speed"], model.particulars["length"]
+    for name, most in (("u", FASTEST * speed), ("v", speed), ("r", QUICKEST_TURN * speed / length)):
+        if name in trial and np.abs(trial[name]).max() > most:
+            k = int(np.argmax(np.abs(trial[name]) > most))
+            last = {channel: float(values[k]) for channel, values in trial.channels.items()}
+            raise UnstableModelError(
+                f"model {model.name!r} runs away after {trial.t[k]:.1f} s ({name} = {trial[name][k]:.3g})",
+                float(trial.t[k]),
+                last,
+            )
 
 
 class Variants(Protocol):

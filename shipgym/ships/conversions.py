@@ -10,7 +10,8 @@ keeps her speed. From Nomoto's form sway cannot come back: two ships that drift 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,6 +35,7 @@ from shipgym.ships.steering import SteeringGear
 if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
 
+Known = Particulars | Mapping[str, Any]
 
 __all__ = [
     "Nomoto", "StraightRunning", "linear_steering_ship", "linearise", "nomoto", "nomoto1_ship",
@@ -92,7 +94,7 @@ def transfer_function(form: Nomoto, order: int = 2) -> TransferFunction:
 
 
 def nomoto1_ship(
-    K: float, T: float, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto"
+    K: float, T: float, particulars: Known, steering: SteeringGear | None = None, name: str = "nomoto"
 ) -> ShipModel:
     """The ship of Nomoto's first-order form, T rdot + r = K delta, as a model of structure `nomoto`.
 
@@ -102,11 +104,11 @@ def nomoto1_ship(
     """
     _check_effect(check_number(K, "K") * check_number(T, "T"), "K and T")
     coefficients = {"c_r": -1.0 / T, "c_d": K / T}
-    return ShipModel(name, "nomoto", particulars, steering or SteeringGear(), coefficients)
+    return ShipModel(name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients)
 
 
 def nomoto2_ship(
-    form: Nomoto, particulars: Particulars, steering: SteeringGear | None = None, name: str = "nomoto2"
+    form: Nomoto, particulars: Known, steering: SteeringGear | None = None, name: str = "nomoto2"
 ) -> ShipModel:
     """The ship of Nomoto's second-order form, of structure `nomoto2`: she does not drift. T is not used.
 
@@ -122,13 +124,13 @@ def nomoto2_ship(
         "e_r": -1.0 / product,
         "e_d": form.K / product,
     }
-    return ShipModel(name, "nomoto2", particulars, steering or SteeringGear(), coefficients)
+    return ShipModel(name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients)
 
 
 def linear_steering_ship(
     A: ArrayLike,
     B: ArrayLike,
-    particulars: Particulars,
+    particulars: Known,
     steering: SteeringGear | None = None,
     name: str = "linear-steering",
 ) -> ShipModel:
@@ -138,14 +140,20 @@ def linear_steering_ship(
     them; at another speed her derivatives follow by the prime system. Raises InputError for other shapes or
     values that are not finite.
     """
-    a, b = prime_matrices(A, B, particulars.require("length"), particulars.require("speed"))
+    ship = _ship(particulars)
+    a, b = prime_matrices(A, B, ship.require("length"), ship.require("speed"))
     rows = np.hstack([a, b])
     coefficients = {
         f"{equation}_{term}": float(rows[i, j])
         for i, equation in enumerate("bc")
         for j, term in enumerate("vrd")
     }
-    return ShipModel(name, "linear-steering", particulars, steering or SteeringGear(), coefficients)
+    return ShipModel(name, "linear-steering", ship, steering or SteeringGear(), coefficients)
+
+
+def _ship(particulars: Known) -> Particulars:
+    """Particulars, made of a mapping where they are one, as `identify` takes them."""
+    return particulars if isinstance(particulars, Particulars) else Particulars.from_mapping(particulars)
 
 
 def prime_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:

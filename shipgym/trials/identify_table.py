@@ -226,6 +226,10 @@ class Options:
         },
     )  # fmt: skip
 
+    model_error: bool = _uncertainty(
+        FLAG, "whether the covariance is scaled until trials left out in turn are predicted within it", True
+    )
+
     prior: Any = _prior(
         TEXT, "what the coefficients are pulled to: a reference ship at this ship's scale (auto, a name or a "
         "file), or the regression formulas clarke or kijima", common=True,

@@ -95,7 +95,7 @@ def test_the_options_tested_and_the_rest_are_all_there_are():
         "anchor",
         "anchor_weight",
     }
-    extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method"}
+    extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method", "model_error"}
     assert known | of_grey_box | of_refinement | extra == OPTIONS.keys()
 
 

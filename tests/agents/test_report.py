@@ -201,10 +201,10 @@ def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown
 
 
-def test_a_band_goes_from_5_to_95_per_cent():
+def test_a_band_is_the_95_per_cent_interval():
     t, values = np.arange(3.0), np.linspace(0.0, 1.0, 101)[:, None] * np.ones(3)
     (drawn,) = band(t, values, "draws", "#1d70b8")
-    assert np.asarray(drawn.y, dtype=float) == pytest.approx([0.95] * 3 + [0.05] * 3)
+    assert np.asarray(drawn.y, dtype=float) == pytest.approx([0.975] * 3 + [0.025] * 3)
 
 
 def test_a_translucent_colour():

@@ -1,0 +1,196 @@
+"""How often the 95 % intervals of the standard indices hold the truth, on ships of other equations.
+
+    python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]
+
+prints the table of docs/certainty.md.
+
+Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is put through sea
+trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides, and for half of the cases a 35
+degree turn to starboard too. She is identified by structures that are not hers. The indices of models drawn
+are compared with her own: advance and tactical diameter to both sides, overshoots and initial turning of
+the zigzags.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+from joblib import Parallel, delayed
+
+ROOT = Path(__file__).parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+import shipgym  # noqa: E402 - the folder above has to be found first
+from identification import identify  # noqa: E402
+from shipgym import ShipModel, Trial  # noqa: E402
+from shipgym.manoeuvres import Manoeuvre, turning_circle, zigzag  # noqa: E402
+from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
+from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of  # noqa: E402
+from shipgym.trials.sensors import Sensors  # noqa: E402
+from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
+
+Value = TypeVar("Value")
+Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
+
+SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
+STRUCTURES = ("abkowitz", "cubic")
+OWN = {"mariner": "abkowitz"}  # the structure that a ship is made of
+TRIALS = ("zigzags", "zigzags and turn")
+INDICES = (
+    "advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg", "overshoot_2_deg",
+    "initial_turning_lengths",
+)  # fmt: skip
+
+
+def ship_of(name: str) -> ShipModel:
+    """A ship by name, the truth behind the trials."""
+    return mmg_ship(name) if name in MMG_SHIPS else shipgym.load_model(name)
+
+
+def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
+    """Her trials as sensors log them; a ship without a shaft logs a steady one."""
+    travel = ship.particulars["length"] / ship.particulars["speed"]
+    dt = min(0.25, travel / 80.0)
+    runs = [
+        zigzag(ship, angle, angle, port, 35.0 * travel, dt).with_(
+            name=f"{angle:.0f} {'port' if port else 'starboard'}"
+        )
+        for angle in (10.0, 20.0)
+        for port in (False, True)
+    ]
+    if kind == TRIALS[1]:
+        runs.append(turning_circle(ship, 35.0, 25.0 * travel, dt).with_(name="turn to starboard"))
+    sensors = Sensors(sampling_s=max(min(1.0, travel / 20.0), dt))
+    steady = np.full(len(runs[0].t), 1.0)
+    return [
+        sensors.measure(
+            run
+            if "n" in run
+            else Trial(
+                run.t, {**run.channels, "n": np.resize(steady, len(run.t))}, name=run.name, kind=run.kind
+            ),
+            100 * seed + k,
+        )
+        for k, run in enumerate(runs)
+    ]
+
+
+def standard_tests(ship: ShipModel) -> dict[str, Manoeuvre]:
+    """The manoeuvres whose indices are compared."""
+    return {name: one for name, one in imo_manoeuvres(ship).items() if "stop" not in name}
+
+
+def true_indices(ship: ShipModel) -> Key[float]:
+    """Indices of a ship, by manoeuvre and name."""
+    found = {run: attempt(one.evaluate, ship)[0] for run, one in standard_tests(ship).items()}
+    return {
+        (run, name): indices[name] for run, indices in found.items() for name in INDICES if name in indices
+    }
+
+
+def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
+    """The same indices of a model, with their intervals over models drawn from its covariance."""
+    tests = standard_tests(model)
+    own = {run: one.no_indices for run, one in tests.items()}
+    found = intervals_of(own, model.sample(draws, seed), {run: one.evaluate for run, one in tests.items()})
+    return {
+        (run, name): one for run, indices in found.items() for name, one in indices.items() if name in INDICES
+    }
+
+
+def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
+    """Whether each interval holds the truth."""
+    return {
+        key: one.interval is not None and one.interval[0] <= truth[key] <= one.interval[1]
+        for key, one in found.items()
+    }
+
+
+def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[str, object]:
+    """Coverage of one case without and with model error: lists of whether an interval holds the truth."""
+    warnings.simplefilter("ignore")
+    ship = ship_of(name)
+    result = identify(
+        sea_trials(ship, kind, seed),
+        structure=structure,
+        particulars=ship.particulars,
+        steering=ship.steering,
+    )
+    row: dict[str, object] = {"ship": name, "structure": structure, "trials": kind, "seed": seed}
+    if not result.stable:
+        return row | {"unstable": True}
+    factor = result.model.provenance["model_error"]["factor"]
+    truth = true_indices(ship)
+    for label, size in (("noise", factor**-2), ("all", 1.0)):
+        found = index_intervals(replace(result.model, covariance=size * result.model.covariance), draws)
+        row[label] = holds(found, truth)
+        row[f"{label} ran away"] = float(np.mean([one.ran_away.mean() for one in found.values()]))
+        widths = [np.ptp(one.interval) / 2.0 / truth[key] for key, one in found.items() if one.interval]
+        row[f"{label} width"] = float(np.median(widths))
+    return row | {"factor": factor}
+
+
+def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
+    """Per cent of the intervals that hold the truth, of manoeuvres whose name begins so."""
+    held = [one for row in rows for key, one in row[label].items() if key[0].startswith(part)]
+    return f"{100.0 * np.mean(held):.0f}" if held else "-"
+
+
+def table(rows: Sequence[dict[str, object]]) -> str:
+    """The table, in Markdown: a row for each ship and trials, and one for all."""
+    groups = {f"{ship}, {kind}": [r for r in rows if (r["ship"], r["trials"]) == (ship, kind)]
+              for ship in SHIPS for kind in TRIALS}  # fmt: skip
+    for kind in TRIALS:
+        groups[f"**all, {kind}**"] = [row for row in rows if row["trials"] == kind]
+    groups["**all**"] = list(rows)
+    lines = [
+        "| ship, trials | models | factor | noise only, % | with model error, % | "
+        "of these zigzags, turns, % | half-width, % | draws run away, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for name, group in groups.items():
+        known = [row for row in group if "factor" in row]
+        if not known:
+            continue
+        factors = [float(row["factor"]) for row in known]
+        width, lost = (100.0 * np.mean([row[f"all {one}"] for row in known]) for one in ("width", "ran away"))
+        unstable = f" ({len(group) - len(known)} unstable)" if len(known) < len(group) else ""
+        lines.append(
+            f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
+            f"{share(known, 'noise')} | {share(known, 'all')} | "
+            f"{share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
+            f"{width:.0f} | {lost:.0f} |"
+        )
+    return "\n".join(lines)
+
+
+def main() -> None:
+    """Run all cases and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--seeds", type=int, default=3, help="of the noise")
+    parser.add_argument("--draws", type=int, default=40, help="models drawn")
+    parser.add_argument("--ships", default=",".join(SHIPS), help="with commas between")
+    parser.add_argument("--workers", type=int, default=2)
+    given = parser.parse_args()
+    cases = [
+        (ship, structure, kind, seed, given.draws)
+        for ship in given.ships.split(",")
+        for structure in STRUCTURES
+        if OWN.get(ship) != structure
+        for kind in TRIALS
+        for seed in range(given.seeds)
+    ]
+    rows = Parallel(n_jobs=given.workers, verbose=5)(delayed(case)(*one) for one in cases)
+    print(table(rows))
+
+
+if __name__ == "__main__":
+    main()

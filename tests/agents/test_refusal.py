@@ -1,0 +1,130 @@
+"""Designs that are refused: no controller file, the reason and the trial that would help."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from agents import PID
+from agents.cli import standard_trials as module
+from agents.cli.standard_trials import standard_trials
+from agents.verification import chain as links
+from agents.verification import refusal
+from agents.verification.chain import build_autopilot
+from agents.verification.page import verification_view
+from agents.verification.refusal import lost_control, rudder_effect, why_refused
+from agents.verification.result import verification_metrics
+from identification.design.experiment import advise
+from shipgym import InputError, UnstableModelError, load_model
+from shipgym.manoeuvres.standard import families_of
+from shipgym.ships.conversions import nomoto1_ship
+
+
+class Changed:
+    """A fit with another model."""
+
+    def __init__(self, fit, model):
+        self.model, self.trials = model, fit.trials
+
+
+@pytest.fixture
+def fit(chain):
+    return chain[1].identification
+
+
+def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
+    assert why_refused(fit) is None
+    assert rudder_effect([t for t in fit.trials if t.use == "fit"], fit.model) > 10.0
+
+
+def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
+    turned = {name: -value if name in ("N_d", "Y_d") else value for name, value in fit.coefficients.items()}
+    said = why_refused(Changed(fit, replace(fit.model, coefficients=turned)))
+    assert said.startswith("at low frequency the model's rudder turns the ship to the other side")
+    assert " to both sides" in said.partition("; run a ")[2]
+
+
+def test_a_damping_that_drives_the_motion_is_refused(fit):
+    wrong = replace(
+        fit.model, coefficients=fit.coefficients | {"N_r": 0.004}, covariance=1e-4 * fit.model.covariance
+    )
+    assert "yaw damping (N_r) has the sign of a force that drives" in why_refused(Changed(fit, wrong))
+
+
+def test_an_autopilot_may_lose_one_in_twenty_of_the_models_drawn():
+    assert lost_control(np.arange(40) < 2) is None
+    assert lost_control(np.arange(40) < 3) == "it loses control of 3 of 40 models drawn"
+
+
+def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch):
+    result = chain[1]
+    monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
+    found, why = links._decided(result.verification, result.identification)
+    assert set(found.refused) == {"pid", "lq"}
+    refused = replace(result, verification=found, refusal=why)
+    links._write(refused, tmp_path / "report")
+    names = sorted(path.name for path in (tmp_path / "report").iterdir())
+    assert names == ["metrics.json", "model.json", "report.html"]
+    assert json.loads((tmp_path / "report" / "metrics.json").read_text())["refusal"] == why
+    assert "No autopilot is given: " in (tmp_path / "report" / "report.html").read_text()
+
+
+def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatch):
+    monkeypatch.setattr(links, "why_refused", lambda fit: "its steering is wrong; run a turn")
+    result = build_autopilot(demo, tmp_path / "report", draws=2)
+    assert result.stable
+    names = sorted(path.name for path in (tmp_path / "report").iterdir())
+    assert names == ["metrics.json", "report.html"]
+    page = (tmp_path / "report" / "report.html").read_text()
+    assert "No autopilot is given: its steering is wrong; run a turn" in page
+    assert "Worst errors on trials held out: " in page
+
+
+def test_gains_have_one_sign_in_report_and_metrics(chain):
+    found = chain[1].verification
+    shown = {name: gains for name, _, gains in verification_view(found)["gains"]}
+    told = verification_metrics(found)["controllers"]
+    names = list(verification_view(found)["designs"])
+    assert dict(shown["yaw rate"])["derivative"] == told["pid"]["gains"]["derivative"]
+    assert shown["yaw rate"][names.index("LQ")] == ("yaw_rate", told["lq"]["gains"]["yaw_rate"])
+
+
+def test_one_manoeuvre_that_fails_does_not_lose_the_others(monkeypatch):
+    ship = load_model("mariner")
+
+    def fails(model):
+        raise UnstableModelError("runs away", 1.0, {})
+
+    families = families_of(ship)
+    sailed = {name: families[name] for name in ("zigzags", "circles")}
+    spirals = {name: replace(one, sail=fails) for name, one in families["spirals"].items()}
+    monkeypatch.setattr(module, "families_of", lambda *_: {**sailed, "spirals": spirals})
+    found = standard_trials(ship)
+    assert found.refused == {"direct spiral": "runs away"}
+    assert found.indices["zigzag 20/20, starboard first"]["overshoot_1_deg"].value == pytest.approx(
+        7.8, abs=0.1
+    )
+    monkeypatch.setattr(module, "families_of", lambda *_: {"spirals": spirals})
+    with pytest.raises(UnstableModelError):
+        standard_trials(ship)
+
+
+def test_an_unstable_design_names_the_options_to_change():
+    with pytest.raises(InputError, match=r"shorter control interval dt, and a lower frequency \(PID\)"):
+        PID.from_model(load_model("mariner"), frequency=0.01, damping=20.0, dt=30.0)
+
+
+def test_nomotos_ship_takes_particulars_as_a_mapping():
+    ship = nomoto1_ship(0.1, 20.0, {"length": 100.0, "speed": 7.0})
+    assert ship.particulars.length == 100.0
+    with pytest.raises(InputError, match="expected a table"):
+        nomoto1_ship(0.1, 20.0, 100.0)
+
+
+def test_advice_is_not_about_a_coefficient_near_zero(fit):
+    used = [trial for trial in fit.trials if trial.use == "fit"]
+    tiny = replace(fit.model, coefficients=fit.coefficients | {"N_0u": 1e-12})
+    found = advise(tiny, used, {"zigzag": lambda ship: used[0]})
+    assert max(found.before, key=lambda name: found.before[name]) == "N_0u"
+    assert found.coefficient != "N_0u"

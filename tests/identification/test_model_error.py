@@ -1,0 +1,137 @@
+"""Standard errors that cover what a structure misses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from certainty import case
+
+from identification import IdentificationResult, Samples, identify
+from identification.estimators.methods import METHODS, fit_all, get_method
+from identification.estimators.rm_svm import RMSVM
+from identification.regression.grey_box import chosen_box
+from identification.uncertainty.model_error import DEFAULT, scale_of, without_trial
+from identification.validation.closed_loop import closed_loop
+from identification.validation.prediction import predict
+from identification.validation.warnings import _not_corrected, _not_refined, _shaft_ignored, held_out_error
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import zigzag, zigzag_indices
+from tests.ships.mmg import mmg_ship
+
+
+def made_up(n: int = 60) -> Samples:
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((n, 4))
+    y = X @ [1.0, -2.0, 0.5, 0.0] + 0.1 * rng.standard_normal(n)
+    return Samples({"r": X}, {"r": y}, np.arange(n, dtype=float), np.ones(n), np.arange(n) * 3 // n, 1)
+
+
+@pytest.mark.parametrize("method", ["ls", "ridge", "ls-svm"])
+def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(method: str) -> None:
+    samples = made_up()
+    found, rest = without_trial(fit_all(METHODS[method].estimator, samples), samples, 1)
+    anew = fit_all(get_method("ls").estimator if method == "ls" else METHODS[method].estimator, rest)
+    np.testing.assert_allclose(found["r"].coef_, anew["r"].coef_, rtol=1e-4)
+    assert len(rest) == 40
+
+
+def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -> None:
+    rng = np.random.default_rng(0)
+    variance, noise = rng.uniform(0.5, 2.0, 4000), rng.uniform(0.0, 4.0, 4000)
+    errors = rng.standard_normal(4000) * np.sqrt(9.0 * variance + noise)
+    assert scale_of(list(zip(errors**2, variance, noise, strict=True))) == pytest.approx(3.0, rel=0.05)
+
+
+def test_intervals_hold_the_truth_of_a_ship_of_other_equations() -> None:
+    """An MMG ship by Abkowitz' structure: noise alone explains half of the error (scripts/certainty.py)."""
+    row = case("kcs", "abkowitz", "zigzags and turn", seed=0, draws=25)
+    assert np.mean(list(row["all"].values())) >= 0.85
+    assert np.mean(list(row["noise"].values())) <= 0.7
+    assert row["factor"] > 2.0
+
+
+def test_the_covariance_in_the_model_is_the_scaled_one(mariner: ShipModel, noisy_trials: list[Trial]) -> None:
+    given = {"particulars": mariner.particulars, "steering": mariner.steering}
+    scaled = identify(noisy_trials, **given)
+    bare = identify(noisy_trials, **given, model_error=False)
+    error = scaled.model.provenance["model_error"]
+    assert 1.0 <= error["factor"] < 4.0  # her own structure
+    assert error["trials"] == 3
+    np.testing.assert_allclose(scaled.model.covariance, error["factor"] ** 2 * bare.model.covariance)
+    assert "model_error" not in bare.model.provenance
+    assert "scaled by" in scaled.summary()
+
+
+def test_too_few_trials_have_the_documented_factor(cao_fit: IdentificationResult) -> None:
+    error = cao_fit.model.provenance["model_error"]
+    assert error == {"factor": DEFAULT, "how": "assumed: too few trials to leave one out (1)"}
+
+
+def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipModel) -> None:
+    """Three tenths of a degree of helm hardly move overshoots where the rudder is reversed at headings."""
+    run = zigzag(mariner, 10, 10, duration=500, dt=0.5)
+    moved = run["delta"] + np.radians(0.3)
+    kept = {name: run[name] for name in ("x", "y", "psi", "u", "v", "r")}
+    trial = Trial(run.t, {**kept, "delta": moved}, kind="zigzag", name="z")
+    again, straight = closed_loop(mariner, trial), predict(mariner, trial)
+    truth, found, open_loop = (zigzag_indices(one, 160.93, 10.0) for one in (run, again, straight))
+    error = abs(found.overshoot_2_deg - truth.overshoot_2_deg)
+    assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.25)
+    assert error < 0.4
+    assert error < 0.5 * abs(open_loop.overshoot_2_deg - truth.overshoot_2_deg)
+
+
+def test_the_worst_errors_on_trials_held_out_are_said(noisy_fit: IdentificationResult) -> None:
+    said = held_out_error(noisy_fit)
+    assert said.startswith("Worst errors on trials held out: heading ")
+    assert "(zigzag_15_15)" in said
+    overshoot = noisy_fit.metrics["trials"]["zigzag_15_15"]["overshoot_1_deg"]
+    assert overshoot["closed_loop"] == pytest.approx(overshoot["measured"], abs=0.5)
+
+
+def test_a_reference_ship_that_is_like_no_ship_at_hand_is_refused() -> None:
+    still = Trial(np.arange(3.0), {c: np.zeros(3) for c in ("u", "v", "r", "delta", "n")}, name="t")
+    with pytest.raises(InputError, match=r"'auto' found, but none is like this ship; .* similarity of 0\.04"):
+        chosen_box("auto", mmg_ship("seiun-maru").particulars, [still])
+
+
+def test_a_correction_left_out_has_an_uncertainty_and_is_said() -> None:
+    samples = made_up()
+    bare = RMSVM(C=0.0).fit(samples.features["r"], samples.targets["r"])
+    assert not bare.coef_.any()
+    assert np.all(np.diag(bare.inverse_moment_) > 0.0)
+
+
+class Found:
+    """As much of a fit as a warning looks at."""
+
+    def __init__(self, model: ShipModel, **more: object) -> None:
+        self.model, self.coefficients = model, model.coefficients
+        self.__dict__.update(more)
+
+
+def test_the_bare_reference_is_said_with_its_similarity(mariner: ShipModel) -> None:
+    known = {"reference": {"name": "tanker", "similarity": {"tanker": 0.6}}}
+    none = replace(mariner, coefficients=dict.fromkeys(mariner.coefficients, 0.0), provenance=known)
+    assert "bare reference ship 'tanker', with a similarity of 0.6" in _not_corrected(Found(none))[0]
+    assert not _not_corrected(Found(replace(none, coefficients=mariner.coefficients)))
+
+
+def test_a_refinement_that_was_given_up_is_said() -> None:
+    said = _not_refined({"refinement": {"decision": "not refined: it runs away"}})
+    assert "output-error was not refined: it runs away: the model is its start" in said[0]
+    assert not _not_refined({"refinement": {"decision": "refined"}})
+
+
+def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> None:
+    t = np.arange(10.0)
+    channels = {"u": 0.0 * t, "v": 0.0 * t, "n": 1.0 + 0.05 * t}
+    trial = Trial(t, channels, name="acceleration.csv", use="fit")
+    said = _shaft_ignored(Found(mariner, trials=[trial]))[0]
+    assert "the shaft speed varies by" in said
+    assert "acceleration.csv starts from rest" in said
+    assert "such as cubic" in said
+    steady = Trial(t, {"u": 0.0 * t + 7.7, "v": 0.0 * t, "n": 0.0 * t + 1.0}, name="z.csv", use="fit")
+    assert not _shaft_ignored(Found(mariner, trials=[steady]))
