@@ -28,6 +28,20 @@ ABKOWITZ = Structure(
     equations={"u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"), "v": SWAY_AND_YAW, "r": SWAY_AND_YAW},
 )
 
+FULL_SWAY_AND_YAW = prime_terms(
+    "0 0u 0uu v r d uv ur ud vvv vvr vrr rrr vvd vrd rrd vdd rdd ddd uuv uur uud"
+)
+ABKOWITZ_FULL = Structure(
+    name="abkowitz-full",
+    source="Abkowitz 1964, Lectures on ship hydrodynamics, steering and manoeuvrability: the Taylor expansion "
+    "to third order, all products that port and starboard symmetry allows, and the asymmetry terms 0, 0u, 0uu",
+    equations={
+        "u": prime_terms("u uu uuu vv rr dd vr vd rd uvv urr udd uvr uvd urd"),
+        "v": FULL_SWAY_AND_YAW,
+        "r": FULL_SWAY_AND_YAW,
+    },
+)
+
 
 def accelerations(name: str, source: str, normalisation: str = "si", **formulas: str) -> Structure:
     """A structure of accelerations from the formulas of its equations `u`, `v`, `r`."""
@@ -123,7 +137,7 @@ STRUCTURES: dict[str, Structure] = {
     structure.name: structure
     for structure in (
         NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
-        ABKOWITZ, CUBIC, MMG_4DOF, PMM38, PMM18,
+        ABKOWITZ, ABKOWITZ_FULL, CUBIC, MMG_4DOF, PMM38, PMM18,
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)
