@@ -227,7 +227,7 @@ def test_a_missing_shaft_speed_is_named() -> None:
 
 
 def test_full_third_order_has_every_product_that_symmetry_allows_and_holds_an_unstable_ships_turn() -> None:
-    """The tanker, of other equations and unstable on course: 0.3 deg of heading for 11 without v r^2 and kin."""
+    """The tanker, of other equations and unstable on course: 0.3 deg of heading, 11 by the Mariner form."""
     table = get_structure("abkowitz-full")
     odd = {"v", "r", "delta"}
     for q, parity in (("u", 0), ("v", 1), ("r", 1)):
