@@ -13,7 +13,7 @@ from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
-from shipgym.ships import ShipModel
+from shipgym.ships import ShipModel, Structure
 from shipgym.ships.simulate import LONGEST_STEP
 from shipgym.trials.trial import Trial
 
@@ -42,8 +42,15 @@ class Segment:
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Channels whose residuals are minimised: velocities that the model has equations of, and heading."""
-    heading = "r" in model.table.equations and all("psi" in trial for trial in trials)
-    return tuple(model.table.equations) + (("psi",) if heading else ())
+    velocities = _velocities(model)
+    heading = "r" in velocities and all("psi" in trial for trial in trials)
+    return velocities + (("psi",) if heading else ())
+
+
+def _velocities(model: ShipModel) -> tuple[str, ...]:
+    """Those that the model has equations of."""
+    table = model.dynamics
+    return tuple(table.equations) if isinstance(table, Structure) else ("u", "v", "r")
 
 
 def cut(
@@ -93,7 +100,7 @@ def _states(trial: Trial, model: ShipModel, smooth: Callable[[Floats, Floats], F
 
 
 def _rudder(trial: Trial, model: ShipModel) -> Rudder:
-    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in model.table.equations))
+    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in _velocities(model)))
     delta = trial["delta"]
     return straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
 
@@ -192,8 +199,8 @@ class Shooter:
             nominal, slopes = self._slopes(parameters[:n_terms], offset, segment)
             counts = np.diff(segment.blocks, append=len(segment.measured))
             factor = np.sqrt(segment.weight * counts)[:, None] / scales
-            value = (_averaged(nominal - segment.measured, segment.blocks, counts) * factor).ravel()
-            slope = _averaged(slopes, segment.blocks, counts) * factor[:, :, None]
+            value = (averaged(nominal - segment.measured, segment.blocks, counts) * factor).ravel()
+            slope = averaged(slopes, segment.blocks, counts) * factor[:, :, None]
             slope = slope.reshape(len(value), -1)
             value, slope, move = _without_start(value, slope, len(self.free))
             jacobian = np.zeros((len(value), len(parameters)))
@@ -254,7 +261,7 @@ def about_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
+def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
     """Means over the blocks of samples along the first axis."""
     means: Floats = np.add.reduceat(values, blocks, axis=0)
     return means / counts.reshape(-1, *(1,) * (values.ndim - 1))
