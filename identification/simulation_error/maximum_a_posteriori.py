@@ -15,23 +15,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from identification.simulation_error.mmg_prior import MMGPrior
-from identification.simulation_error.segments import Segment, averaged, compared_channels, cut
+from identification.options import Options, name_of
+from identification.regression.problem import Problem
+from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
+from identification.simulation_error.segments import Segment, compared_channels, cut
+from shipgym.checks import check_number
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
+from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.mmg import IDENTIFIED
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
-SEGMENT_LENGTHS = 1.7  # ship lengths at service speed
+MAP, DEFAULT_METHOD = "map", Options.method
+SEGMENT_LENGTHS, INTERVAL = 1.7, 0.067  # of segments, and between samples, ship lengths at service speed
 CORRELATED = 1.0  # ship lengths, over which errors are one error
 FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}  # by U0, U0, U0 / L, 1
 STRENGTHS = (1.0, 2.0, 3.0)  # of the prior: its deviations divided by it
 MARGIN = 0.1  # by which the error held out may exceed the least for a stronger prior
-ROUNDS = 3  # of fits, between which the scales of the residuals are renewed
+STEPS_HELD_OUT = 2  # of Gauss-Newton, from the fit of all trials to that of some
 STEP = 1e-4  # of finite differences, standard deviations of the prior
 MOST_GROUPS, PIECES = 5, 3  # groups of trials held out; pieces of a single trial
 LARGEST = 1e3  # residual of a ship that runs away, in scales
@@ -43,6 +49,7 @@ class Estimate:
 
     z: Floats  # coefficients in standard deviations of the prior from its mean, shape (41,)
     scales: Floats  # of the residuals by channel
+    strength: float  # of the prior
     covariance: Floats  # of z, Gauss-Newton
     evaluations: int
 
@@ -53,6 +60,40 @@ class Posterior:
 
     model: ShipModel
     report: dict[str, Any]  # for the provenance
+
+
+def checked_mmg(options: Options) -> Options:
+    """The options of an identification of the MMG form; InputError for those that it does not have."""
+    method = name_of(options.method)
+    if method not in (MAP, DEFAULT_METHOD):
+        raise InputError(
+            f"method: {method!r} found with structure 'mmg', which is not linear in its coefficients: it is "
+            "fitted by simulation error with a prior; leave the method out, or choose another structure"
+        )
+    others = [name for name in options.settings() if getattr(options, name) is not None]
+    if others:
+        raise InputError(
+            f"settings: {', '.join(others)} found, which structure 'mmg' does not know; leave them out, or "
+            "choose another structure"
+        )
+    if options.prior is not None and options.reference_model is not None:
+        raise InputError(
+            f"reference_model: {name_of(options.reference_model)!r} found beside prior "
+            f"{name_of(options.prior)!r}, expected one of them: the coefficients of structure 'mmg' are pulled to "
+            "one reference ship, or to formulas"
+        )
+    return replace(options, method=MAP)
+
+
+def fit_mmg(problem: Problem, options: Options) -> Posterior:
+    """The MMG form of greatest probability; options by `checked_mmg`.
+
+    The prior is that of the `reference_model`, or of `prior`: a reference ship, or formulas, by default those
+    of Yoshimura & Masumoto 2012.
+    """
+    prior = mmg_prior(options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars)
+    blank = replace(problem.blank, particulars=prior.ship)
+    return maximum_a_posteriori(blank, problem.used, prior, options.prior_strength)
 
 
 def maximum_a_posteriori(
@@ -72,22 +113,25 @@ def maximum_a_posteriori(
         Of the prior, by which its standard deviations are divided; by default the strongest of 1, 2, 3 whose
         error, each trial predicted from the others, is within a tenth of the least.
     """
+    if strength is not None:
+        check_number(strength, "prior_strength", above=0.0)
     problem = _Problem(blank, trials, prior)
-    everything = np.arange(len(problem.segments))
     estimates: dict[float, Estimate] = {}
     errors: dict[float, float] = {}
     factors: dict[float, float] = {}
     start, evaluations = np.zeros(len(IDENTIFIED)), 0
     for value in STRENGTHS if strength is None else (strength,):
-        found = problem.solve(start, everything, value)
+        found = problem.solve(start, value)
         estimates[value], start = found, found.z
-        errors[value], factors[value] = problem.held_out(found, value, estimates[min(estimates)].scales)
+        errors[value], factors[value] = problem.held_out(found, estimates[min(estimates)].scales)
         evaluations += found.evaluations
     least = min(errors.values())
     chosen = max(value for value, error in errors.items() if error <= (1.0 + MARGIN) * least)
     best = estimates[chosen]
     report = {
         "prior": prior.source,
+        **({"similarity": dict(prior.similarity)} if prior.similarity else {}),
+        **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
         "prior_strength": chosen,
         "errors_held_out": {f"{value:g}": error for value, error in errors.items()},
         "covariance_factor": factors[chosen],
@@ -116,46 +160,51 @@ class _Problem:
         self.travel = ship["length"] / ship["speed"]
         units = {"u": ship["speed"], "v": ship["speed"], "r": 1.0 / self.travel, "psi": 1.0}
         self.floors = np.array([FLOORS[name] * units[name] for name in self.channels])
-        self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False)
+        self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL)
         self.groups = _groups(self.segments)
+        self.kept: dict[bytes, tuple[Floats, Floats]] = {}
 
     def model(self, z: Floats) -> ShipModel:
         """The model of some coefficients."""
         values = dict(zip(IDENTIFIED, (self.mean + z * self.prior.deviation).tolist(), strict=True))
         return replace(self.blank, coefficients=self.prior.mean | values)
 
-    def at(self, z: Floats, which: Sequence[int] | Floats) -> tuple[Floats, Floats]:
-        """Errors of the simulated channels, averaged over blocks, and their slopes, of some segments.
+    def at(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+        """As `simulated`, which is not done twice in a row."""
+        key = z.tobytes() + which.tobytes()
+        if key not in self.kept:
+            self.kept = {key: self.simulated(z, which)}
+        return self.kept[key]
 
-        Each times the root of the share that its block has of the time over which errors are one error;
-        shapes (n_blocks, n_channels) and (n_blocks, n_channels, 41).
+    def simulated(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+        """Errors of the simulated channels and their slopes, of some segments.
+
+        Each times the root of the share that its step has of the time over which errors are one error;
+        shapes (n_samples, n_channels) and (n_samples, n_channels, 41).
         """
-        first = len(Ship._fields)
+        first, n = len(Ship._fields), len(IDENTIFIED)
         ships = np.repeat(self.numbers, LANES).reshape(-1, LANES)
-        n = len(IDENTIFIED)
         ships[first : first + n] = (self.mean + z * self.prior.deviation)[:, None]
         ships[first + np.arange(n), 1 + np.arange(n)] += STEP * self.prior.deviation
-        found = [self._sailed(self.segments[int(k)], ships.ravel()) for k in which]
-        return np.concatenate([e for e, _ in found]), np.concatenate([s for _, s in found])
+        found = np.concatenate([self._sailed(self.segments[k], ships.ravel()) for k in which])
+        errors = found[:, :, 0]
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
+            slopes = (found[:, :, 1:] - errors[:, :, None]) / STEP
+        return errors, slopes
 
-    def _sailed(self, segment: Segment, ships: Floats) -> tuple[Floats, Floats]:
-        n = len(IDENTIFIED)
+    def _sailed(self, segment: Segment, ships: Floats) -> Floats:
+        """Errors of the ships of all lanes in a segment, shape (n_samples - 1, n_channels, 42)."""
         state = np.repeat(segment.start, LANES)
         out = np.empty((len(segment.measured), len(state)))
         self.loop(state, ships, np.zeros(LANES), segment.inputs, segment.samples, out)
-        lanes = out.reshape(len(out), -1, LANES)[:, self.columns, : n + 1]
-        counts = np.diff(segment.blocks, append=len(segment.measured))
-        means = averaged(lanes - segment.measured[:, :, None], segment.blocks, counts)
-        ends = np.append(segment.times[1:], segment.inputs[-1, 0])
-        share = np.minimum((ends - segment.times) / (CORRELATED * self.travel), 1.0)
-        means = means * np.sqrt(share)[:, None, None]
-        with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
-            slopes = (means[:, :, 1:] - means[:, :, :1]) / STEP
-        return means[:, :, 0], np.nan_to_num(slopes, posinf=0.0, neginf=0.0)
+        lanes = out.reshape(len(out), -1, LANES)[1:, self.columns, : len(IDENTIFIED) + 1]
+        share = np.sqrt(self._weight(segment) / len(lanes))
+        found: Floats = (lanes - segment.measured[1:, :, None]) * share
+        return found
 
-    def scales(self, errors: Floats, which: Sequence[int] | Floats) -> Floats:
+    def scales(self, errors: Floats, which: Rows) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
-        shares = sum(self._weight(self.segments[int(k)]) for k in which)
+        shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
             rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
         return np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
@@ -163,72 +212,77 @@ class _Problem:
     def _weight(self, segment: Segment) -> float:
         return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.travel)
 
-    def solve(
-        self, start: Floats, which: Sequence[int] | Floats, strength: float, scales: Floats | None = None
-    ) -> Estimate:
-        """Fit some segments; without given `scales` these are renewed and the fit repeated."""
-        z, evaluations, rounds = start, 0, 1 if scales is not None else ROUNDS
-        given = scales
-        pull = strength * np.eye(len(z))
-        for _ in range(rounds):
-            scales = self.scales(self.at(z, which)[0], which) if given is None else given
-            shots = _Shots(self, which, scales, pull)
+    def solve(self, start: Floats, strength: float) -> Estimate:
+        """Fit all segments, the scales of the residuals renewed between rounds."""
+        everything, z, evaluations = np.arange(len(self.segments)), start, 0
+        for last in (False, False, True):
+            scales = self.scales(self.at(z, everything)[0], everything)
+            shots = _Shots(self, everything, scales, strength)
+            tolerance = 1e-4 if last else 1e-2
             found = least_squares(
-                shots.residuals, z, shots.jacobian, method="trf", ftol=1e-4, xtol=1e-4, max_nfev=30
+                shots.residuals, z, shots.jacobian, method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30
             )
             z, evaluations = found.x, evaluations + found.nfev
-        jacobian = shots.jacobian(z)
-        assert scales is not None
-        return Estimate(z, scales, np.linalg.inv(jacobian.T @ jacobian), evaluations)
+        return Estimate(z, scales, strength, _inverse(shots.jacobian(z)), evaluations)
 
-    def held_out(self, whole: Estimate, strength: float, scales: Floats) -> tuple[float, float]:
+    def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
         """Error of each group of segments by a fit of the others, and the factor on the covariance.
 
-        The error is in the scales given; the factor makes the errors held out, by those that the covariance
-        of the others' fit and the scatter of the residuals lead to expect, one on average; at least 1.
+        The fit of the others takes Gauss-Newton steps from that of all. The error is in the scales given; the
+        factor makes the errors held out, by those that the covariance of the others' fit and the scatter of
+        the residuals lead to expect, one on average; at least 1.
         """
         errors, excess, expected = [], 0.0, 0.0
         for group in np.unique(self.groups):
-            rest, held = (np.flatnonzero(self.groups != group), np.flatnonzero(self.groups == group))
-            fit = self.solve(whole.z, rest, strength, whole.scales)
-            error, slopes = self.at(fit.z, held)
-            error = np.clip(np.nan_to_num(error / scales, nan=LARGEST), -LARGEST, LARGEST)
-            ratio = scales / whole.scales
-            slopes = slopes / whole.scales[:, None]
-            weight = sum(self._weight(self.segments[k]) for k in held)
-            errors.append(np.sum(error**2) / (weight * len(scales)))
-            excess += float(np.sum((error * ratio) ** 2)) - weight * len(scales)
-            expected += float(np.einsum("bci,ij,bcj->", slopes, fit.covariance, slopes))
+            rest, held = np.flatnonzero(self.groups != group), np.flatnonzero(self.groups == group)
+            z = whole.z
+            for _ in range(STEPS_HELD_OUT):
+                shots = _Shots(self, rest, whole.scales, whole.strength)
+                jacobian = shots.jacobian(z)
+                covariance = _inverse(jacobian)
+                z = z - covariance @ (jacobian.T @ shots.residuals(z))
+            tested = _Shots(self, held, whole.scales, 0.0)
+            error, slopes = tested.at(z)
+            weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
+            errors.append(np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2) / weight)
+            excess += float(error @ error) - weight
+            expected += float(np.sum((slopes @ covariance) * slopes))
         return float(np.sqrt(np.mean(errors))), max(excess / max(expected, 1e-12), 1.0)
 
 
-@dataclass(eq=False)
+def _inverse(jacobian: Floats) -> Floats:
+    """Gauss-Newton covariance."""
+    inverse: Floats = np.linalg.inv(jacobian.T @ jacobian)
+    return inverse
+
+
+@dataclass(frozen=True, eq=False)
 class _Shots:
-    """The least-squares problem of some segments; the last simulation is kept."""
+    """The least-squares problem of some segments."""
 
     problem: _Problem
-    which: Sequence[int] | Floats
+    which: Rows
     scales: Floats
-    pull: Floats
-    kept: tuple[bytes, Floats, Floats] | None = None
+    strength: float
 
     def at(self, z: Floats) -> tuple[Floats, Floats]:
-        key = z.tobytes()
-        if self.kept is None or self.kept[0] != key:
-            errors, slopes = self.problem.at(z, self.which)
+        """Errors in their scales, shape (n_rows,), and their slopes, shape (n_rows, 41)."""
+        errors, slopes = self.problem.at(z, self.which)
+        with np.errstate(invalid="ignore"):
             scaled = np.clip(np.nan_to_num(errors / self.scales, nan=LARGEST), -LARGEST, LARGEST)
-            slopes = slopes / self.scales[:, None]
-            self.kept = key, scaled.ravel(), slopes.reshape(scaled.size, -1)
-        return self.kept[1], self.kept[2]
+            steep = np.nan_to_num(slopes / self.scales[:, None], posinf=0.0, neginf=0.0)
+        return scaled.ravel(), steep.reshape(scaled.size, -1)
 
     def residuals(self, z: Floats) -> Floats:
-        return np.concatenate([self.at(z)[0], self.pull @ z])
+        """Of the segments and the prior."""
+        return np.concatenate([self.at(z)[0], self.strength * z])
 
     def jacobian(self, z: Floats) -> Floats:
-        return np.vstack([self.at(z)[1], self.pull])
+        """Of the residuals."""
+        return np.vstack([self.at(z)[1], self.strength * np.eye(len(z))])
 
 
-def _groups(segments: Sequence[Segment]) -> NDArray[np.int64]:
+def _groups(segments: Sequence[Segment]) -> Rows:
     """Which segments are held out together: of a trial, of every fifth one, or a third of a single one."""
     trial = np.array([segment.trial for segment in segments])
     if trial.max() == trial.min():

@@ -4,8 +4,8 @@ Sources of the formulas: Yoshimura & Masumoto 2012, Hydrodynamic database and ma
 with medium high-speed merchant ships and fishing vessels, MARSIM (hull, flow straightening); Kijima, Katsuno,
 Nakiri & Furukawa 1990, On the manoeuvring performance of a ship with the parameter of loading condition,
 J. Soc. Naval Architects of Japan 168 (hull as the alternative, x_H); Zhou, Sheng & Feng 1983 after Motora's
-charts (added mass); Fujii & Tuda 1961 (rudder lift slope); Quadvlieg 2013 (a_H, t_R); Taylor (wake); ITTC 1957
-and Denny-Mumford (resistance); Wageningen B4-50 (thrust).
+charts (added mass); Fujii & Tuda 1961 (rudder lift slope); Quadvlieg 2013 (a_H, t_R); Taylor (wake); ITTC
+1957 and Denny-Mumford (resistance); Wageningen B4-50 (thrust).
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 from shipgym.ships.mmg import IDENTIFIED, MMG, SHIP, dimensions, standard_form
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import ADDED_MASSES, Particulars
 
 Floats = NDArray[np.float64]
 
@@ -40,12 +40,14 @@ LARGEST_DRIFT, LARGEST_TURN = 0.35, 0.8  # to which Kijima's squares are turned 
 DEVIATIONS: dict[str, tuple[float, ...]] = {
     "mx": (0.005,), "my": (0.03, 0.04), "Jz": (0.002, 0.004), "R_0": (0.006,), "X_vv": (0.03, 0.06),
     "X_vr": (0.04, 0.06), "X_rr": (0.02, 0.03), "X_vvvv": (0.4, 0.6), "Y_v": (0.04, 0.08),
-    "Y_r": (0.03, 0.05), "Y_vvv": (0.6,), "Y_vvr": (0.4,), "Y_vrr": (0.3,), "Y_rrr": (0.05,), "N_v": (0.02, 0.03),
-    "N_r": (0.007, 0.012), "N_vvv": (0.1,), "N_vvr": (0.1,), "N_vrr": (0.05,), "N_rrr": (0.01, 0.03),
+    "Y_r": (0.03, 0.05), "Y_vvv": (0.6,), "Y_vvr": (0.4,), "Y_vrr": (0.3,), "Y_rrr": (0.05,),
+    "N_v": (0.02, 0.03), "N_r": (0.007, 0.012), "N_vvv": (0.1,), "N_vvr": (0.1,), "N_vrr": (0.05,),
+    "N_rrr": (0.01, 0.03),
     "thrust": (0.25,), "w_P0": (0.1,), "C_1": (0.5,), "C_2": (0.25,), "C_2_side": (0.25,), "t_R": (0.05, 0.1),
     "a_H": (0.1, 0.12), "x_H": (0.05,), "l_R": (0.1, 0.2), "gamma_R": (0.12, 0.15), "gamma_R_side": (0.12,),
     "epsilon": (0.2,), "kappa": (0.12,), "f_alpha": (0.2, 0.3), "delta_0": (math.radians(1.0),),
-    "Y_0": (0.001,), "N_0": (0.0005,), "c_R": (0.5,), "speed_power": (0.5,), "N_absr": (0.003,), "N_rr": (0.008,),
+    "Y_0": (0.001,), "N_0": (0.0005,), "c_R": (0.5,), "speed_power": (0.5,), "N_absr": (0.003,),
+    "N_rr": (0.008,),
 }  # fmt: skip
 
 
@@ -94,9 +96,10 @@ def _deviations(which: int) -> Floats:
 def completed(particulars: Particulars) -> Particulars:
     """Particulars with rudder and propeller of usual size where absent, marked as estimated.
 
-    The rudder's area is that of Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
+    Added masses are coefficients of the MMG form and stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
     """
     ship = particulars.completed()
+    ship = replace(ship, **dict.fromkeys(ADDED_MASSES), estimated=ship.estimated - set(ADDED_MASSES))
     L, B, T = ship.length, ship.require("beam"), ship.require("draught")
     area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
     usual = {
@@ -132,8 +135,8 @@ def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, d
     if found[model.name] < LEAST_SIMILARITY:
         raise InputError(
             f"reference_model: {model.name!r} found, which is not like this ship: similarity "
-            f"{found[model.name]:.2f}, expected at least {LEAST_SIMILARITY:g}; give prior = 'yoshimura', which "
-            "takes formulas of the main dimensions, or a model of a ship more like this one"
+            f"{found[model.name]:.2f}, expected at least {LEAST_SIMILARITY:g}; give prior = 'yoshimura' for "
+            "formulas of the main dimensions, or a model of a ship more like this one"
         )
     return model, found
 

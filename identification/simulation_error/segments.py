@@ -60,22 +60,25 @@ def cut(
     lengths: float,
     staggered: bool,
     smooth: Callable[[Floats, Floats], Floats] = preprocess.smooth,
+    interval: float = 0.0,
 ) -> list[Segment]:
     """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
 
     A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed;
-    `smooth` gives, of times and values, the state at its start.
+    `smooth` gives, of times and values, the state at its start. Compared are samples at least an `interval`
+    apart, in ship lengths; where it is 0, all.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
             states, rudder = _states(piece, model, smooth), _rudder(piece, model)
+            every = max(int(interval * travel / np.median(np.diff(piece.t)) + 1e-9), 1)
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
                 segments += [
                     _segment(piece, index, rows, states, channels, rudder, travel)
-                    for rows in map(slice, edges[:-1], edges[1:] + 1)
+                    for rows in map(slice, edges[:-1], edges[1:] + 1, [every] * len(edges))
                 ]
     return segments
 
