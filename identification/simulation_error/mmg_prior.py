@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.simulation_error.formulas import FORMULAS
 from identification.simulation_error.similarity import AUTO, correlations, select_reference, similarity_vector
 from shipgym.checks import check_choice, quoted
 from shipgym.errors import InputError
@@ -82,6 +83,11 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     if isinstance(source, str) and source in HULL_FORMULAS:
         mean = formula_coefficients(source, ship)
         prior = MMGPrior(source, ship, mean, _deviations(1), _out_of_range(ship))
+    elif isinstance(source, str) and source in FORMULAS:
+        raise InputError(
+            f"prior: {source!r} found with structure 'mmg', expected {quoted(HULL_FORMULAS)} or a reference "
+            "ship"
+        )
     else:
         model, similarity = _reference(source, ship)
         prior = MMGPrior(model.name, ship, reference_coefficients(model), _deviations(0), (), similarity)
@@ -96,7 +102,8 @@ def _deviations(which: int) -> Floats:
 def completed(particulars: Particulars) -> Particulars:
     """Particulars with rudder and propeller of usual size where absent, marked as estimated.
 
-    Added masses are coefficients of the MMG form and stand there alone. The rudder's area is that of Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
+    Added masses are coefficients of the MMG form and stand there alone. The rudder's area is that of
+    Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
     """
     ship = particulars.completed()
     ship = replace(ship, **dict.fromkeys(ADDED_MASSES), estimated=ship.estimated - set(ADDED_MASSES))
