@@ -157,7 +157,7 @@ class _Problem:
         self.channels = compared_channels(blank, trials)
         self.columns = [blank.state_names.index(name) for name in self.channels]
         ship = blank.particulars
-        self.travel = ship["length"] / ship["speed"]
+        self.travel = ship.length / ship.require("speed")
         units = {"u": ship["speed"], "v": ship["speed"], "r": 1.0 / self.travel, "psi": 1.0}
         self.floors = np.array([FLOORS[name] * units[name] for name in self.channels])
         self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL)
@@ -207,7 +207,8 @@ class _Problem:
         shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
             rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
-        return np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
+        found: Floats = np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
+        return found
 
     def _weight(self, segment: Segment) -> float:
         return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.travel)
@@ -252,8 +253,9 @@ class _Problem:
 
 def _inverse(jacobian: Floats) -> Floats:
     """Gauss-Newton covariance."""
-    inverse: Floats = np.linalg.inv(jacobian.T @ jacobian)
-    return inverse
+    inverse = np.linalg.inv(jacobian.T @ jacobian)
+    symmetric: Floats = 0.5 * (inverse + inverse.T)
+    return symmetric
 
 
 @dataclass(frozen=True, eq=False)

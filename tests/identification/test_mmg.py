@@ -222,6 +222,7 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     again = shipgym.load_model(tmp_path / "model.json")
     state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
     np.testing.assert_array_equal(again.derivatives(state, command), found.model.derivatives(state, command))
+    np.testing.assert_array_equal(again.covariance, found.model.covariance)
     drawn = again.sample(2, 0)
     assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
     assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
