@@ -224,7 +224,7 @@ class _Problem:
                 shots.residuals, z, shots.jacobian, method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30
             )
             z, evaluations = found.x, evaluations + found.nfev
-        return Estimate(z, scales, strength, _inverse(shots.jacobian(z)), evaluations)
+        return Estimate(z, scales, strength, _covariance(shots.at(z)[1]), evaluations)
 
     def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
         """Error of each group of segments by a fit of the others, and the factor on the covariance.
@@ -240,8 +240,8 @@ class _Problem:
             for _ in range(STEPS_HELD_OUT):
                 shots = _Shots(self, rest, whole.scales, whole.strength)
                 jacobian = shots.jacobian(z)
-                covariance = _inverse(jacobian)
-                z = z - covariance @ (jacobian.T @ shots.residuals(z))
+                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ shots.residuals(z))
+            covariance = _covariance(jacobian[: -len(z)])
             tested = _Shots(self, held, whole.scales, 0.0)
             error, slopes = tested.at(z)
             weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
@@ -251,9 +251,9 @@ class _Problem:
         return float(np.sqrt(np.mean(errors))), max(excess / max(expected, 1e-12), 1.0)
 
 
-def _inverse(jacobian: Floats) -> Floats:
-    """Gauss-Newton covariance."""
-    inverse = np.linalg.inv(jacobian.T @ jacobian)
+def _covariance(slopes: Floats) -> Floats:
+    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
     symmetric: Floats = 0.5 * (inverse + inverse.T)
     return symmetric
 

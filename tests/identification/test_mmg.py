@@ -16,6 +16,7 @@ from identification import IdentificationResult, identify
 from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
+from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import kvlcc2, mmg
 from shipgym.ships.scaling import scale_model
 
@@ -211,6 +212,25 @@ def test_coefficients_are_recovered_within_their_errors(
     provenance = found.model.provenance or {}
     assert (provenance["method"], provenance["prior"]) == ("map", "kvlcc2-l7")
     assert set(provenance["errors_held_out"]) == {"1", "2", "3"}
+
+
+def test_models_drawn_hold_the_turn_that_no_trial_shows(
+    fitted: tuple[ShipModel, IdentificationResult],
+) -> None:
+    ship, found = fitted
+    truth, *drawn = (turn_lengths(model) for model in (ship, *found.model.sample(40, 0)))
+    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
+    assert np.all((low < truth) & (truth < high))
+    assert np.all((high - low) / truth < 0.25)  # and say something
+
+
+def turn_lengths(model: ShipModel) -> tuple[float, float]:
+    """Advance and tactical diameter of a 35 deg turn, ship lengths."""
+    travel = model.particulars.length / model.particulars["speed"]
+    found = turning_indices(turning_circle(model, 35.0, duration=20 * travel, dt=0.05 * travel), 7.0)
+    assert found.advance_lengths is not None
+    assert found.tactical_diameter_lengths is not None
+    return found.advance_lengths, found.tactical_diameter_lengths
 
 
 def test_its_result_is_saved_and_loaded_like_any_other(
