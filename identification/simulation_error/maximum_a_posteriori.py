@@ -134,7 +134,7 @@ def maximum_a_posteriori(
         **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
         "prior_strength": chosen,
         "errors_held_out": {f"{value:g}": error for value, error in errors.items()},
-        "covariance_factor": factors[chosen],
+        "model_error": {"factor": factors[chosen], "how": "simulated segments of trials left out in turn"},
         "segments": len(problem.segments),
         "evaluations": evaluations,
         "residual_rms": dict(zip(problem.channels, best.scales.tolist(), strict=True)),
@@ -142,7 +142,9 @@ def maximum_a_posteriori(
     }
     covariance = np.zeros((len(prior.mean),) * 2)
     inner = slice(len(IDENTIFIED))
-    covariance[inner, inner] = factors[chosen] * best.covariance * np.outer(prior.deviation, prior.deviation)
+    covariance[inner, inner] = (
+        factors[chosen] ** 2 * best.covariance * np.outer(prior.deviation, prior.deviation)
+    )
     return Posterior(replace(problem.model(best.z), covariance=covariance), report)
 
 
@@ -227,7 +229,7 @@ class _Problem:
         return Estimate(z, scales, strength, _covariance(shots.at(z)[1]), evaluations)
 
     def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
-        """Error of each group of segments by a fit of the others, and the factor on the covariance.
+        """Error of each group of segments by a fit of the others, and the factor on the standard errors.
 
         The fit of the others takes Gauss-Newton steps from that of all. The error is in the scales given; the
         factor makes the errors held out, by those that the covariance of the others' fit and the scatter of
@@ -248,7 +250,7 @@ class _Problem:
             errors.append(np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2) / weight)
             excess += float(error @ error) - weight
             expected += float(np.sum((slopes @ covariance) * slopes))
-        return float(np.sqrt(np.mean(errors))), max(excess / max(expected, 1e-12), 1.0)
+        return float(np.sqrt(np.mean(errors))), float(np.sqrt(max(excess / expected, 1.0)))
 
 
 def _covariance(slopes: Floats) -> Floats:
