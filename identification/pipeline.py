@@ -14,19 +14,22 @@ from identification.estimators.estimator import FitTask
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
-from identification.regression.grey_box import bare_metrics
+from identification.regression.grey_box import bare_metrics, explained_samples
 from identification.regression.problem import Problem, pose
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
+from identification.simulation_error.maximum_a_posteriori import MAP, checked_mmg, fit_mmg
 from identification.simulation_error.prior import with_prior
 from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
+from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
@@ -76,6 +79,8 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    if structure == MMG:
+        return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
     chosen = get_method(method)
     problem = pose(trials, asked, particulars, steering)
     fit, refined = _fitted(chosen, asked, problem)
@@ -88,6 +93,41 @@ def identify(
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
+
+
+def _identified_mmg(
+    trials: Sequence[Trial],
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
+    steering: SteeringGear | None,
+) -> IdentificationResult:
+    """The MMG form; its regression is that on the model's own accelerations."""
+    problem = pose(trials, options, particulars, steering)
+    found = fit_mmg(problem, options)
+    sampling = {
+        "samples": options.samples,
+        "gear": steering,
+        "smooth": options.preprocessing or options.smooth,
+    }
+    samples, estimators = explained_samples(problem.used, found.model, window=options.window, **sampling)
+    reasons = reasons_unstable(found.model, problem.used)
+    report = {
+        "decision": "runs away" if reasons else "stable as fitted",
+        **({"rejected": reasons} if reasons else {}),
+    }
+    fit = GuardedFit(found.model, estimators, not reasons, report)
+    provenance = {
+        "structure": MMG,
+        "method": MAP,
+        "samples": options.samples,
+        "settings": provenance_settings(options, {}),
+        **_origin(fit, samples, problem.used),
+        **found.report,
+        "steering": "estimated" if steering is None else "given",
+    }
+    model = replace(found.model, provenance=provenance)
+    call = whole_call(options, problem.trials, particulars, steering)
+    return _evaluated(model, fit, replace(problem, samples=samples, blank=model), call)
 
 
 def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
@@ -208,7 +248,7 @@ def _evaluated(
     predictions = {trial.name: predict(model, trial) for trial in trials}
     model = _marked(model, [name for name, predicted in predictions.items() if predicted is None])
     stable = bool((model.provenance or {})["stable"])
-    bare = {"reference": bare_metrics(model, trials)} if isinstance(model.table, GreyBox) else {}
+    bare = {"reference": bare_metrics(model, trials)} if isinstance(problem.table, GreyBox) else {}
     return IdentificationResult(
         model=model,
         stable=stable,
@@ -218,7 +258,7 @@ def _evaluated(
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
-        diagnostics=diagnose(fit.estimators, problem.samples, model.table),
+        diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
         predictions=predictions,
         trials=trials,
         samples=problem.samples,
@@ -245,7 +285,7 @@ def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:
 
 def _reference(problem: Problem) -> dict[str, Any]:
     """What a grey box stands on, for the provenance; nothing for other structures."""
-    box = problem.blank.table
+    box = problem.table
     if not isinstance(box, GreyBox):
         return {}
     return {"reference": {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}}

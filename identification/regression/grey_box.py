@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimators.estimator import Estimator
+from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.prediction import predict, trial_metrics
@@ -80,6 +82,26 @@ def structure_samples(
         features={q: features[:, :-1] for q, features in built.features.items()},
         targets={q: built.targets[q] - features[:, -1] for q, features in built.features.items()},
     )
+
+
+def explained_samples(
+    trials: Sequence[Trial], model: ShipModel, **sampling: Any
+) -> tuple[Samples, dict[str, Estimator]]:
+    """The regression on a model's own accelerations, one term an equation, and estimators of coefficient 1.
+
+    For models that were not fitted by regression; `sampling` as in `build_samples`.
+    """
+    box = grey_box(model, shaft=True)
+    widened = _Widened(**{field.name: getattr(box, field.name) for field in fields(box)})
+    built = build_samples(
+        trials, widened, model.particulars, shaft_speed=model.service_shaft_speed, **sampling
+    )
+    own = replace(built, features={q: features[:, -1:] for q, features in built.features.items()})
+    estimators: dict[str, Estimator] = {}
+    for q, features in own.features.items():
+        estimators[q] = TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, own.targets[q])
+        estimators[q].coef_ = np.ones(1)
+    return own, estimators
 
 
 def _with_block_coefficient(particulars: Particulars) -> Particulars:

@@ -15,15 +15,19 @@ from identification.regression.samples import Samples
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, get_structure
+from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
+from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
+#: Stands for the MMG form where channels, excitation and particulars are checked.
+MMG_CHANNELS = Structure(MMG, "stand-in", dict.fromkeys("uvr", (Term("mmg", (("delta", 1), ("n", 1))),)), "service")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,7 @@ class Problem:
     trials: tuple[Trial, ...]  # all, those held out marked `validate`
     used: tuple[Trial, ...]  # those to fit, repaired where asked
     blank: ShipModel  # the model but for its coefficients
+    table: Structure  # of the regression; of the MMG form, which has none, a stand-in
     samples: Samples  # the regression
     #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
@@ -68,19 +73,20 @@ def pose(
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    return Problem(tuple(everything), tuple(used), blank, regression, similarity)
+    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity)
 
 
 def _blank(
     name: str, table: Structure, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
+    names = (table if isinstance(table, GreyBox) else get_dynamics(table.name)).coefficient_names
     return ShipModel(
         name=name,
         structure=table.name,
         particulars=ship,
         steering=gear,
-        coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        coefficients=dict.fromkeys(names, 0.0),
         service_shaft_speed=shaft,
         own_table=table if isinstance(table, GreyBox) else None,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
@@ -113,6 +119,8 @@ def _table(
     used: Sequence[Trial],
 ) -> tuple[Structure, dict[str, float]]:
     """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
+    if structure == MMG:
+        return MMG_CHANNELS, {}
     if structure != GREY_BOX:
         if reference is not None:
             raise InputError(

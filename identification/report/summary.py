@@ -42,7 +42,7 @@ def summary_table(fit: Fit) -> str:
 
 
 def _coefficients(fit: Fit) -> Table:
-    structure = fit.model.table
+    structure = fit.model.dynamics
     title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     if (structure.normalisation, structure.quantity) != ("prime", "force"):
         title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0

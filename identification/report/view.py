@@ -151,7 +151,7 @@ def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
 
 def _derivatives(model: ShipModel) -> bool:
     """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
-    return (model.table.normalisation, model.table.quantity) == ("prime", "force")
+    return (model.dynamics.normalisation, model.dynamics.quantity) == ("prime", "force")
 
 
 def _coefficients(fit: Fit) -> dict[str, list[dict[str, Any]]]:

@@ -13,7 +13,7 @@ from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
-from shipgym.ships import ShipModel
+from shipgym.ships import ShipModel, Structure
 from shipgym.ships.simulate import LONGEST_STEP
 from shipgym.trials.trial import Trial
 
@@ -42,8 +42,15 @@ class Segment:
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Channels whose residuals are minimised: velocities that the model has equations of, and heading."""
-    heading = "r" in model.table.equations and all("psi" in trial for trial in trials)
-    return tuple(model.table.equations) + (("psi",) if heading else ())
+    velocities = _velocities(model)
+    heading = "r" in velocities and all("psi" in trial for trial in trials)
+    return velocities + (("psi",) if heading else ())
+
+
+def _velocities(model: ShipModel) -> tuple[str, ...]:
+    """Those that the model has equations of."""
+    table = model.dynamics
+    return tuple(table.equations) if isinstance(table, Structure) else ("u", "v", "r")
 
 
 def cut(
@@ -53,22 +60,25 @@ def cut(
     lengths: float,
     staggered: bool,
     smooth: Callable[[Floats, Floats], Floats] = preprocess.smooth,
+    interval: float = 0.0,
 ) -> list[Segment]:
     """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
 
     A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed;
-    `smooth` gives, of times and values, the state at its start.
+    `smooth` gives, of times and values, the state at its start. Compared are samples at least an `interval`
+    apart, in ship lengths; where it is 0, all.
     """
     travel = model.particulars["length"] / model.particulars["speed"]
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
             states, rudder = _states(piece, model, smooth), _rudder(piece, model)
+            every = max(int(interval * travel / np.median(np.diff(piece.t)) + 1e-9), 1)
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
                 segments += [
                     _segment(piece, index, rows, states, channels, rudder, travel)
-                    for rows in map(slice, edges[:-1], edges[1:] + 1)
+                    for rows in map(slice, edges[:-1], edges[1:] + 1, [every] * len(edges))
                 ]
     return segments
 
@@ -95,7 +105,7 @@ def _states(trial: Trial, model: ShipModel, smooth: Callable[[Floats, Floats], F
 
 
 def _rudder(trial: Trial, model: ShipModel) -> Rudder:
-    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in model.table.equations))
+    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in _velocities(model)))
     delta = trial["delta"]
     return straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
 
@@ -194,8 +204,8 @@ class Shooter:
             nominal, slopes = self._slopes(parameters[:n_terms], offset, segment)
             counts = np.diff(segment.blocks, append=len(segment.measured))
             factor = np.sqrt(segment.weight * counts)[:, None] / scales
-            value = (_averaged(nominal - segment.measured, segment.blocks, counts) * factor).ravel()
-            slope = _averaged(slopes, segment.blocks, counts) * factor[:, :, None]
+            value = (averaged(nominal - segment.measured, segment.blocks, counts) * factor).ravel()
+            slope = averaged(slopes, segment.blocks, counts) * factor[:, :, None]
             slope = slope.reshape(len(value), -1)
             value, slope, move = _without_start(value, slope, len(self.free))
             jacobian = np.zeros((len(value), len(parameters)))
@@ -256,7 +266,7 @@ def about_mean(values: Floats) -> Floats:
     return values - values.mean(axis=0) if len(values) else values
 
 
-def _averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
+def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
     """Means over the blocks of samples along the first axis."""
     means: Floats = np.add.reduceat(values, blocks, axis=0)
     return means / counts.reshape(-1, *(1,) * (values.ndim - 1))

@@ -84,6 +84,8 @@ class ShipEquations:
     switches: tuple[str, ...] = ()
     path: Path | None = field(default=None, repr=False)
     normalisation: ClassVar[str] = "own"  # as a model file has it: the publication's units
+    quantity: ClassVar[str] = "force"  # what the coefficients make up
+    scales: ClassVar[bool] = False  # whether the dimensions are those of the particulars
 
     def __post_init__(self) -> None:
         check_text(self.name, "ship equations: name")

@@ -15,7 +15,7 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     identified structure in its particulars, estimated where absent. Raises InputError if these do not tell
     the mass.
     """
-    own = {"container": _container, "kvlcc2": _kvlcc2}
+    own = {"container": _container, "kvlcc2": _mmg, "mmg": _mmg}
     if model.structure == "tanker":
         return _tanker(model, water_depth)
     return own.get(model.structure, _particulars)(model)
@@ -69,15 +69,16 @@ def _container(model: ManoeuvringModel) -> Floats:
     return _prime_mass(model) * prime
 
 
-def _kvlcc2(model: ManoeuvringModel) -> Floats:
+def _mmg(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015, equations 6 and 7."""
-    c, density = model.coefficients, model.particulars["water_density"]
-    added = 0.5 * density * c["L"] ** 2 * c["d"]
+    c, p = model.coefficients, model.particulars
+    length, draught = c.get("L", p.length), c.get("d", p.draught)
+    added = 0.5 * p.require("water_density") * length**2 * (draught or p.require("draught"))
     mass, static, yaw = rigid_inertia(model)
     matrix = np.zeros((3, 4))
     matrix[0, 0] = mass + c["mx"] * added
     matrix[1, 1], matrix[1, 2] = mass + c["my"] * added, static
-    matrix[2, 1], matrix[2, 2] = static, yaw + c["Jz"] * added * c["L"] ** 2
+    matrix[2, 1], matrix[2, 2] = static, yaw + c["Jz"] * added * length**2
     return matrix
 
 

@@ -60,13 +60,13 @@ class ManoeuvringModel:
             )
         object.__setattr__(self, "coefficients", ordered)
         if (
-            isinstance(self.dynamics, Structure)
+            (isinstance(self.dynamics, Structure) or self.dynamics.scales)
             and "n" in self.command_names
             and not self.service_shaft_speed > 0
         ):
             raise InputError(
                 f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g} found, expected that at "
-                f"service speed in 1/s: the terms of structure {self.structure!r} have a shaft speed"
+                f"service speed in 1/s: structure {self.structure!r} has a shaft speed"
             )
         if self.covariance is not None and self.covariance.shape != (len(names), len(names)):
             raise InputError(

@@ -48,7 +48,11 @@ class Particulars(Mapping[str, Any]):
     block_coefficient, speed : float, optional
         Displaced volume by length * beam * draught; service speed, m/s.
     rudder_area, propeller_diameter : float, optional
-        Movable area of the rudder, m2; m.
+        Movable area of the rudder, of all rudders together, m2; m.
+    rudder_aspect_ratio, propeller_pitch_ratio : float, optional
+        Span of a rudder squared by its area; pitch of the propeller by its diameter.
+    rudders, propellers : float, optional
+        How many; 1 where not given.
     length_overall, frontal_area, lateral_area : float, optional
         m; projected areas above the water seen from ahead and from the side, m2.
     lateral_centroid, lateral_centroid_height : float, optional
@@ -80,6 +84,10 @@ class Particulars(Mapping[str, Any]):
     speed: float | None = _optional(below=50.0, hint="in m/s (a knot is 0.514 m/s)")
     rudder_area: float | None = _optional()
     propeller_diameter: float | None = _optional(of_length=0.5)
+    rudder_aspect_ratio: float | None = _optional(below=10.0)
+    propeller_pitch_ratio: float | None = _optional(below=3.0)
+    rudders: float | None = _optional(below=9.0)
+    propellers: float | None = _optional(below=9.0)
     length_overall: float | None = _optional(of_length=2.0)
     frontal_area: float | None = _optional(of_square=0.5)
     lateral_area: float | None = _optional(of_square=0.5)

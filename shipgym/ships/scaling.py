@@ -61,7 +61,7 @@ def scale_model(
     which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
-    if not isinstance(table, Structure):
+    if not isinstance(table, Structure) and not table.scales:
         raise InputError(
             f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
             "for one length; expected a model with a table of terms, such as one identified from its trials"
@@ -72,7 +72,9 @@ def scale_model(
         speed = model.particulars["speed"] * np.sqrt(size)
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
-    factors = _coefficient_factors(table, model, size, fast)
+    factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
+    if isinstance(table, Structure) and table.normalisation == "si":
+        factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
     return replace(
         model,
@@ -87,10 +89,8 @@ def scale_model(
     )
 
 
-def _coefficient_factors(table: Structure, model: ShipModel, size: float, fast: float) -> dict[str, float]:
-    """What each coefficient is multiplied by: 1 for those without unit, the change of units in SI."""
-    if table.normalisation != "si":
-        return dict.fromkeys(table.coefficient_names, 1.0)
+def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str, float]:
+    """What each coefficient of a table in SI units is multiplied by: the change of units."""
     similar = replace(table, normalisation="service")
     return {
         name: similar.feature_scale(equation, term, size, fast, fast / size)

@@ -5,7 +5,7 @@ from typing import Any
 
 from shipgym.checks import check_choice, check_table
 from shipgym.errors import InputError
-from shipgym.ships import container, kvlcc2, tanker
+from shipgym.ships import container, kvlcc2, mmg, tanker
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.pmm import PMM18, PMM38
 from shipgym.ships.term_table import EQUATION_NAMES, FORCE_OF_EQUATION, Structure
@@ -26,6 +26,18 @@ ABKOWITZ = Structure(
     source="Chislett & Strom-Tejsen 1965, Planar motion mechanism tests and full-scale steering and "
     "manoeuvring predictions for a Mariner class vessel; Cao 2015, equations 13 to 17",
     equations={"u": prime_terms("u uu uuu vv rr dd udd vr vd uvd"), "v": SWAY_AND_YAW, "r": SWAY_AND_YAW},
+)
+
+FULL_SWAY_AND_YAW = prime_terms("0 0u 0uu v r d uv ur ud vvv vvr vrr rrr vvd vrd rrd vdd rdd ddd uuv uur uud")
+ABKOWITZ_FULL = Structure(
+    name="abkowitz-full",
+    source="Abkowitz 1964, Lectures on ship hydrodynamics, steering and manoeuvrability: the expansion to "
+    "third order, every product that port and starboard symmetry allows, and the asymmetry terms 0, 0u, 0uu",
+    equations={
+        "u": prime_terms("u uu uuu vv rr dd vr vd rd uvv urr udd uvr uvd urd"),
+        "v": FULL_SWAY_AND_YAW,
+        "r": FULL_SWAY_AND_YAW,
+    },
 )
 
 
@@ -123,7 +135,7 @@ STRUCTURES: dict[str, Structure] = {
     structure.name: structure
     for structure in (
         NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
-        ABKOWITZ, CUBIC, MMG_4DOF, PMM38, PMM18,
+        ABKOWITZ, ABKOWITZ_FULL, CUBIC, MMG_4DOF, PMM38, PMM18,
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)
@@ -131,22 +143,27 @@ WITH_REFERENCE = "grey-box"  # a table that stands on a reference ship, which on
 
 
 SHIPPED_EQUATIONS: dict[str, ShipEquations] = {
-    ship.name: ship for ship in (container.SHIP, tanker.SHIP, kvlcc2.SHIP)
+    ship.name: ship for ship in (container.SHIP, tanker.SHIP, kvlcc2.SHIP, mmg.SHIP)
 }
 #: Ships with equations of their own by name, registered ones included.
 EQUATIONS = dict(SHIPPED_EQUATIONS)
 
 
 def list_structures() -> list[str]:
-    """Names of the structures that can be identified, registered ones and the grey box included."""
-    return [*STRUCTURES, WITH_REFERENCE]
+    """Names of the structures that can be identified, registered ones, grey box and MMG form included."""
+    return [*STRUCTURES, WITH_REFERENCE, mmg.MMG]
 
 
 def get_structure(name: str) -> Structure:
     """An identified structure by name.
 
-    Raises InputError if there is none of that name, or it is the grey box, which takes a reference ship.
+    Raises InputError if there is none of that name, it is the grey box, which takes a reference ship, or the
+    MMG form, which is no table.
     """
+    if name == mmg.MMG:
+        raise InputError(
+            "structure: 'mmg' found, which is no table of terms; choose one, such as 'abkowitz' or 'cubic'"
+        )
     if name == WITH_REFERENCE:
         raise InputError(
             "structure: 'grey-box' found, which is a reference ship and a table of terms; give the reference "

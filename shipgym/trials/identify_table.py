@@ -84,7 +84,8 @@ class Options:
         NUMBER, "shaft speed at service speed, 1/s; by default that at the start of the trials", above=0.0
     )
     reference_model: Any = _model(
-        TEXT, "reference ship of a grey box: auto (the one most like this ship), a name, or a file",
+        TEXT, "reference ship of a grey box or of the prior of `mmg`: auto (the one most like this ship), a "
+        "name, or a file",
         common=True,
     )  # fmt: skip
 
@@ -232,10 +233,12 @@ class Options:
 
     prior: Any = _prior(
         TEXT, "what the coefficients are pulled to: a reference ship at this ship's scale (auto, a name or a "
-        "file), or the regression formulas clarke or kijima", common=True,
+        "file), or the regression formulas clarke or kijima; of `mmg` yoshimura (its default) or kijima",
+        common=True,
     )  # fmt: skip
     prior_strength: float | None = _prior(
-        NUMBER, "strength of that pull: 0 for none, inf for the prior itself; by default by cross-validation",
+        NUMBER, "strength of that pull: 0 for none, inf for the prior itself; of `mmg` by what its standard "
+        "deviations are divided; by default by cross-validation",
         common=True, at_least=0.0,
     )  # fmt: skip
     prior_folds: str = _prior(
@@ -248,7 +251,7 @@ class Options:
         check_choice(self.uncertainty, OPTIONS["uncertainty"].choices, "uncertainty")
         for name, unset in (("prior_strength", None), ("prior_folds", "trials")):
             found = getattr(self, name)
-            if self.prior is None and found != unset:
+            if self.prior is None and found != unset and self.structure != "mmg":
                 raise InputError(f"{name}: {found!r} found without a prior; name one, or leave it out")
 
     @classmethod

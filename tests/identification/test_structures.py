@@ -11,14 +11,14 @@ import pytest
 import shipgym
 from identification import identify
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
-from shipgym.manoeuvres import zigzag
+from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import STRUCTURES, get_structure
 
 L, U0, N0 = 160.93, 7.7175, 1.2
 PARTICULARS = Particulars(length=L, speed=U0)  # accelerations need no mass
 GEAR = SteeringGear(35.0, 5.0, 1.0)
-OTHERS = ("abkowitz", "surge", "surge-perturbed", "mmg4dof", "pmm38", "pmm18")
+OTHERS = ("abkowitz", "abkowitz-full", "surge", "surge-perturbed", "mmg4dof", "pmm38", "pmm18")
 STEERED = [name for name in STRUCTURES if name not in OTHERS]
 
 LINEAR = {"b_v": -0.06, "b_r": -2.3, "b_d": -0.08, "c_v": -1e-3, "c_r": -0.104, "c_d": 3.7e-3}
@@ -234,3 +234,29 @@ def test_a_missing_shaft_speed_is_named() -> None:
         identify([stopped], "cubic", particulars=PARTICULARS)
     with pytest.raises(InputError, match="service_shaft_speed: -1 found"):
         identify([stopped], "cubic", particulars=PARTICULARS, service_shaft_speed=-1.0)
+
+
+def test_full_third_order_has_every_product_that_symmetry_allows_and_holds_an_unstable_ships_turn() -> None:
+    """The tanker, of other equations and unstable on course: 0.3 deg of heading, 11 by the Mariner form."""
+    table = get_structure("abkowitz-full")
+    odd = {"v", "r", "delta"}
+    for q, parity in (("u", 0), ("v", 1), ("r", 1)):
+        powers = {tuple(sorted(term.powers)) for term in table.terms(q)}
+        assert len(powers) == {"u": 15, "v": 22, "r": 22}[q]
+        uneven = [p for p in powers if sum(n for s, n in p if s in odd) % 2 != parity]
+        assert sorted(uneven) == ([] if q == "u" else [(), (("du", 1),), (("du", 2),)])
+    ship = shipgym.load_model("tanker")
+    travel = ship.particulars["length"] / ship.particulars["speed"]
+    runs = [
+        zigzag(ship, rudder, heading, port_first=port, duration=25 * travel, dt=0.05 * travel)
+        for rudder, heading, port in ((10, 10, False), (20, 20, True), (30, 10, False), (35, 20, True))
+    ]
+    turn = turning_circle(ship, 25, duration=15 * travel, dt=0.05 * travel)
+    trials = [run.with_(name=f"zigzag-{k}") for k, run in enumerate(runs)]
+    trials.append(turn.with_(name="turn", use="validate"))
+    missed = {}
+    for structure in ("abkowitz", "abkowitz-full"):
+        fit = identify(trials, structure, particulars=ship.particulars, steering=ship.steering)
+        missed[structure] = np.degrees(fit.metrics["trials"]["turn"]["rmse"]["psi"])
+    assert missed["abkowitz"] > 8.0
+    assert missed["abkowitz-full"] < 1.0

@@ -1,0 +1,294 @@
+"""The coefficients of the MMG form that trials and prior make most probable, by simulation error in segments.
+
+The cost is that of the simulated states in segments back to back, each started from the smoothed measurement,
+by their own scatter, plus the squared distance from the prior (Maine & Iliff 1985, NASA RP-1138, 2.5, output
+error with prior). How much narrower the prior is made, the trials decide, each predicted from the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from identification.options import Options, name_of
+from identification.regression.problem import Problem
+from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
+from identification.simulation_error.segments import Segment, compared_channels, cut
+from shipgym.checks import check_number
+from shipgym.engine.loops import ship_loop
+from shipgym.engine.motion import Ship
+from shipgym.engine.records import LANES
+from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.ships.mmg import IDENTIFIED
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+Rows = NDArray[np.int64]
+
+MAP, DEFAULT_METHOD = "map", Options.method
+SEGMENT_LENGTHS, INTERVAL = 1.7, 0.067  # of segments, and between samples, ship lengths at service speed
+CORRELATED = 1.0  # ship lengths, over which errors are one error
+FLOORS = {"u": 0.0017, "v": 0.0017, "r": 0.0021, "psi": np.radians(0.1)}  # by U0, U0, U0 / L, 1
+STRENGTHS = (1.0, 2.0, 3.0)  # of the prior: its deviations divided by it
+MARGIN = 0.1  # by which the error held out may exceed the least for a stronger prior
+STEPS_HELD_OUT = 2  # of Gauss-Newton, from the fit of all trials to that of some
+STEP = 1e-4  # of finite differences, standard deviations of the prior
+MOST_GROUPS, PIECES = 5, 3  # groups of trials held out; pieces of a single trial
+LARGEST = 1e3  # residual of a ship that runs away, in scales
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What a fit found."""
+
+    z: Floats  # coefficients in standard deviations of the prior from its mean, shape (41,)
+    scales: Floats  # of the residuals by channel
+    strength: float  # of the prior
+    covariance: Floats  # of z, Gauss-Newton
+    evaluations: int
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """The model of greatest probability and its covariance."""
+
+    model: ShipModel
+    report: dict[str, Any]  # for the provenance
+
+
+def checked_mmg(options: Options) -> Options:
+    """The options of an identification of the MMG form; InputError for those that it does not have."""
+    method = name_of(options.method)
+    if method not in (MAP, DEFAULT_METHOD):
+        raise InputError(
+            f"method: {method!r} found with structure 'mmg', which is not linear in its coefficients: it is "
+            "fitted by simulation error with a prior; leave the method out, or choose another structure"
+        )
+    others = [name for name in options.settings() if getattr(options, name) is not None]
+    if others:
+        raise InputError(
+            f"settings: {', '.join(others)} found, which structure 'mmg' does not know; leave them out, or "
+            "choose another structure"
+        )
+    if options.prior is not None and options.reference_model is not None:
+        raise InputError(
+            f"reference_model: {name_of(options.reference_model)!r} found beside prior "
+            f"{name_of(options.prior)!r}, expected one of them: the coefficients of structure 'mmg' are "
+            "pulled to one reference ship, or to formulas"
+        )
+    return replace(options, method=MAP)
+
+
+def fit_mmg(problem: Problem, options: Options) -> Posterior:
+    """The MMG form of greatest probability; options by `checked_mmg`.
+
+    The prior is that of the `reference_model`, or of `prior`: a reference ship, or formulas, by default those
+    of Yoshimura & Masumoto 2012.
+    """
+    prior = mmg_prior(options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars)
+    blank = replace(problem.blank, particulars=prior.ship)
+    return maximum_a_posteriori(blank, problem.used, prior, options.prior_strength)
+
+
+def maximum_a_posteriori(
+    blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior, strength: float | None = None
+) -> Posterior:
+    """Fit the MMG form to trials.
+
+    Parameters
+    ----------
+    blank : ShipModel
+        Of structure `mmg`, complete but for its coefficients.
+    trials : sequence of Trial
+        With u, v, r, delta, n, and psi where known.
+    prior : MMGPrior
+        Before the trials.
+    strength : float, optional
+        Of the prior, by which its standard deviations are divided; by default the strongest of 1, 2, 3 whose
+        error, each trial predicted from the others, is within a tenth of the least.
+    """
+    if strength is not None:
+        check_number(strength, "prior_strength", above=0.0)
+    problem = _Problem(blank, trials, prior)
+    estimates: dict[float, Estimate] = {}
+    errors: dict[float, float] = {}
+    factors: dict[float, float] = {}
+    start, evaluations = np.zeros(len(IDENTIFIED)), 0
+    for value in STRENGTHS if strength is None else (strength,):
+        found = problem.solve(start, value)
+        estimates[value], start = found, found.z
+        errors[value], factors[value] = problem.held_out(found, estimates[min(estimates)].scales)
+        evaluations += found.evaluations
+    least = min(errors.values())
+    chosen = max(value for value, error in errors.items() if error <= (1.0 + MARGIN) * least)
+    best = estimates[chosen]
+    report = {
+        "prior": prior.source,
+        **({"similarity": dict(prior.similarity)} if prior.similarity else {}),
+        **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
+        "prior_strength": chosen,
+        "errors_held_out": {f"{value:g}": error for value, error in errors.items()},
+        "model_error": {"factor": factors[chosen], "how": "simulated segments of trials left out in turn"},
+        "segments": len(problem.segments),
+        "evaluations": evaluations,
+        "residual_rms": dict(zip(problem.channels, best.scales.tolist(), strict=True)),
+        "deviations_from_prior": dict(zip(IDENTIFIED, best.z.round(3).tolist(), strict=True)),
+    }
+    covariance = np.zeros((len(prior.mean),) * 2)
+    inner = slice(len(IDENTIFIED))
+    covariance[inner, inner] = (
+        factors[chosen] ** 2 * best.covariance * np.outer(prior.deviation, prior.deviation)
+    )
+    return Posterior(replace(problem.model(best.z), covariance=covariance), report)
+
+
+class _Problem:
+    """Segments, and what ships of given coefficients do in them."""
+
+    def __init__(self, blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior) -> None:
+        self.blank, self.prior = replace(blank, coefficients=prior.mean), prior
+        self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
+        self.numbers = self.blank.ship_numbers()
+        self.loop = ship_loop(self.blank.vessel, "segments")
+        self.channels = compared_channels(blank, trials)
+        self.columns = [blank.state_names.index(name) for name in self.channels]
+        ship = blank.particulars
+        self.travel = ship.length / ship.require("speed")
+        units = {"u": ship["speed"], "v": ship["speed"], "r": 1.0 / self.travel, "psi": 1.0}
+        self.floors = np.array([FLOORS[name] * units[name] for name in self.channels])
+        self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL)
+        self.groups = _groups(self.segments)
+        self.kept: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def model(self, z: Floats) -> ShipModel:
+        """The model of some coefficients."""
+        values = dict(zip(IDENTIFIED, (self.mean + z * self.prior.deviation).tolist(), strict=True))
+        return replace(self.blank, coefficients=self.prior.mean | values)
+
+    def at(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+        """As `simulated`, which is not done twice in a row."""
+        key = z.tobytes() + which.tobytes()
+        if key not in self.kept:
+            self.kept = {key: self.simulated(z, which)}
+        return self.kept[key]
+
+    def simulated(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+        """Errors of the simulated channels and their slopes, of some segments.
+
+        Each times the root of the share that its step has of the time over which errors are one error;
+        shapes (n_samples, n_channels) and (n_samples, n_channels, 41).
+        """
+        first, n = len(Ship._fields), len(IDENTIFIED)
+        ships = np.repeat(self.numbers, LANES).reshape(-1, LANES)
+        ships[first : first + n] = (self.mean + z * self.prior.deviation)[:, None]
+        ships[first + np.arange(n), 1 + np.arange(n)] += STEP * self.prior.deviation
+        found = np.concatenate([self._sailed(self.segments[k], ships.ravel()) for k in which])
+        errors = found[:, :, 0]
+        with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
+            slopes = (found[:, :, 1:] - errors[:, :, None]) / STEP
+        return errors, slopes
+
+    def _sailed(self, segment: Segment, ships: Floats) -> Floats:
+        """Errors of the ships of all lanes in a segment, shape (n_samples - 1, n_channels, 42)."""
+        state = np.repeat(segment.start, LANES)
+        out = np.empty((len(segment.measured), len(state)))
+        self.loop(state, ships, np.zeros(LANES), segment.inputs, segment.samples, out)
+        lanes = out.reshape(len(out), -1, LANES)[1:, self.columns, : len(IDENTIFIED) + 1]
+        share = np.sqrt(self._weight(segment) / len(lanes))
+        found: Floats = (lanes - segment.measured[1:, :, None]) * share
+        return found
+
+    def scales(self, errors: Floats, which: Rows) -> Floats:
+        """Root mean square of the errors by channel, not below the floors."""
+        shares = sum(self._weight(self.segments[k]) for k in which)
+        with np.errstate(invalid="ignore", over="ignore"):
+            rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
+        found: Floats = np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
+        return found
+
+    def _weight(self, segment: Segment) -> float:
+        return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.travel)
+
+    def solve(self, start: Floats, strength: float) -> Estimate:
+        """Fit all segments, the scales of the residuals renewed between rounds."""
+        everything, z, evaluations = np.arange(len(self.segments)), start, 0
+        for last in (False, False, True):
+            scales = self.scales(self.at(z, everything)[0], everything)
+            shots = _Shots(self, everything, scales, strength)
+            tolerance = 1e-4 if last else 1e-2
+            found = least_squares(
+                shots.residuals, z, shots.jacobian, method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30
+            )
+            z, evaluations = found.x, evaluations + found.nfev
+        return Estimate(z, scales, strength, _covariance(shots.at(z)[1]), evaluations)
+
+    def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
+        """Error of each group of segments by a fit of the others, and the factor on the standard errors.
+
+        The fit of the others takes Gauss-Newton steps from that of all. The error is in the scales given; the
+        factor makes the errors held out, by those that the covariance of the others' fit and the scatter of
+        the residuals lead to expect, one on average; at least 1.
+        """
+        errors, excess, expected = [], 0.0, 0.0
+        for group in np.unique(self.groups):
+            rest, held = np.flatnonzero(self.groups != group), np.flatnonzero(self.groups == group)
+            z = whole.z
+            for _ in range(STEPS_HELD_OUT):
+                shots = _Shots(self, rest, whole.scales, whole.strength)
+                jacobian = shots.jacobian(z)
+                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ shots.residuals(z))
+            covariance = _covariance(jacobian[: -len(z)])
+            tested = _Shots(self, held, whole.scales, 0.0)
+            error, slopes = tested.at(z)
+            weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
+            errors.append(np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2) / weight)
+            excess += float(error @ error) - weight
+            expected += float(np.sum((slopes @ covariance) * slopes))
+        return float(np.sqrt(np.mean(errors))), float(np.sqrt(max(excess / expected, 1.0)))
+
+
+def _covariance(slopes: Floats) -> Floats:
+    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    symmetric: Floats = 0.5 * (inverse + inverse.T)
+    return symmetric
+
+
+@dataclass(frozen=True, eq=False)
+class _Shots:
+    """The least-squares problem of some segments."""
+
+    problem: _Problem
+    which: Rows
+    scales: Floats
+    strength: float
+
+    def at(self, z: Floats) -> tuple[Floats, Floats]:
+        """Errors in their scales, shape (n_rows,), and their slopes, shape (n_rows, 41)."""
+        errors, slopes = self.problem.at(z, self.which)
+        with np.errstate(invalid="ignore"):
+            scaled = np.clip(np.nan_to_num(errors / self.scales, nan=LARGEST), -LARGEST, LARGEST)
+            steep = np.nan_to_num(slopes / self.scales[:, None], posinf=0.0, neginf=0.0)
+        return scaled.ravel(), steep.reshape(scaled.size, -1)
+
+    def residuals(self, z: Floats) -> Floats:
+        """Of the segments and the prior."""
+        return np.concatenate([self.at(z)[0], self.strength * z])
+
+    def jacobian(self, z: Floats) -> Floats:
+        """Of the residuals."""
+        return np.vstack([self.at(z)[1], self.strength * np.eye(len(z))])
+
+
+def _groups(segments: Sequence[Segment]) -> Rows:
+    """Which segments are held out together: of a trial, of every fifth one, or a third of a single one."""
+    trial = np.array([segment.trial for segment in segments])
+    if trial.max() == trial.min():
+        return np.arange(len(trial)) * PIECES // len(trial)
+    return trial % MOST_GROUPS

@@ -1,0 +1,279 @@
+"""The MMG form: its equations, what is known of it beforehand, and what trials tell of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import shipgym
+from identification import IdentificationResult, identify
+from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from shipgym import InputError, Particulars, ShipModel, Trial
+from shipgym.engine.motion import Motion, Ship
+from shipgym.manoeuvres import turning_circle, turning_indices
+from shipgym.ships import kvlcc2, mmg
+from shipgym.ships.scaling import scale_model
+
+L7 = mmg.SHIP.particulars
+
+
+def ship_of(changes: Mapping[str, float], particulars: Particulars = L7) -> ShipModel:
+    """KVLCC2 in the general form, some coefficients changed."""
+    known = mmg.standard_form(kvlcc2.SHIP.coefficients, 1.179, kvlcc2.SHIP.service_shaft_speed)
+    return ShipModel(
+        "mmg", "mmg", particulars, mmg.SHIP.steering, known | dict(changes),
+        service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
+    )  # fmt: skip
+
+
+def at(model: ShipModel, motion: Motion) -> np.ndarray:
+    """Accelerations by the plain functions."""
+    length, speed = model.particulars.length, model.particulars["speed"]
+    ship = Ship(length, speed, 0.6, 0.3, 0.0, model.service_shaft_speed, math.inf, speed)
+    numbers = mmg.Coefficients(*model.dynamics.numbers(model.coefficients, model.particulars).tolist())
+    return np.array(mmg.accelerations(motion, numbers, ship)[:3])
+
+
+def motions(count: int = 200) -> list[Motion]:
+    """States of hard manoeuvres."""
+    random, found = np.random.default_rng(0), []
+    for _ in range(count):
+        u = 1.179 * random.uniform(0.2, 1.1)
+        v, r = 0.3 * u * random.uniform(-1, 1), 0.8 * u / 7.0 * random.uniform(-1, 1)
+        delta, n = random.uniform(-0.6, 0.6), 11.85 * random.uniform(0.5, 1.2)
+        found.append(Motion(0.0, 0.0, 0.0, u, v, r, 0.0, 0.0, 0.0, delta, n))
+    return found
+
+
+def test_kvlcc2_in_the_general_form_has_her_own_accelerations() -> None:
+    ship = Ship(7.0, 1.179, 0.6, 0.3, 0.0, kvlcc2.SHIP.service_shaft_speed, math.inf, 1.179)
+    for motion in motions():
+        own = np.array(kvlcc2.accelerations(motion, kvlcc2.Coefficients(), ship)[:3])
+        np.testing.assert_allclose(at(ship_of({}), motion), own, rtol=0.0, atol=1e-13 * np.abs(own).max())
+    other_wake = dict(kvlcc2.SHIP.coefficients) | {"PACKAGE_FORM": 1.0}
+    with pytest.raises(InputError, match="form 'shipmmg' found, expected the published one"):
+        mmg.standard_form(other_wake, 1.179, 11.85)
+
+
+def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
+    motion = Motion(0.0, 0.0, 0.0, 0.7, -0.15, 0.07, 0.0, 0.0, 0.0, 0.4, 11.85)
+    mirrored = motion._replace(v=-motion.v, r=-motion.r, delta=-motion.delta)
+    plain = at(ship_of({}), motion)
+    helm = at(ship_of({"delta_0": 0.1}), motion._replace(delta=0.3))
+    np.testing.assert_allclose(helm, plain, rtol=1e-12)
+    assert at(ship_of({"c_R": 0.8}), motion)[2] > plain[2]  # a stronger rudder to starboard
+    slower = at(ship_of({"speed_power": 0.5}), motion)[2] - plain[2]
+    speed = math.hypot(motion.u, motion.v) / 1.179
+    less = at(ship_of({"Y_r": 0.083 * speed**0.5, "N_r": -0.049 * speed**0.5}), motion)[2] - plain[2]
+    assert slower == pytest.approx(less, rel=1e-9)
+    sides = {"C_2_side": 0.0, "gamma_R_side": 0.0}
+    for name in ("N_absr", "N_rr", "Y_0", "N_0"):  # even in r: without them port and starboard are alike
+        ship = ship_of(sides | {name: 0.01})
+        assert np.abs(at(ship, motion) - at(ship, mirrored) * [1, -1, -1])[2] > 1e-4
+    alike = at(ship_of(sides), motion) - at(ship_of(sides), mirrored) * [1, -1, -1]
+    np.testing.assert_allclose(alike, 0.0, atol=1e-15)
+    for x in (0.05, 0.4, 1.0, 1.5):
+        assert mmg.power_law(x, -0.7) == pytest.approx(x**-0.7, rel=1e-11)
+
+
+def test_twin_screws_and_rudders_count() -> None:
+    one, two = (
+        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p), strict=True))
+        for p in (L7, replace(L7, propellers=2.0, rudders=2.0, rudder_area=2 * L7.require("rudder_area")))
+    )
+    assert (one["eta"], two["eta"]) == pytest.approx((0.216 / 0.345,) * 2)  # each in a race of its own
+    assert (one["N"], two["N"]) == (1.0, 2.0)
+    assert mmg.dimensions(replace(L7, propellers=2.0))[6] == 0.0  # one rudder between the races
+    ahead = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85)
+    surge = [at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)]
+    assert surge[1] - surge[0] == pytest.approx(surge[2] - surge[1])
+    assert surge[1] > surge[0]
+
+
+def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> None:
+    model = ship_of({"speed_power": 0.3})
+    large = scale_model(model, 320.0)
+    for motion in motions(20):
+        fast, size = large.particulars["speed"] / 1.179, 320.0 / 7.0
+        same = motion._replace(u=fast * motion.u, v=fast * motion.v, r=fast / size * motion.r,
+                               n=fast / size * motion.n)  # fmt: skip
+        ours, theirs = at(model, motion), at(large, same)
+        np.testing.assert_allclose(theirs * [1, 1, size] * (size / fast**2), ours, rtol=1e-9)
+    model.save(tmp_path / "mmg.json")
+    again = shipgym.load_model(tmp_path / "mmg.json")
+    assert (again.structure, again.coefficients) == ("mmg", model.coefficients)
+    text = (
+        (tmp_path / "mmg.json")
+        .read_text()
+        .replace('"propeller_diameter": 0.216', '"propeller_diameter": null')
+    )
+    (tmp_path / "bad.json").write_text(text)
+    with pytest.raises(InputError, match=r"propeller_diameter is needed and not known"):
+        shipgym.load_model(tmp_path / "bad.json")
+    with pytest.raises(InputError, match="service_shaft_speed"):
+        replace(model, service_shaft_speed=0.0)
+
+
+def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
+    """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
+    prior = mmg_prior("yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None))
+    mean, own = prior.mean, ship_of({}).coefficients
+    assert [round(mean[name], 3) for name in ("my", "Jz")] == [own["my"], own["Jz"]]
+    assert mean["mx"] == pytest.approx(own["mx"], abs=0.002)
+    for name, within in (
+        ("Y_v", 0.1),
+        ("Y_r", 0.02),
+        ("Y_vvv", 0.15),
+        ("N_v", 0.01),
+        ("N_r", 0.005),
+        ("N_rrr", 0.01),
+    ):
+        assert mean[name] == pytest.approx(own[name], abs=within)
+    assert mean["f_alpha"] == pytest.approx(2.747, abs=0.5)
+    assert prior.ship.estimated >= {"rudder_area", "rudder_aspect_ratio"}
+    assert not prior.remarks
+    kijima = formula_coefficients("kijima", prior.ship)
+    assert kijima["N_vrr"] == pytest.approx(0.097, abs=0.003)  # -(0.5 d Cb / B - 0.05) for beta
+    assert kijima["X_vv"] == mean["X_vv"]
+    ahead = Motion(0.0, 0.0, 0.0, 1.179, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85159)
+    for source in ("yoshimura", "kijima", "kvlcc2-l7"):  # at service speed thrust balances resistance
+        found = mmg_prior(source, L7)
+        assert at(ship_of(found.mean, found.ship), ahead)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> None:
+    slim = Particulars(
+        length=100.0, beam=10.0, draught=5.0, block_coefficient=0.45, speed=10.0, rudder_area=8.0
+    )
+    remarks = mmg_prior("yoshimura", slim).remarks
+    assert any(
+        "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to" in r for r in remarks
+    )
+    assert any(r.startswith("L/B 10 is outside") for r in remarks)
+    for reference in ("auto", "kvlcc2"):
+        with pytest.raises(
+            InputError, match=r"is not like this ship: similarity -?[01]\.\d\d, expected at least 0.5"
+        ):
+            mmg_prior(reference, slim)
+    with pytest.raises(InputError, match="'tanker' found, which is not written in the MMG form"):
+        mmg_prior("tanker", L7)
+    assert mmg_prior("auto", L7).source == "kvlcc2-l7"
+
+
+TRUTH = {
+    "Y_v": -0.33, "N_r": -0.046, "N_v": -0.125, "thrust": 0.9, "c_R": 0.6, "delta_0": 0.01, "kappa": 0.55,
+    "R_0": 0.02, "speed_power": 0.3, "N_vvr": -0.33, "l_R": -0.75, "gamma_R": 0.55,
+}  # fmt: skip
+
+
+def sailed(ship: ShipModel, rudder_deg: float, leg_s: float, seed: int) -> Trial:
+    """Rudder reversed at intervals, as in a zigzag, with noise of a model basin."""
+    steps = np.arange(1000)
+    order = np.radians(rudder_deg) * np.where(steps // round(leg_s / 0.15) % 2 == 0, 1.0, -1.0)
+    order[:20] = 0.0
+    run = ship.simulate(np.column_stack([order, np.full(len(steps), ship.service_shaft_speed)]), 0.15)
+    random = np.random.default_rng(seed)
+    noise = {"u": 0.003, "v": 0.003, "r": 3e-4, "psi": 1e-3, "delta": 0.0, "n": 0.0}
+    channels = {c: run[c] + s * random.standard_normal(len(run)) for c, s in noise.items()}
+    return Trial(run.t, channels, name=f"rudder {rudder_deg:g}")
+
+
+@pytest.fixture(scope="module")
+def fitted() -> tuple[ShipModel, IdentificationResult]:
+    ship = ship_of(TRUTH)
+    trials = [sailed(ship, *run, seed) for seed, run in enumerate([(10, 12), (20, 9), (30, 8)])]
+    turn = sailed(ship, 35.0, 1000.0, 9).with_(name="turn", use="validate")
+    arguments: dict[str, Any] = {"particulars": L7, "steering": ship.steering, "reference_model": "kvlcc2-l7"}
+    return ship, identify([*trials, turn], "mmg", **arguments)
+
+
+def test_coefficients_are_recovered_within_their_errors(
+    fitted: tuple[ShipModel, IdentificationResult],
+) -> None:
+    ship, found = fitted
+    errors = found.standard_errors
+    off = np.array([(found.coefficients[c] - ship.coefficients[c]) / errors[c] for c in mmg.IDENTIFIED])
+    assert np.mean(np.abs(off) < 1.96) > 0.9
+    assert np.abs(off).max() < 3.0
+    for name in ("thrust", "R_0", "kappa"):  # what the trials tell better than the prior
+        assert abs(found.coefficients[name] - TRUTH[name]) < 0.6 * abs(
+            mmg.SHIP.coefficients[name] - TRUTH[name]
+        )
+    assert np.degrees(found.metrics["trials"]["turn"]["rmse"]["psi"]) < 6.0  # of 600 deg
+    assert found.stable
+    assert min(found.diagnostics[q].r_squared for q in "vr") > 0.9  # of accelerations from noisy velocities
+    assert [errors[name] for name in mmg.KNOWN] == [0.0] * len(mmg.KNOWN)
+    provenance = found.model.provenance or {}
+    assert (provenance["method"], provenance["prior"]) == ("map", "kvlcc2-l7")
+    assert set(provenance["errors_held_out"]) == {"1", "2", "3"}
+
+
+def test_models_drawn_hold_the_turn_that_no_trial_shows(
+    fitted: tuple[ShipModel, IdentificationResult],
+) -> None:
+    ship, found = fitted
+    truth, *drawn = (turn_lengths(model) for model in (ship, *found.model.sample(40, 0)))
+    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
+    assert np.all((low < truth) & (truth < high))
+    assert np.all((high - low) / truth < 0.25)  # and say something
+
+
+def turn_lengths(model: ShipModel) -> tuple[float, float]:
+    """Advance and tactical diameter of a 35 deg turn, ship lengths."""
+    travel = model.particulars.length / model.particulars["speed"]
+    found = turning_indices(turning_circle(model, 35.0, duration=20 * travel, dt=0.05 * travel), 7.0)
+    assert found.advance_lengths is not None
+    assert found.tactical_diameter_lengths is not None
+    return found.advance_lengths, found.tactical_diameter_lengths
+
+
+def test_its_result_is_saved_and_loaded_like_any_other(
+    fitted: tuple[ShipModel, IdentificationResult], tmp_path: Path
+) -> None:
+    _, found = fitted
+    assert "mmg by map" in found.summary()
+    found.save(tmp_path)
+    again = shipgym.load_model(tmp_path / "model.json")
+    state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
+    np.testing.assert_array_equal(again.derivatives(state, command), found.model.derivatives(state, command))
+    np.testing.assert_array_equal(again.covariance, found.model.covariance)
+    drawn = again.sample(2, 0)
+    assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
+    assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
+    assert "outside the range" not in (tmp_path / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
+        ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
+        (
+            {"prior": "kijima", "reference_model": "auto"},
+            r"reference_model: 'auto' found beside prior 'kijima'",
+        ),
+        ({"reference_model": "mariner"}, r"'mariner' found, which is not written in the MMG form"),
+        ({"prior": "clarke"}, r"prior: 'clarke' found with structure 'mmg', expected 'yoshimura'"),
+        ({"prior_strength": 0.0}, r"prior_strength: 0"),
+    ],
+)
+def test_options_it_does_not_have(options: dict[str, Any], message: str) -> None:
+    trial = sailed(ship_of({}), 20.0, 9.0, 0)
+    with pytest.raises(InputError, match=message):
+        identify([trial], "mmg", particulars=L7, steering=mmg.SHIP.steering, **options)
+
+
+def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None:
+    trial = sailed(ship_of({}), 20.0, 9.0, 0)
+    idle = Trial(trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle")
+    with pytest.raises(InputError, match="'idle': the rudder stays at 0.00 deg throughout"):
+        identify([idle], "mmg", particulars=L7)
+    without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
+    with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
+        identify([without], "mmg", particulars=L7)
