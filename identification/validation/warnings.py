@@ -54,8 +54,8 @@ def model_warnings(fit: Fit) -> list[str]:
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
             "held back; predictions far from the recorded manoeuvres are doubtful"
         )
-        found += _not_corrected(fit) + _not_refined(provenance) + _shaft_ignored(fit)
-        found += [*provenance.get("prior_remarks", []), *exactly_collinear(fit), *_lost_headings(fit)]
+    found += _not_corrected(fit) + _not_refined(provenance) + _shaft_ignored(fit)
+    found += [*provenance.get("prior_remarks", []), *exactly_collinear(fit), *_lost_headings(fit)]
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
     if derived:
         found.append(
