@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from identification.estimators.decomposition import centre_and_scale
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import MAD
+from shipgym.checks import check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -60,6 +61,7 @@ class LinearSupportVectorMachine(LinearRegressor):
 
         if not np.isfinite(check_weight(self.C)):
             raise InputError(f"C: {self.C} found, expected a finite number")
+        check_whole(self.seed, "seed", at_least=0, at_most=2**32 - 1, hint="which this method takes")
         if not 0.0 <= self.epsilon < np.inf:
             raise InputError(f"epsilon: {self.epsilon} found, expected a finite number of at least 0")
         X, y = validated(self, X, y)

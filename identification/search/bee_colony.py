@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
 from shipgym.checks import check_whole
 
 Floats = NDArray[np.float64]
@@ -38,9 +38,9 @@ class ArtificialBeeColony:
 
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise; see `Optimiser.minimise`."""
-        n = check_whole(self.sources, "sources", at_least=2)
-        check_whole(self.rounds, "rounds", at_least=1)
-        check_whole(self.limit, "limit", at_least=1)
+        n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
+        check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
+        check_whole(self.limit, "limit", at_least=1, at_most=MOST)
         low, high = check_bounds(bounds)
         rng = np.random.default_rng(seed)
         record = Recorder(objective)

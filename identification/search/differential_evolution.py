@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
 from shipgym.checks import check_whole
 
 
@@ -31,8 +31,8 @@ class DifferentialEvolution:
         """Minimise; see `Optimiser.minimise`."""
         from scipy.optimize import Bounds, differential_evolution
 
-        check_whole(self.members, "members", at_least=5)
-        check_whole(self.rounds, "rounds", at_least=1)
+        check_whole(self.members, "members", at_least=5, at_most=MOST)
+        check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         low, high = check_bounds(bounds)
         record = Recorder(objective)
 

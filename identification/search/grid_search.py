@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.search.search import Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
 from shipgym.checks import check_whole
 
 
@@ -31,8 +31,8 @@ class GridSearch:
 
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise; see `Optimiser.minimise`. The seed changes nothing."""
-        points = check_whole(self.points, "points", at_least=3)
-        check_whole(self.refinements, "refinements", at_least=0)
+        points = check_whole(self.points, "points", at_least=3, at_most=MOST)
+        check_whole(self.refinements, "refinements", at_least=0, at_most=MOST)
         low, high = check_bounds(bounds)
         record = Recorder(objective)
         first, last = low, high

@@ -14,6 +14,7 @@ from shipgym.errors import InputError
 Floats = NDArray[np.float64]
 
 LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
+MOST = 100_000  # particles, rounds and the like of a search
 
 #: Values of candidates, an array of shape (n_candidates, n_dimensions) -> (n_candidates,).
 Objective = Callable[[Floats], Floats]

@@ -70,7 +70,9 @@ class Refinement:
     anchor_weight: float = 1e-3  # of the squared residuals of those turns
 
     def __post_init__(self) -> None:
-        check_number(self.segment_lengths, "segment_lengths", above=0.0, hint="in ship lengths")
+        check_number(
+            self.segment_lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint="in ship lengths"
+        )
         check_choice(self.segment_start, STARTS, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
         check_number(self.extra_weight, "extra_weight", above=0.0)

@@ -75,6 +75,8 @@ def cut(
 
 def _edges(t: Floats, duration: float, shift: float) -> Integers:
     """First samples of the segments, and the last sample; the last segment may be half as long again."""
+    if shift * duration >= t[-1] - t[0]:
+        return np.zeros(0, dtype=np.int64)
     count = max(round((t[-1] - t[0]) / duration - shift), 1)
     times = t[0] + shift * duration + np.arange(count) * (t[-1] - t[0] - shift * duration) / count
     edges = np.append(np.searchsorted(t, times), len(t) - 1)

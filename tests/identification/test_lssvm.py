@@ -167,6 +167,7 @@ def test_polynomial_kernel_learns_a_quadratic() -> None:
         (TunedLSSVM(folds="trials"), "folds: 'trials' found with 0 trials"),
         (TunedLSSVM(optimiser=ArtificialBeeColony(sources=1)), "sources: 1"),
         (LinearSupportVectorMachine(epsilon=-1.0), "epsilon: -1"),
+        (LinearSupportVectorMachine(seed=2**32), "seed: 4294967296"),
         (LSSVM(kernel="rbf", C=np.inf), "finite"),
         (LSSVM(scale=[1.0, 2.0]), "scale"),
         (TruncatedLSSVM(selection="elbow"), "selection: 'elbow'"),

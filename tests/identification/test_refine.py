@@ -40,6 +40,7 @@ def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
     mariner: ShipModel, cao_zigzag: Trial
 ) -> None:
     travel = mariner.particulars["length"] / mariner.particulars["speed"]
+    assert len(cut([cao_zigzag], mariner, ("u", "v", "r"), 1e6, True)) == 1  # the whole trial
     segments = cut([cao_zigzag], mariner, ("u", "v", "r"), 4.0, True)
     starts = [segment.times[0] for segment in segments]
     assert starts[0] == 0.0
@@ -177,6 +178,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
     ("settings", "message"),
     [
         ({"segment_lengths": 0.0}, "segment_lengths: 0"),
+        ({"segment_lengths": 1e100}, "segment_lengths: 1e[+]100"),
         ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
         ({"pull": -1.0}, "pull: -1"),
         ({"extra_weight": float("nan")}, "extra_weight: nan"),

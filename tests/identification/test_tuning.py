@@ -112,6 +112,7 @@ def test_values_that_are_not_numbers_are_never_the_best() -> None:
         ({"objective": lambda x: x}, "one value for each row"),
         ({"optimiser": ArtificialBeeColony(limit=0)}, "limit: 0"),
         ({"optimiser": ParticleSwarm(particles=0)}, "particles: 0"),
+        ({"optimiser": ParticleSwarm(particles=2**62)}, "at least 1 and at most 100000"),
         ({"optimiser": GridSearch(points=2)}, "points: 2"),
         ({"optimiser": DifferentialEvolution(members=1)}, "members: 1"),
     ],
