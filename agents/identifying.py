@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from identification import IdentificationResult, identify
 from identification.design.reduced import ReducedIdentification, identify_reduced
 from identification.estimators.methods import METHODS
 from identification.validation.comparison import Comparison, compare_methods
-from shipgym.errors import InputError
+from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.identify_table import check_options
 from shipgym.trials.ship_file import ShipFile
@@ -61,7 +60,7 @@ def identify_trials(
     ship: ShipFile, trials: Sequence[Trial], arguments: Mapping[str, Any]
 ) -> IdentificationResult:
     """`identify_ship` for trials that are read already, both from `trials_of`."""
-    with _named(ship):
+    with placed(str(ship.path)):
         return identify(trials, particulars=ship.particulars, steering=ship.steering, **arguments)
 
 
@@ -74,7 +73,7 @@ def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | Non
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
-    with _named(ship):
+    with placed(str(ship.path)):
         return compare_methods(
             trials, names or None, particulars=ship.particulars, steering=ship.steering, **arguments
         )
@@ -85,16 +84,7 @@ def reduce_ship(
 ) -> ReducedIdentification:
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
-    with _named(ship):
+    with placed(str(ship.path)):
         return identify_reduced(
             trials, direction, tolerance, particulars=ship.particulars, steering=ship.steering, **arguments
         )
-
-
-@contextmanager
-def _named(ship: ShipFile) -> Iterator[None]:
-    """Errors name the ship file."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{ship.path}: {error}") from None

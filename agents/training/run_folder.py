@@ -19,7 +19,7 @@ from typing import Any
 from agents.output import present
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import present_names
-from shipgym.checks import check_keys, check_table, check_whole, data_only
+from shipgym.checks import Shape, check_keys, check_shape, check_table, check_whole, data_only, placed
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -27,6 +27,10 @@ FORMAT = 1
 RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json"
 AGENT, LAST, TENSORBOARD = "agent.json", "last.json", "tensorboard"
 FIELDS = ("format", "configuration", "threads", "command", "versions")
+CONFIGURATION: Shape = {
+    "algorithm": (str,), "task": (str,), "environment": (str,), "model": (str,), "options": {},
+    "settings": {}, "seed": (int,), "randomise": (bool,),
+}  # fmt: skip
 PACKAGES = ("shipgym", "numpy", "numba", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
 REMEDY = "begin the run anew in another folder"
 
@@ -74,12 +78,9 @@ def read_plan(folder: Path, given: Given | None = None) -> Plan:
     configuration = content["configuration"]
     named = {name: configuration.get(name) for name in ("model", "options")}
     data_only(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
-    try:
+    with placed(where):
+        check_shape(configuration, CONFIGURATION, "configuration")
         plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"{where}: configuration: {error} is missing or of another kind; {REMEDY}") from None
     check_same(plan.configuration(), configuration, str(folder))
     return plan
 
