@@ -108,38 +108,27 @@ def tune(
         else, or every trial of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
-    with in_use(Path(out)):
-        return _tuned(plan, Path(out), trials, fixed, where, progress, training or train_trial)
+    folder = Path(out)
+    with in_use(folder):
+        study = _opened(folder, plan, fixed)
+        found: list[Trial] = []
+        for first in range(0, trials, BATCH):
+            proposed = _proposed(plan, found, min(BATCH, trials - first), fixed)
+            best = min((trial.cost for trial in found if trial.cost is not None), default=None)
 
+            def tell(done: int, _: int, before: int = first, best: float | None = best) -> None:
+                if progress is not None:
+                    progress(before + done, trials, best)
 
-def _tuned(
-    plan: Plan,
-    folder: Path,
-    trials: int,
-    fixed: Sequence[str],
-    where: JobEngine,
-    progress: Callable[[int, int, float | None], None] | None,
-    training: Callable[[dict[str, Any]], dict[str, Any]],
-) -> Tuning:
-    study = _opened(folder, plan, fixed)
-    found: list[Trial] = []
-    for first in range(0, trials, BATCH):
-        proposed = _proposed(plan, found, min(BATCH, trials - first), fixed)
-        best = min((trial.cost for trial in found if trial.cost is not None), default=None)
-
-        def tell(done: int, _: int, before: int = first, best: float | None = best) -> None:
-            if progress is not None:
-                progress(before + done, trials, best)
-
-        jobs = [_job(plan, settings, found) for _, settings in proposed]
-        results = replace(where, keep=folder / KEPT).run(training, jobs, tell)
-        for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
-            found.append(_trial(first + k, parameters, settings, result))
-        _record(study, found, plan, fixed)
-        if all(trial.ended == "diverged" for trial in found):
-            raise InputError(f"every trial diverged, the first: {results[0]['why']}")
-        _write_best(folder, plan, found)
-    return Tuning(tuple(found), _best(found))
+            jobs = [_job(plan, settings, found) for _, settings in proposed]
+            results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
+            for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
+                found.append(_trial(first + k, parameters, settings, result))
+            _record(study, found, plan, fixed)
+            if all(trial.ended == "diverged" for trial in found):
+                raise InputError(f"every trial diverged, the first: {results[0]['why']}")
+            _write_best(folder, plan, found)
+        return Tuning(tuple(found), _best(found))
 
 
 def evaluated_evenly(plan: Plan) -> Plan:

@@ -464,19 +464,19 @@ class Engine:
         return plan[tile, :, lane].reshape(-1, 2).copy()
 
 
-def as_array(actions: Any, where: str) -> NDArray[Any]:
-    """Actions as an array; raises InputError for lists of several lengths and what NumPy cannot read."""
+def as_array(actions: Any) -> NDArray[Any]:
+    """Actions as an array; one of objects where NumPy cannot read them, such as ragged lists."""
     try:
         return np.asarray(actions)
-    except (TypeError, ValueError, RuntimeError) as error:
-        raise InputError(f"{where}: {type(actions).__name__} found, not an array ({error})") from None
+    except (TypeError, ValueError, RuntimeError):
+        return np.array(None)
 
 
 def as_numbers(actions: Any, where: str) -> NDArray[Any]:
-    """Actions as an array of real numbers; raises InputError for texts, objects and complex numbers."""
-    array = as_array(actions, where)
+    """Actions as an array; raises InputError for texts, objects, complex numbers and ragged lists."""
+    array = as_array(actions)
     if array.dtype.kind not in "fiub":
-        raise InputError(f"{where}: array of {array.dtype} found, expected real numbers in [-1, 1]")
+        raise InputError(f"{where}: {actions!r} found, expected real numbers, see the action space")
     return array
 
 

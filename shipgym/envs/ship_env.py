@@ -259,7 +259,7 @@ def refuse_step() -> int:
 
 def _one_order(action: Any) -> int:
     """The number of a discrete rudder order."""
-    array = as_array(action, "action")
+    array = as_array(action)
     if array.shape != () or array.dtype.kind not in "iu" or not 0 <= array < len(RUDDER_ORDERS):
         raise InputError(
             f"action: {action!r} found, expected a whole number from 0 to {len(RUDDER_ORDERS) - 1}: "

@@ -212,7 +212,7 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         return shown.observations, shown.outcomes[0], shown.terminated, shown.truncated, infos
 
     def _commands(self, actions: Any) -> Any:
-        array = as_array(actions, "actions")
+        array = as_array(actions)
         if array.shape != (self.num_envs,) or array.dtype.kind not in "iu":
             raise InputError(
                 f"actions: {array.dtype} of shape {array.shape} found, "
