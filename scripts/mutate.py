@@ -178,9 +178,11 @@ def faults(module: str, kind: str) -> list[Fault]:
     passed, nodes = parsed(module)
     found = []
     for number, operator in enumerate(KINDS[kind]):
-        places = [place for node in nodes for place in operator.mutation_positions(node)]
-        for occurrence, (start, _) in enumerate(places):
-            if not any(first <= start <= last for first, last in passed):
+        places = [(place, node) for node in nodes for place in operator.mutation_positions(node)]
+        for occurrence, ((start, _), node) in enumerate(places):
+            # * and ** before arguments are no products
+            signature = node.type == "operator" and node.parent.type not in ("arith_expr", "term")
+            if not signature and not any(first <= start <= last for first, last in passed):
                 found.append(Fault(module, start[0], kind, number, occurrence))
     return found
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 LIMIT: "float | None" = 2.5
 
 
-def half(x: "int | None", go: bool = True) -> float | None:
+def half(x: "int | None", *, go: bool = True) -> float | None:
     """Half of x + 1."""
     if x is None or not go:
         raise ValueError("none")

@@ -146,3 +146,11 @@ def test_waves_teach_it_little_that_is_wrong():
     ours, theirs = (sail(kind.from_model(MARINER), MARINER, task, seeds) for kind in (AdaptiveLQ, LQ))
     assert not ours.terminated.any()
     assert ours.cost.mean() < 1.2 * theirs.cost.mean()
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("forgetting_lengths", 0.0), ("redesign_lengths", 0.0), ("noise", -1.0)]
+)
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        AdaptiveLQ.from_model(MARINER, **{name: value})

@@ -115,3 +115,12 @@ def test_impossible_designs_are_refused():
     for arguments in ({"reference_share": 0.0}, {"tracking_lengths": -1.0}, {"wave_period": 1.0}):
         with pytest.raises(InputError, match=f"{next(iter(arguments))}: .* found"):
             FilteredPID.from_model(MARINER, **arguments)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("largest_turn_rate_deg_s", 0.0), ("reference_share", 0.0), ("tracking_lengths", -1.0)],
+)
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        FilteredPID.from_model(MARINER, **{name: value})

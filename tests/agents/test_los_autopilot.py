@@ -114,3 +114,9 @@ def test_course_keeping_and_another_corridor_are_refused():
         check_controller(guided, MARINER, path_following_task(corridor=0.5))
     with pytest.raises(InputError, match=r"observation: shape \(8,\) found, expected \(9,\)"):
         guided.predict(np.zeros(8))
+
+
+@pytest.mark.parametrize(("name", "value"), [("lookahead_lengths", 0.0)])
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        LineOfSight.from_model(MARINER, **{name: value})

@@ -141,3 +141,11 @@ def test_impossible_designs_are_refused():
         LQG.from_model(MARINER, wave_period=1.0)
     with pytest.raises(InputError, match="noise: 0 found"):
         LQG.from_model(MARINER, noise=0.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("wave_heading_deg", 0.0), ("disturbance_deg", 0.0), ("rudder_weight", -1.0)]
+)
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        LQG.from_model(MARINER, wave_period=9.0, **{name: value})

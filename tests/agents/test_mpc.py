@@ -131,3 +131,9 @@ def test_without_the_solver_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "osqp", None)
     with pytest.raises(InputError, match=r"OSQP is not installed; .* pip install 'shipgym\[mpc\]'"):
         MPC.from_model(MARINER)
+
+
+@pytest.mark.parametrize(("name", "value"), [("horizon_lengths", 0.0), ("horizon_lengths", 20.1)])
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        MPC.from_model(MARINER, **{name: value})

@@ -163,3 +163,9 @@ def test_a_policy_evaluation_of_stable_baselines3_takes_it_as_it_is():
 def test_impossible_designs_are_refused(arguments, message):
     with pytest.raises(InputError, match=message):
         PID.from_model(MARINER, **arguments)
+
+
+@pytest.mark.parametrize(("name", "value"), [("frequency", 0.0), ("damping", -1.0)])
+def test_numbers_beyond_their_bounds_are_refused(name, value):
+    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+        PID.from_model(MARINER, **{name: value})

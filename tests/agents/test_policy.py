@@ -207,3 +207,33 @@ def test_a_base_of_other_observations_is_refused():
     assert other.observation_names == names
     with pytest.raises(InputError, match="base"):
         random_policy(base=other, authority=0.3)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"activation": "elu"}, "network.activation: 'elu' found"),
+        ({"output": "relu"}, "network.output: 'relu' found"),
+    ],
+)
+def test_networks_that_cannot_be_are_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(random_network(8, 4, 1), **changes)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda w, b: (w.astype(np.float64), b), r"weight: float64 of shape \(4, 8\) found, expected"),
+        (lambda w, b: (w[0], b), r"weight: float32 of shape \(8,\) found, expected float32 with 2 axes"),
+        (lambda w, b: (w.tolist(), b), r"weight: list of shape \(\) found"),
+        (lambda w, b: (w, b[:-1]), "bias: 3 found, expected 4, one for each row of weight"),
+        (lambda w, b: (w[:, :0], b), r"weight: shape \(4, 0\) found, expected numbers"),
+        (lambda w, b: (w + np.float32(np.nan), b), r"weight: nan found at \[0, 0\], expected finite numbers"),
+    ],
+)
+def test_layers_that_cannot_be_are_refused(change, message):
+    network = random_network(8, 4, 1)
+    first, *rest = network.layers
+    with pytest.raises(InputError, match=message):
+        replace(network, layers=(change(*first), *rest))

@@ -209,6 +209,7 @@ def test_the_command_trains_and_resumes(tmp_path):
     assert told["configuration"]["settings"]["n_steps"] == 32
     written = json.loads((run / "run.json").read_text())
     assert written["configuration"] == told["configuration"]
+    assert written["format"] == 1  # which later versions read
     assert {path.suffix for path in run.iterdir() if path.is_file()} == {".json", ".safetensors"}
     before = learned(run)
     settings = written["configuration"]["settings"]

@@ -10,7 +10,7 @@ import pytest
 import shipgym
 from identification import build_samples
 from identification.design.experiment import _gains, advise, fisher_information, standard_candidates
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import get_structure
 
@@ -125,3 +125,15 @@ def test_what_cannot_be_advised_is_named(ship: ShipModel) -> None:
         advise(ship, [])
     with pytest.raises(InputError, match="equations written by hand"):
         advise(shipgym.load_model("container"), [gentle(ship)])
+
+
+def test_candidates_that_no_ship_survives_are_refused(ship: ShipModel) -> None:
+    def lost(model: ShipModel) -> Trial:
+        raise UnstableModelError("lost", 1.0, {})
+
+    with pytest.raises(InputError, match="candidates: 1 found, none that model 'virtual' survives"):
+        advise(ship, [gentle(ship)], {"hard": lost})
+    both = {"hard": lost, "gentle": gentle}
+    assert list(advise(ship, [gentle(ship)], both).steps[0]) == ["gentle"]
+    with pytest.raises(InputError, match="number: 0 found"):
+        advise(ship, [gentle(ship)], number=0)

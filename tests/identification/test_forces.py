@@ -168,3 +168,16 @@ def test_rows_of_the_regression_know_their_force_and_their_trial() -> None:
     of_axis = [found.trial[found.equation == k].tolist() for k in range(3)]
     assert of_axis[0] == of_axis[1] == of_axis[2] == sorted(of_axis[0])
     assert {k: of_axis[0].count(k) for k in range(3)} == {k: len(run) for k, run in enumerate(runs)}
+
+
+def test_tests_that_tell_nothing_are_refused() -> None:
+    run = tank_tests()[0]
+    with pytest.raises(InputError, match="trials: none found, expected captive tests"):
+        force_regression([], PMM18, PARTICULARS)
+    stopped = Trial(run.t, {name: 0.0 * run[name] for name in run.channels}, name="stopped")
+    with pytest.raises(InputError, match="trial 'stopped': a ship at rest found"):
+        force_regression([stopped], PMM18, PARTICULARS)
+    with pytest.raises(InputError, match="rank: 3 found with method 'ls', which keeps all"):
+        identify_forces([run], "pmm18", PARTICULARS, method="ls", rank=3)
+    with pytest.raises(InputError, match="particulars: None found, expected at least length"):
+        identify_forces([run], "pmm18", None)

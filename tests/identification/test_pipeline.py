@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import shipgym
-from identification import IdentificationResult, identify
+from identification import LSSVM, ArtificialBeeColony, IdentificationResult, identify
+from identification.options import Options, name_of, provenance_settings
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships.simulate import open_loop
@@ -231,3 +232,44 @@ def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
     settings = {"C": 1e12} if method == "ls-svm" else {}
     fit = identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
     assert within_one_per_cent(fit, mariner) == 40
+
+
+def test_settings_are_recorded_as_json_knows_them(mariner: ShipModel) -> None:
+    """Infinity as null, arrays as lists, models and trials by name, estimators with their settings."""
+    options = Options.of({"structure": "abkowitz", "method": "ls", "samples": "spline", "window": 3})
+    given = {
+        "infinite": np.inf, "array": np.arange(3), "number": np.float64(2.5), "model": mariner,
+        "nested": {"a": (1, np.nan)}, "method": LSSVM(C=7.0), "search": ArtificialBeeColony(rounds=9),
+        "ship": SteeringGear(30.0, 2.0, 1.0), "none": None, "flag": True,
+    }  # fmt: skip
+    found = provenance_settings(options, given)
+    assert found["window"] == 3
+    assert (found["smooth"], found["guarded"]) == (options.smooth, options.guarded)
+    assert "preprocessing" not in found
+    assert (found["infinite"], found["array"], found["number"]) == (None, [0, 1, 2], 2.5)
+    assert (found["model"], found["nested"]) == ("mariner", {"a": [1, None]})
+    assert found["method"]["kind"] == "LSSVM"
+    assert found["method"]["C"] == 7.0
+    assert found["search"] == {"kind": "ArtificialBeeColony", "sources": 20, "rounds": 9, "limit": 20}
+    assert found["ship"] == SteeringGear(30.0, 2.0, 1.0).to_dict()
+    assert (found["none"], found["flag"]) == (None, True)
+    json.dumps(found, allow_nan=False)
+    cleaned = Options.of({"structure": "abkowitz", "method": "ls", "preprocessing": "median"})
+    assert provenance_settings(cleaned, {})["preprocessing"] == "median"
+    assert [name_of(one) for one in ("ls", mariner, LSSVM())] == ["ls", "mariner", "LSSVM"]
+
+
+def test_provenance_says_whether_the_steering_gear_was_given(
+    cao_fit: IdentificationResult, cao_zigzag: Trial, mariner: ShipModel
+) -> None:
+    assert cao_fit.model.provenance is not None
+    assert cao_fit.model.provenance["steering"] == "estimated"
+    assert "uncertainty" not in cao_fit.model.provenance
+    fit = identify([cao_zigzag], "nomoto", "ls", particulars=mariner.particulars, steering=mariner.steering)
+    assert fit.model.provenance is not None
+    assert fit.model.provenance["steering"] == "given"
+    (trial,) = fit.model.provenance["trials"]
+    derived = sorted(cao_zigzag.derived)
+    assert trial == {"name": cao_zigzag.name, "sha256": cao_zigzag.sha256, "derived": derived}
+    assert fit.model.provenance["ranks"] == {"r": 2}
+    assert "search" not in fit.model.provenance

@@ -157,3 +157,15 @@ def test_each_step_says_how_much_is_explained_and_of_what_is_held_out() -> None:
     assert second.coefficients == pytest.approx({"a": 2.0, "c": 1.0})
     assert second.held_out == pytest.approx(1.0)
     assert first.held_out == pytest.approx(0.8, abs=0.02)
+
+
+def test_numbers_beyond_their_bounds_are_refused() -> None:
+    X, y = orthogonal()
+    for name in ("tolerance", "threshold"):
+        with pytest.raises(InputError, match=f"{name}: -1 found"):
+            backward_elimination(X, y, NAMES, **{name: -1.0})
+    with pytest.raises(InputError, match="tolerance: -1 found"):
+        forward_selection(X, y, NAMES, tolerance=-1.0)
+    for change in (0.0, 1.0):
+        with pytest.raises(InputError, match=f"change: {change:g} found"):
+            sensitivity(virtual_ship("steering7"), turning_circle, change)

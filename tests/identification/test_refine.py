@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -194,3 +195,18 @@ def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao
     lacking = Trial(cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking")
     with pytest.raises(InputError, match="extra trial 'lacking': channel 'v' is missing"):
         identify([cao_zigzag], method="output-error", particulars=mariner.particulars, extra_trials=[lacking])
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("segment_lengths", 0.0),
+        ("segment_start", "anywhere"),
+        ("pull", -1.0),
+        ("extra_weight", 0.0),
+        ("anchor_weight", 0.0),
+    ],
+)
+def test_refinements_that_cannot_be_are_refused(name: str, value: Any) -> None:
+    with pytest.raises(InputError, match=f"{name}: .* found"):
+        Refinement(**{name: value})

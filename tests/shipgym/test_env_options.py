@@ -201,6 +201,7 @@ def test_a_tanker_goes_astern():
 
 
 def test_discrete_orders_are_the_continuous_ones():
+    assert RUDDER_ORDERS == (-1.0, -0.5, -0.25, -0.1, 0.0, 0.1, 0.25, 0.5, 1.0)
     discrete, continuous = make(action="rudder-discrete"), make()
     assert discrete.action_space == gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
     for env in (discrete, continuous):

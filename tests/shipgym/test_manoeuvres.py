@@ -172,6 +172,20 @@ def test_wrong_arguments(mariner, call, message):
         call(mariner)
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"heading_deg": 0.0}, "heading_deg: 0 found"),
+        ({"heading_deg": 181.0}, "heading_deg: 181 found"),
+        ({"rudder_deg": 91.0}, "rudder_deg: 91 found"),
+        ({"switch": "insde"}, "Did you mean 'inside'"),
+    ],
+)
+def test_zigzags_that_cannot_be_are_refused(mariner, options, message):
+    with pytest.raises(InputError, match=message):
+        manoeuvres.zigzag(mariner, **{"rudder_deg": 10.0, "heading_deg": 10.0} | options)
+
+
 def test_what_a_trial_lacks_is_named():
     trial = Trial([0, 1, 2], {"psi": [0, 0, 0.0]})
     with pytest.raises(InputError, match="'delta' is missing"):

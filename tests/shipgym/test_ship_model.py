@@ -242,3 +242,45 @@ def test_distance_and_range_of_a_state_are_those_of_the_matrix_and_of_the_box(st
     assert envelope_distance(motion, data) == pytest.approx(expected, abs=1e-12)
     inside = all(a <= x <= b for a, x, b in zip(low, state, high, strict=True))
     assert outside_range(motion, data) == (not inside)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"coefficients": {}}, r"structure 'abkowitz' has \d+; missing: .*X_u.*; unknown: none"),
+        ({"covariance": np.eye(3)}, r"covariance of 'mariner': shape \(3, 3\), expected \(\d+, \d+\)"),
+    ],
+)
+def test_models_that_do_not_fit_together_are_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        replace(shipgym.load_model("mariner"), **changes)
+
+
+def test_coefficients_are_numbers_and_known():
+    mariner = shipgym.load_model("mariner")
+    with pytest.raises(InputError, match="X_u is nan, expected a number"):
+        replace(mariner, coefficients=mariner.coefficients | {"X_u": np.nan})
+    with pytest.raises(InputError, match="missing: none; unknown: Z_u"):
+        replace(mariner, coefficients=mariner.coefficients | {"Z_u": 1.0})
+    backwards = dict(reversed(mariner.coefficients.items()))
+    assert list(replace(mariner, coefficients=backwards).coefficients) == list(mariner.coefficients)
+
+
+def test_states_and_commands_that_are_none_are_refused():
+    mariner, tanker = shipgym.load_model("mariner"), shipgym.load_model("tanker")
+    state = mariner.service_state
+    for states, commands, message in (
+        (state[:-1], [0.0], r"state: shape \(6,\) found, expected \(..., 7\) for x, y, psi"),
+        (0.0, [0.0], r"state: shape \(\) found"),
+        (state, [0.0, 0.0], r"command: shape \(2,\) found, expected \(..., 1\) for delta"),
+        (np.where(state > 0.0, np.inf, state), [0.0], "state: inf found, expected finite numbers"),
+        (state, [10.0], "command: row 0: rudder 10 found, expected rad .not degrees."),
+    ):
+        with pytest.raises(InputError, match=message):
+            mariner.derivatives(states, commands)
+    with pytest.raises(InputError, match=r"command: row 1: shaft speed 80 found, expected 1/s \(not rpm\)"):
+        tanker.derivatives(tanker.service_state, [[0.0, 1.0], [0.0, 80.0]])
+    with pytest.raises(InputError, match="water_depth: 18 m found, expected more than the draught"):
+        tanker.derivatives(tanker.service_state, tanker.service_command, 18.0)
+    many = mariner.derivatives(np.tile(state, (2, 3, 1)), np.zeros((3, 1)))
+    assert many.shape == (2, 3, 7)

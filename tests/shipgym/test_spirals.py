@@ -117,6 +117,15 @@ def test_wrong_arguments(call, message):
         call(load_model("mariner"))
 
 
+def test_a_tolerance_and_a_method_that_are_none_are_refused():
+    t = np.arange(50.0)
+    still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})
+    with pytest.raises(InputError, match="tolerance_deg: 0 found"):
+        manoeuvres.spiral_from_trial(still, tolerance_deg=0.0)
+    with pytest.raises(InputError, match="spiral method: 'dirct' found"):
+        manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.5, -0.1]), "dirct"))
+
+
 def test_what_a_trial_lacks_is_named():
     t = np.arange(50.0)
     still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})

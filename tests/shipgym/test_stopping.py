@@ -107,6 +107,8 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
         ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: 0 found"),
         ("tanker", lambda m: acceleration(m, duration=-5.0), "duration: -5 found"),
         ("tanker", lambda m: acceleration_indices(stopping(m)), "expected an acceleration"),
+        ("tanker", lambda m: acceleration_indices(stopping(m), 0.0), "part: 0 found"),
+        ("tanker", lambda m: acceleration_indices(stopping(m), 1.0), "part: 1 found"),
     ],
 )
 def test_wrong_arguments(name, call, message):

@@ -204,3 +204,34 @@ def test_the_track_is_the_integral_of_the_velocity():
     np.testing.assert_allclose(
         trial["psi"], cumulative_trapezoid(trial["r"], trial.t, initial=0.0), atol=1e-4
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "beyond", "least"),
+    [
+        ("speed", 0.0, 0.1),
+        ("shaft_speed", 0.0, 0.1),
+        ("cycles", 0, 1),
+        ("samples", 7, 8),
+        ("noise", -0.1, 0.0),
+        ("seed", -1, 0),
+    ],
+)
+def test_tanks_that_cannot_be_are_refused(name, beyond, least):
+    assert getattr(Tank(**{name: least}), name) == least
+    with pytest.raises(InputError, match=rf"tank {name}: .* found, expected"):
+        Tank(**{name: beyond})
+
+
+def test_motions_that_cannot_be_towed_are_refused(mariner):
+    with pytest.raises(InputError, match="hold_s: 0 found"):
+        towing_tank.static_drift(mariner, [5.0], hold_s=0.0)
+    with pytest.raises(InputError, match=r"drift_deg\[1\]: 181 found"):
+        towing_tank.static_drift(mariner, [5.0, 181.0])
+    with pytest.raises(InputError, match="drift_deg: no angle found"):
+        towing_tank.static_drift(mariner, [])
+    for motion in (towing_tank.pure_surge, towing_tank.pure_sway, towing_tank.pure_yaw):
+        with pytest.raises(InputError, match=r"amplitude.*: 0 found"):
+            motion(mariner, 0.0)
+        with pytest.raises(InputError, match="period_s: 0 found"):
+            motion(mariner, 0.1, 0.0)
