@@ -68,6 +68,8 @@ def use_agent(agent: Any) -> None:
 
 def use_results(result: Any) -> None:
     """The tables that are printed, and every figure."""
+    if result is None:  # to be computed again
+        return
     for table in (ranking_table(result), costs_table(result)):
         SHOWN.print(table)
     for task, found in result.summary["tasks"].items():
@@ -210,6 +212,6 @@ KINDS = (
     Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
-    Kind("part", read_part, lambda found: found and use_results(found), prepare=keep_part, slow=10),
+    Kind("part", read_part, use_results, prepare=keep_part, slow=10),
     Kind("kept-result", read_kept, prepare=keep_results),
 )
