@@ -115,7 +115,7 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]], where: str) -
             raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
         shape = tuple(lengths.get(axis) if isinstance(axis, str) else axis for axis in named)
         array = check_array(table[name], shape, f"{where}.{name}")
-        fits = array.ndim == len(named) and 0 < array.size and np.abs(array).max() <= NUMBERS.largest
+        fits = array.ndim == len(named) and array.size > 0 and np.abs(array).max() <= NUMBERS.largest
         if not (fits and all(lengths.setdefault(a, n) == n for a, n in zip(named, array.shape, strict=True))):
             raise InputError(
                 f"{where}.{name}: expected numbers of magnitude {NUMBERS.largest:g} at most, of shape "

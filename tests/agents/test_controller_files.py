@@ -179,6 +179,7 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             r"arrays.kalman\[0\]: 3 entries .* 2 numbers",
         ),
         ("lqg", lambda arrays: arrays["kalman"][0].__setitem__(0, 1e5), "a sampled pole of size .* below 1"),
+        ("lqg", lambda arrays: arrays["transition"].append([0.0] * 3), r"shape \(states, states\)"),
         (
             "lqg",
             lambda arrays: arrays["output"].pop(),
