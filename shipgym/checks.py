@@ -76,6 +76,14 @@ def check_keys(
             raise InputError(f"{where}: field '{key}' is missing, expected {quoted(required)}")
 
 
+def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
+    """Refuse a file whose number `format` is another than the known one."""
+    if (found := content.get("format", known)) != known:
+        raise InputError(
+            f"{where}: format {shown(found)} found, this version of shipgym reads format {known}"
+        )
+
+
 def check_table(value: Any, where: str) -> Mapping[str, Any]:
     """Return `value`, which must be a table (a mapping with text as keys)."""
     if not isinstance(value, Mapping):

@@ -30,6 +30,7 @@ from agents.controllers.registry import controller_class, controller_kinds
 from shipgym.checks import (
     check_array,
     check_choice,
+    check_format,
     check_keys,
     check_number,
     check_table,
@@ -55,10 +56,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
 
     Raises InputError naming the field at fault.
     """
-    if "format" in content and content["format"] != FORMAT:
-        raise InputError(
-            f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
-        )
+    check_format(content, FORMAT, where)
     if "kind" in content:
         kinds = controller_kinds()
         kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
