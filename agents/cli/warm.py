@@ -40,9 +40,11 @@ def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json =
     """
     from agents.cli.terminal import out as console
     from agents.cli.terminal import print_json
-    from shipgym.engine.cache_folder import cache_folder
+    from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
 
+    if (folder := usable_folder()) is None:
+        raise InputError("there is no cache to fill, for the reason above")
     jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name))
     done = []
     for number, (what, job) in enumerate(jobs.items(), start=1):
@@ -59,9 +61,9 @@ def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json =
                 f"{number}/{len(jobs)}  {what}: {refused or f'{done[-1].seconds:.1f} s'}", soft_wrap=True
             )
     if as_json:
-        print_json({"cache": str(cache_folder()), "ready": [asdict(one) for one in done]})
+        print_json({"cache": str(folder), "ready": [asdict(one) for one in done]})
     else:
-        console.print(f"kept in {cache_folder()}", soft_wrap=True)
+        console.print(f"kept in {folder}", soft_wrap=True)
 
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:

@@ -231,6 +231,19 @@ def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     assert not list(here.iterdir())
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
+def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
+    tmp_path.chmod(0o777)
+    answer = subprocess.run(
+        [sys.executable, "-m", "agents.cli", "warm"], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "SHIPGYM_CACHE": str(tmp_path)},
+    )  # fmt: skip
+    assert answer.returncode == 2
+    assert "may be written by other users" in answer.stderr
+    assert "there is no cache to fill" in answer.stderr
+    assert not list(tmp_path.iterdir())
+
+
 def test_warm_knows_environments_and_models():
     answer = shipgym("warm", "titanic")
     assert answer.exit_code == 2
