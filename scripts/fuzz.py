@@ -21,6 +21,7 @@ import os
 os.environ["NUMBA_DISABLE_JIT"] = "1"  # equations of ships as plain Python: each structure would be compiled
 
 import math
+import sys
 import time
 from pathlib import Path
 from typing import Annotated
@@ -52,7 +53,10 @@ def main(
         raise typer.BadParameter(f"{unknown[0]!r} found, expected one of {', '.join(known)}")
     chosen = {name: one for name, one in known.items() if not kind or name in kind}
     work = chunks(chosen.values(), inputs)
-    total, console = sum(chunk.last - chunk.first for chunk in work), Console()
+    total, console = (
+        sum(chunk.last - chunk.first for chunk in work),
+        Console(width=None if sys.stdout.isatty() else 110),
+    )
     with Progress(console=console, disable=not console.is_terminal) as progress:
         bar = progress.add_task("inputs", total=total)
         reports = run(

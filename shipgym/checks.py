@@ -76,6 +76,14 @@ def check_keys(
             raise InputError(f"{where}: field '{key}' is missing, expected {quoted(required)}")
 
 
+def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
+    """Refuse a file whose number `format` is another than the known one."""
+    if (found := content.get("format", known)) != known:
+        raise InputError(
+            f"{where}: format {shown(found)} found, this version of shipgym reads format {known}"
+        )
+
+
 def check_table(value: Any, where: str) -> Mapping[str, Any]:
     """Return `value`, which must be a table (a mapping with text as keys)."""
     if not isinstance(value, Mapping):
@@ -156,7 +164,7 @@ def check_number(
 
 def check_whole(value: Any, where: str, *, at_least: int, at_most: float = math.inf, hint: str = "") -> int:
     """Return `value`, which must be a whole number from `at_least` to `at_most`."""
-    if isinstance(value, bool) or not isinstance(value, Integral) or not at_least <= value <= at_most:
+    if isinstance(value, bool) or not isinstance(value, Integral) or not at_least <= int(value) <= at_most:
         expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
         expected += f" and at most {at_most}" if at_most < math.inf else ""
         raise InputError(f"{where}: {shown(value)} found, expected {expected}")

@@ -35,6 +35,7 @@ LARGEST_NUMBER = 1e100
 
 #: A dotted key that nests deeper than allowed, on which `tomllib` spends time and memory by the square.
 _LONG_KEY = re.compile(rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{DEEPEST}}}""")
+_AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # without waiting, should a file have become a pipe
 #: What cannot be written in UTF-8, or ends a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
@@ -175,7 +176,7 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
         if not stat.S_ISREG(kind):
             found = "a folder" if stat.S_ISDIR(kind) else "no regular file (a device, a pipe or a socket)"
             raise InputError(f"{path}: this is {found}, expected a {what}")
-        with open(path, "rb", opener=_open_at_once) as file:
+        with open(path, "rb", opener=lambda name, flags: os.open(name, flags | _AT_ONCE)) as file:
             size = os.fstat(file.fileno()).st_size
             if not largest:
                 return b""
@@ -311,11 +312,6 @@ def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(table) < len(pairs):
         raise KeyError(Counter(key for key, _ in pairs).most_common(1)[0][0])
     return table
-
-
-def _open_at_once(path: str, flags: int) -> int:
-    """Open a file without waiting, should it have become a pipe."""
-    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
 
 def _names_beside(path: Path) -> list[str]:

@@ -72,9 +72,9 @@ class AdaptiveLQ(Stateful):
     ranges: ClassVar[Mapping[str, Range]] = {
         **Controller.ranges, "length": Range(1e-2, 1e4), "speed": Range(1e-3, 1e3),
         "gear_lag": Range(0.0, 1e4), "sway_error": Range(1e-9, 1e6), "yaw_error": Range(1e-9, 1e6),
-        "integral_time": Range(1e-3, 1e9), "rate_weight_s2": Range(1e-9, 1e9),
-        "rudder_weight": Range(1e-9, 1e9, RUDDER_WEIGHT),
-        "restless_limit": Range(1e-9, 1e3), "forgetting": Range(1e-6, 1.0), "redesign_steps": Range(1.0, 1e9),
+        "integral_time": Range(1e-6, 1e12), "rate_weight_s2": Range(1e-12, 1e12),
+        "rudder_weight": Range(1e-12, 1e12, RUDDER_WEIGHT), "restless_limit": Range(1e-9, 1e6),
+        "forgetting": Range(1e-300, 1.0), "redesign_steps": Range(1.0, 1e9),
     }  # fmt: skip
 
     prior: Floats

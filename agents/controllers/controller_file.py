@@ -30,6 +30,7 @@ from agents.controllers.registry import controller_class, controller_kinds
 from shipgym.checks import (
     check_array,
     check_choice,
+    check_format,
     check_keys,
     check_number,
     check_table,
@@ -55,10 +56,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
 
     Raises InputError naming the field at fault.
     """
-    if "format" in content and content["format"] != FORMAT:
-        raise InputError(
-            f"{where}: format {content['format']!r} found, this version of shipgym reads format {FORMAT}"
-        )
+    check_format(content, FORMAT, where)
     if "kind" in content:
         kinds = controller_kinds()
         kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
@@ -115,12 +113,12 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]], where: str) -
             raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
         shape = tuple(lengths.get(axis) if isinstance(axis, str) else axis for axis in named)
         array = check_array(table[name], shape, f"{where}.{name}")
-        if array.ndim != len(named) or not array.size or np.abs(array).max() > NUMBERS.largest:
+        fits = array.ndim == len(named) and array.size > 0 and np.abs(array).max() <= NUMBERS.largest
+        if not (fits and all(lengths.setdefault(a, n) == n for a, n in zip(named, array.shape, strict=True))):
             raise InputError(
                 f"{where}.{name}: expected numbers of magnitude {NUMBERS.largest:g} at most, of shape "
                 f"({', '.join(map(str, named))}); {REMEDY}"
             )
-        lengths |= dict(zip(named, array.shape, strict=True))
         arrays[name] = array
     return arrays
 

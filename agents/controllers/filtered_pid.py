@@ -27,7 +27,7 @@ DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
 # and second derivative, the integral, and the notch's four numbers of heading and of yaw rate
 LAST_ERROR, LAST_RATE, LEAD, TURN, TURN_RATE, GATHERED, NOTCHES = range(7)
 N_MEMORY = NOTCHES + 8
-FROM_NONE = Range(0.0, 1e3)  # of rates and frequencies; 0 leaves a filter out
+FROM_NONE = Range(0.0, 1e6)  # of rates and frequencies; 0 leaves a filter out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -46,11 +46,9 @@ class Guided(Controller):
     gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead", "integral")
     has_autopilot: ClassVar[bool] = True
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "lookahead": Range(1e-6, NUMBERS.largest),
-        "task_lookahead": Range(1e-6, NUMBERS.largest),
-        "integral": Range(0.0, NUMBERS.largest),
-    }
+        **Controller.ranges, "lookahead": Range(1e-6, NUMBERS.largest),
+        "task_lookahead": Range(1e-6, NUMBERS.largest), "integral": Range(0.0, NUMBERS.largest),
+    }  # fmt: skip
 
     autopilot: Policy  # steers by the first eight observations, those of course keeping
 

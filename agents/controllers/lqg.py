@@ -74,7 +74,7 @@ class LQG(Stateful):
         "kalman": ("states", len(OUTPUTS)),
         "output": (len(OUTPUTS), "states"),
     }
-    ranges: ClassVar[Mapping[str, Range]] = {**Controller.ranges, "new_course_rad": Range(1e-6, 10.0)}
+    ranges: ClassVar[Mapping[str, Range]] = {**Controller.ranges, "new_course_rad": Range(1e-6, 1e6)}
 
     transition: Floats
     input: Floats
@@ -83,9 +83,7 @@ class LQG(Stateful):
 
     def __post_init__(self) -> None:
         if len(self.input) not in STATES:
-            raise InputError(
-                f"arrays.input: {len(self.input)} states found, expected {STATES[0]} or {STATES[1]}"
-            )
+            raise InputError(f"arrays.input: {len(self.input)} states found, expected one of {STATES}")
         trusted = np.eye(len(self.input)) - self.kalman @ self.output
         check_stable(trusted @ self.transition, "arrays: transition of the Kalman filter")
 

@@ -65,10 +65,8 @@ class MPC(Stateful):
         "effect": (len(SIGNALS),),
     }
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "horizon_steps": Range(2, MOST_STEPS),
-        "rudder_rate_rad_s": Range(1e-6, 1e3),
-    }
+        **Controller.ranges, "horizon_steps": Range(2, MOST_STEPS), "rudder_rate_rad_s": Range(1e-6, 1e3),
+    }  # fmt: skip
 
     transition: Floats
     effect: Floats

@@ -47,7 +47,16 @@ from agents.policies.network import Layer, Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
-from shipgym.checks import check_keys, check_number, check_table, check_text, check_whole, placed, quoted
+from shipgym.checks import (
+    check_format,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    check_whole,
+    placed,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES
@@ -92,14 +101,8 @@ def _current(content: Mapping[str, Any]) -> dict[str, Any]:
 
 def _check_fields(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
     """All fields there, none besides, and of this format."""
-    if content.get("format") != FORMAT:
-        raise InputError(
-            f"{where}: format {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
-        )
-    check_keys(content, expected, where)
-    for name in expected:
-        if name not in content and name not in LATER:
-            raise InputError(f"{where}: field '{name}' is missing; the file has {quoted(expected)}")
+    check_format(content, FORMAT, where)
+    check_keys(content, expected, where, [name for name in expected if name not in LATER])
 
 
 def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> LearnedPolicy:

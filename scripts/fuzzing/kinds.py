@@ -17,10 +17,13 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent, load_results
+from agents.benchmarking.contestants import Contestant
+from agents.benchmarking.results import gathered
+from agents.benchmarking.run import _check_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.engines.jobs import run_jobs
-from agents.engines.serialisation import KeptResults, serialised
-from agents.suites.suite import parse_suite
+from agents.engines.serialisation import KeptResults, pack, serialised, unpack
+from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
 from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
 from agents.training.settings import load_settings, read_settings_file
@@ -65,6 +68,8 @@ def use_agent(agent: Any) -> None:
 
 def use_results(result: Any) -> None:
     """The tables that are printed, and every figure."""
+    if result is None:  # to be computed again
+        return
     for table in (ranking_table(result), costs_table(result)):
         SHOWN.print(table)
     for task, found in result.summary["tasks"].items():
@@ -169,6 +174,31 @@ def read_study(path: Path) -> Any:
     return _opened(path.parent, read_plan(CORPUS / "run" / "ppo"), ()).trials
 
 
+@cache
+def part_job() -> tuple[Contestant, BenchmarkTask, str]:
+    """A contestant, a task, and the job of both."""
+    one, task = Contestant("pid", "pid"), load_suite().task("mariner-calm")
+    return one, task, serialised(job_of(one, task, DEFAULT_SUITE, 3), "job")
+
+
+def keep_part(folder: Path) -> None:
+    """What a benchmark that goes on finds."""
+    costs = {"cost": np.array([1.0, 2.0, 3.0]), "success": np.array([1.0, 0.0, np.nan])}
+    run = {"episodes": costs, "failure": "", "seconds_per_action": 1e-6, "policy_sha256": None}
+    KeptResults(folder, run_job).save(part_job()[2], {"value": pack({"refused": "", "runs": [run, run]})})
+
+
+def read_part(path: Path) -> Any:
+    """A benchmark of parts that are done."""
+    one, task, text = part_job()
+    kept = KeptResults(path.parent, run_job).load(text)
+    if kept is None:
+        return None
+    part = unpack(kept["value"])
+    _check_part(part, 3, "part")
+    return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
+
+
 KINDS = (
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
@@ -182,5 +212,6 @@ KINDS = (
     Kind("study", read_study, len, main="study.json", prepare=keep_study, slow=200),
     Kind("suite", read_suite, slow=2),
     Kind("settings", read_settings, slow=8),
+    Kind("part", read_part, use_results, prepare=keep_part, slow=10),
     Kind("kept-result", read_kept, prepare=keep_results),
 )

@@ -13,12 +13,10 @@ from typing import Any
 from fuzzing.values import NUMBERS, RAW, TEXTS, float_bytes, json_text, mutated, toml_text
 from shipgym.files import parse_toml
 
-Change = tuple[
-    bytes, str | Callable[[], str]
-]  # the content, and what was done to it, or a function that says so
-SOURCES: dict[
-    str, Callable[[Random, bytes], Change]
-]  # by the ending of a file's name, at the end of this file
+#: The content, and what was done to it, or a function that says so.
+Change = tuple[bytes, str | Callable[[], str]]
+#: By the ending of a file's name; given at the end of this file.
+SOURCES: dict[str, Callable[[Random, bytes], Change]]
 LARGEST_TOML = 10_000  # bytes that are parsed for a change: keys of many parts take long
 BYTES_SHARE = 0.12  # of mutations that know nothing of the format
 INSERTED = (

@@ -25,7 +25,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_array, check_keys, check_table
+from shipgym.checks import check_array, check_format, check_keys, check_table
 from shipgym.errors import InputError
 
 FORMAT = 1
@@ -63,12 +63,9 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
         raise InputError(
             f"kind: {content.get('kind')!r} found, expected {KIND!r}: a file that RecordEpisode wrote"
         )
-    if content.get("format") != FORMAT:
-        raise InputError(
-            f"format: {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
-        )
+    check_format(content, FORMAT, KIND)
     known = ("format", "kind", *TABLES, *PLAIN)
-    check_keys(content, known, "episode file", known)
+    check_keys(content, known, KIND, known)
     values = {name: content[name] for name in PLAIN}
     for table, names in TABLES.items():
         if table == "path" and content[table] is None:

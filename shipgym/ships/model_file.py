@@ -34,6 +34,7 @@ from shipgym.checks import (
     check_array,
     check_choice,
     check_flag,
+    check_format,
     check_keys,
     check_number,
     check_table,
@@ -75,10 +76,7 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
 
     Raises InputError that starts with `where` and names the field at fault.
     """
-    if "format" in fields and fields["format"] != FORMAT:
-        raise InputError(
-            f"{where}: format {fields['format']!r} found, this version of shipgym reads format {FORMAT}"
-        )
+    check_format(fields, FORMAT, where)
     check_keys(fields, FIELDS, where, REQUIRED)
     dynamics = _dynamics(fields["structure"], f"{where}: structure", make)
     normalisation = dynamics.normalisation

@@ -108,7 +108,7 @@ def test_a_wrong_field_is_named(changes, message, tmp_path):
     ("content", "message"),
     [
         (b'{"format": 1, "kind": "pid", "gai', "broken JSON .*line 1 column 30.*cut short"),
-        (b"\x89PNG\xff\xfe", "binary content found, expected a controller file"),
+        (b"\x89PNG\xff\xfe", "binary content.*expected a controller file"),
         (b"[1, 2]", "expected a table"),
         (b"{}", "field 'format' is missing"),
     ],
@@ -179,6 +179,7 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             r"arrays.kalman\[0\]: 3 entries .* 2 numbers",
         ),
         ("lqg", lambda arrays: arrays["kalman"][0].__setitem__(0, 1e5), "a sampled pole of size .* below 1"),
+        ("lqg", lambda arrays: arrays["transition"].append([0.0] * 3), r"shape \(states, states\)"),
         (
             "lqg",
             lambda arrays: arrays["output"].pop(),

@@ -165,7 +165,7 @@ def test_a_wrong_field_is_named(field, value, message, tmp_path):
         ("dt", 0.0, "dt: 0 found"),
         ("fallback", POLICIES, "fallback: .*expected a table"),
         ("fallback__gains__yaw_rate", None, "fallback: gains: 'yaw_rate' is missing"),
-        ("envelope__low", [1.0], r"envelope.low: 1 entries found"),
+        ("envelope__low", [1.0], r"envelope.low: 1 entries found, expected a list of 4"),
         ("limits__back_deg", 20.0, "limits.back_deg: 20 found, expected a number > 0 and < 12; less than"),
         ("limits__calm", 1.0, "limits: unknown key 'calm'"),
         ("policy__network__sizes", [8, 9], "policy: network: .*shape"),

@@ -159,7 +159,7 @@ def test_the_command_writes_the_page(recorded):
         ("x,y\n1,2\n", "broken JSON"),
         ("[1, 2]", "expected a table"),
         ('{"name": "mariner", "format": 1}', "kind: None found, expected 'episode'"),
-        ('{"kind": "episode", "format": 9}', "format: 9 found, this version of shipgym reads format 1"),
+        ('{"kind": "episode", "format": 9}', "format 9 found, this version of shipgym reads format 1"),
     ],
 )
 def test_a_wrong_file_exits_with_2_one_message_and_no_page(recorded, text, said):

@@ -84,7 +84,7 @@ def test_an_episode_cannot_be_changed():
 @pytest.mark.parametrize(
     ("place", "value", "said"),
     [
-        (("format",), 2, "format: 2 found, this version of shipgym reads format 1"),
+        (("format",), 2, "format 2 found, this version of shipgym reads format 1"),
         (("kind",), None, "kind: None found, expected 'episode'"),
         (("dt",), 0, "dt: 0 found, expected a number > 0"),
         (("dt",), "1", "dt: '1' (a text; write the number without quotes) found"),
