@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from types import NoneType
@@ -87,24 +87,25 @@ def benchmark(
             keep=None if folder is None else folder / PARTS,
             progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
         )  # fmt: skip
-        done = {(job["contestant"], job["task"]): one for job, one in zip(jobs, found, strict=True)}
-        for (name, on), part in done.items():
-            _check_part(part, episodes, f"part of '{name}' on '{on}'")
+        parts = (checked_part(one, job) for job, one in zip(jobs, found, strict=True))
+        done = {(job["contestant"], job["task"]): part for job, part in zip(jobs, parts, strict=True)}
         for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
             done[one.name, task.name] = results_of(one, task, suite, episodes)
         return gathered(suite, chosen, who, done, episodes).save(folder)
 
 
-def _check_part(part: Any, episodes: int, where: str) -> None:
-    """Refuse a result of `results_of` that is another: it may be one that was kept in a file."""
+def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:
+    """A result of `run_job`, which may have been kept in a file; InputError if it is not one of the job."""
+    where = f"part of '{job['contestant']}' on '{job['task']}'"
     check_shape(part, PART, where)
     names = {"cost"}.union(*(run["episodes"] for run in part["runs"]))
     for run in part["runs"]:
         shapes = {
             name: values.shape for name, values in run["episodes"].items() if values.dtype.kind in "bif"
         }
-        if shapes != dict.fromkeys(names, (episodes,)):
-            raise InputError(f"{where}: expected the cost and other figures of {episodes} episodes")
+        if shapes != dict.fromkeys(names, (job["episodes"],)):
+            raise InputError(f"{where}: expected cost and other figures of {job['episodes']} episodes")
+    return part
 
 
 def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:

@@ -19,7 +19,7 @@ from rich.console import Console
 from agents import load_agent, load_results
 from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
-from agents.benchmarking.run import _check_part, job_of, run_job
+from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.engines.jobs import run_jobs
 from agents.engines.serialisation import KeptResults, pack, serialised, unpack
@@ -194,8 +194,7 @@ def read_part(path: Path) -> Any:
     kept = KeptResults(path.parent, run_job).load(text)
     if kept is None:
         return None
-    part = unpack(kept["value"])
-    _check_part(part, 3, "part")
+    part = checked_part(unpack(kept["value"]), json.loads(text))
     return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
 
 
