@@ -43,6 +43,12 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
                 f"{folder}: holds '{foreign[0]}', which is not a result of this command, and would be "
                 "replaced as a whole; choose another folder or a new one"
             )
+    check_writable(folder)
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that can neither be made nor written; raises InputError naming what is in the way."""
+    target = folder.absolute()
     ancestor = target if _stands_alone(target) else target.parent
     while not ancestor.exists():
         ancestor = ancestor.parent

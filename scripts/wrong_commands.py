@@ -116,8 +116,12 @@ def fault(line: list[str]) -> str:
     before = sorted(Path().rglob("*"))
     signal.signal(signal.SIGALRM, late)
     signal.alarm(LONGEST_S)
-    answer = CliRunner().invoke(app, line)
-    signal.alarm(0)
+    try:
+        answer = CliRunner().invoke(app, line)
+    except _TooLongError:
+        return f"not refused within {LONGEST_S} s"
+    finally:
+        signal.alarm(0)
     told = answer.stderr.splitlines()
     if answer.exit_code not in (1, 2) or not isinstance(answer.exception, SystemExit):
         return f"exit code {answer.exit_code}, {answer.exception!r}"
