@@ -16,7 +16,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from shipgym.errors import InputError
-from shipgym.files import abandoned_drafts, atomic_path, draft_folder, is_draft, remove_drafts
+from shipgym.files import DRAFT, abandoned_drafts, atomic_path, draft_folder, remove_drafts
 
 ASIDE = ".old"
 PROCESS = "process"
@@ -59,7 +59,7 @@ def check_writable(folder: Path) -> None:
 def present(folder: Path) -> list[str]:
     """Names in a folder in order, without locks and drafts."""
     lock = _lock_path(folder).name
-    return sorted(one.name for one in folder.iterdir() if one.name != lock and not is_draft(one.name))
+    return sorted(one.name for one in folder.iterdir() if one.name != lock and not DRAFT.fullmatch(one.name))
 
 
 def check_page(path: Path) -> None:

@@ -17,6 +17,7 @@ from zlib import crc32
 from shipgym.checks import check_table, did_you_mean
 from shipgym.errors import InputError
 
+#: Names of `draft_name`.
 DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
 ABANDONED_S = 7 * 86400.0
 MOUNTED = (EXDEV, EBUSY)  # what renaming onto a mount point fails with
@@ -63,16 +64,12 @@ def draft_folder(path: Path) -> Iterator[Path]:
     """A folder beside a path that is removed when the block ends, unless it was renamed."""
     remove_drafts(path.parent)
     draft = draft_name(path)
+    shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
     try:
         draft.mkdir()
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-
-def is_draft(name: str) -> bool:
-    """Whether a name is one of `draft_name`."""
-    return DRAFT.fullmatch(name) is not None
 
 
 def abandoned_drafts(folder: Path) -> list[Path]:
