@@ -16,7 +16,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from shipgym.errors import InputError
-from shipgym.files import abandoned_drafts, atomic_path, draft_folder, is_draft, remove_drafts
+from shipgym.files import DRAFT, abandoned_drafts, atomic_path, draft_folder, remove_drafts
 
 ASIDE = ".old"
 PROCESS = "process"
@@ -43,6 +43,12 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
                 f"{folder}: holds '{foreign[0]}', which is not a result of this command, and would be "
                 "replaced as a whole; choose another folder or a new one"
             )
+    check_writable(folder)
+
+
+def check_writable(folder: Path) -> None:
+    """Refuse a folder that can neither be made nor written; raises InputError naming what is in the way."""
+    target = folder.absolute()
     ancestor = target if _stands_alone(target) else target.parent
     while not ancestor.exists():
         ancestor = ancestor.parent
@@ -53,7 +59,7 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 def present(folder: Path) -> list[str]:
     """Names in a folder in order, without locks and drafts."""
     lock = _lock_path(folder).name
-    return sorted(one.name for one in folder.iterdir() if one.name != lock and not is_draft(one.name))
+    return sorted(one.name for one in folder.iterdir() if one.name != lock and not DRAFT.fullmatch(one.name))
 
 
 def check_page(path: Path) -> None:

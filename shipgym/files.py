@@ -38,6 +38,7 @@ _LONG_KEY = re.compile(rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{D
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # without waiting, should a file have become a pipe
 #: What cannot be written in UTF-8, or ends a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
+#: Names of `draft_name`.
 DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
 ABANDONED_S = 7 * 86400.0
 MOUNTED = (EXDEV, EBUSY)  # what renaming onto a mount point fails with
@@ -84,16 +85,12 @@ def draft_folder(path: Path) -> Iterator[Path]:
     """A folder beside a path that is removed when the block ends, unless it was renamed."""
     remove_drafts(path.parent)
     draft = draft_name(path)
+    shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
     try:
         draft.mkdir()
         yield draft
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-
-def is_draft(name: str) -> bool:
-    """Whether a name is one of `draft_name`."""
-    return DRAFT.fullmatch(name) is not None
 
 
 def abandoned_drafts(folder: Path) -> list[Path]:

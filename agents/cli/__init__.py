@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import os
 import sys
+import warnings
 from io import TextIOWrapper
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -256,6 +257,12 @@ def doctor_command(as_json: Json = False) -> None:
         raise typer.Exit(FAILED)
 
 
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    from agents.cli.terminal import warn
+
+    warn(str(message))
+
+
 def main() -> None:
     """Run the command line."""
     if sys.stdout is None:
@@ -264,6 +271,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files may have any bytes
+    warnings.showwarning = _show_warning  # names in it come from files
     try:
         app(prog_name="shipgym")
     except OSError as error:  # of the help, which no command answers for

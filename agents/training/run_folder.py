@@ -16,7 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from agents.output import present
+from agents.output import check_writable, present
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import present_names
 from shipgym.checks import Shape, check_keys, check_shape, check_table, check_whole, data_only, placed
@@ -55,6 +55,7 @@ def check_new(folder: Path) -> None:
         raise InputError(f"{folder}: a run is there already; resume it with --resume, or name another folder")
     if folder.exists() and (not folder.is_dir() or present(folder)):
         raise InputError(f"{folder}: exists and is not a training run; name another folder")
+    check_writable(folder)
 
 
 def begin_folder(folder: Path, plan: Plan, command: str) -> None:
