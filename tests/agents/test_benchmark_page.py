@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import sys
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -12,6 +13,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import PID, benchmark
+from agents.benchmarking import page as benchmark_page
+from agents.benchmarking import page_replays
 from agents.benchmarking.page import command, write_page
 from agents.benchmarking.page_figures import COLOURS
 from agents.benchmarking.page_replays import (
@@ -379,3 +382,50 @@ def test_everything_that_can_be_operated_has_a_name(opened):
     assert len(operated) > 40
     unnamed = [node for node in operated if not node["name"]["value"].strip()]
     assert len(unnamed) <= 1  # the corner of the matrix
+
+
+def test_runs_are_numbered_where_there_are_several():
+    def called(runs):
+        summary = {"tasks": {"calm": {"ppo": {"runs": runs}}}}
+        return page_replays._called(SimpleNamespace(summary=summary), EpisodeId("ppo", "calm", 1, FIRST))
+
+    assert [called(runs) for runs in (1, 2, 5)] == ["ppo", "ppo, run 2", "ppo, run 2"]
+
+
+def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
+    def shown(metric, *means):
+        found = {k: {"metrics": {metric: {"mean": mean}}} for k, mean in enumerate(means)}
+        return benchmark_page._is_shown(metric, found)
+
+    assert shown("shielded", 0.0, 0.1)
+    assert not shown("shielded", 0.0, 0.0)
+    assert not shown("shielded", None, 0.0)
+    assert shown("success", 0.0)
+    assert shown("success", None, 0.0)
+    assert not shown("success", None, None)
+    assert not benchmark_page._is_shown("success", {"pid": {"metrics": {}}})
+
+
+def test_who_failed_or_did_not_take_part_is_told_with_the_task():
+    tasks = {
+        "calm": {"pid": {"failed": 0, "failure": ""}, "mine": {"failed": 3, "failure": "no number"}},
+        "rough": {"pid": {"failed": 0, "failure": ""}},
+    }
+    contestants = {"pid": {"refused": {}}, "mine": {"refused": {"rough": "other observations"}}}
+    result = SimpleNamespace(summary={"tasks": tasks, "contestants": contestants})
+    assert benchmark_page._failures(result) == [
+        "mine did not take part in rough: other observations",
+        "mine failed in 3 episodes of calm: no number",
+    ]
+
+
+def test_the_hardest_episode_has_tracks_where_there_is_a_path(result):
+    worst = {task: hardest_of(result, task) for task in TASKS}
+    for task, names in (("mariner-calm", {"histories"}), ("mariner-current", {"histories", "tracks"})):
+        one = EpisodeId("pid", task, 0, worst[task])
+        suited = load_suite().task(task)
+        pilot = PID.from_model(suited.ship, dt=suited.task.interval(suited.ship))
+        episodes = recorded(pilot, suited, [worst[task]]).episodes
+        again = SimpleNamespace(episodes={one: episodes[0]})
+        assert benchmark_page._hardest(result, again, task).keys() == names
+        assert benchmark_page._hardest(result, SimpleNamespace(episodes={}), task) == {}

@@ -68,6 +68,11 @@ class Hard(Helmsman):
         return 100.0 * seen[..., :1], state
 
 
+class Wordy(Helmsman):
+    def answer(self, seen, state):
+        return [["port"]] * len(seen) if seen.ndim == 2 else ["port"], state
+
+
 class Flat(Helmsman):
     def answer(self, seen, state):
         return seen[..., 0], state
@@ -95,6 +100,9 @@ class Misscaled(Helmsman):
 def test_a_user_s_own_passes():
     check_controller(Helmsman())
     check_controller(Helmsman(), load_model("kvlcc2"), n_steps=3)
+    check_controller(Helmsman(), n_steps=2)
+    with pytest.raises(InputError, match="n_steps: 1 found"):
+        check_controller(Helmsman(), n_steps=1)
 
 
 @pytest.mark.parametrize(
@@ -106,6 +114,7 @@ def test_a_user_s_own_passes():
         (Vandal(), "the observation was changed"),
         (Divider(), "step 0: action .*nan.* found"),
         (Hard(), r"expected \[-1, 1\]"),
+        (Wordy(), "action .*'port'.* found, expected numbers"),
         (Flat(), r"action of shape \(3,\) found, expected \(3, 1\)"),
         (Curt(), "ndarray found, expected a pair: action and state"),
         (Short(), "unexpected keyword argument 'state'; expected predict"),

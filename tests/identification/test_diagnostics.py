@@ -108,12 +108,12 @@ def test_times_that_nearly_coincide_are_refused(
 
 
 def test_each_equation_tells_its_numbers() -> None:
-    """Two orthogonal features of sizes 1 and 100, one of them explained but for alternating errors of 0.5."""
+    """Two orthogonal features (0.01 and 100), one explained but for alternating errors of 0.5."""
     rows = np.arange(400)
-    a = np.where(rows % 2 == 0, 1.0, -1.0)
+    a = np.where(rows % 2 == 0, 0.01, -0.01)
     b = np.where(rows // 2 % 2 == 0, 100.0, -100.0)
     error = 0.5 * np.where(rows // 4 % 2 == 0, 1.0, -1.0)
-    X, y = np.column_stack([a, b]), 3.0 * a + error
+    X, y = np.column_stack([a, b]), 300.0 * a + error
     samples = Samples({"r": X}, {"r": y}, 1.0 * rows, np.ones(400), np.zeros(400, dtype=np.int64), 1)
     fit = LSSVM(C=np.inf, fit_intercept=False).fit(X, y)
     found = diagnose({"r": fit}, samples, get_structure("nomoto"))["r"]
@@ -125,7 +125,7 @@ def test_each_equation_tells_its_numbers() -> None:
     assert found.collinear_pairs == ()
     assert found.residual_autocorrelation[3] == pytest.approx(-0.99)
     assert len(found.residual_autocorrelation) == 10
-    alike = replace(samples, features={"r": np.column_stack([a, a + 0.01 * b / 100.0])})
+    alike = replace(samples, features={"r": np.column_stack([a, a + 1e-6 * b])})
     ((first, second, correlation),) = diagnose({"r": fit}, alike, get_structure("nomoto"))[
         "r"
     ].collinear_pairs

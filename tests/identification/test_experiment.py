@@ -9,7 +9,13 @@ import pytest
 
 import shipgym
 from identification import build_samples
-from identification.design.experiment import _gains, advise, fisher_information, standard_candidates
+from identification.design.experiment import (
+    _gains,
+    _regression,
+    advise,
+    fisher_information,
+    standard_candidates,
+)
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import get_structure
@@ -137,3 +143,15 @@ def test_candidates_that_no_ship_survives_are_refused(ship: ShipModel) -> None:
     assert list(advise(ship, [gentle(ship)], both).steps[0]) == ["gentle"]
     with pytest.raises(InputError, match="number: 0 found"):
         advise(ship, [gentle(ship)], number=0)
+
+
+def test_the_condition_of_a_trial_does_not_depend_on_units(ship: ShipModel) -> None:
+    """That of the features by their root mean squares, though those of yaw rates are tiny."""
+    trial = gentle(ship)
+    (known,) = advise(ship, [trial], {"same": gentle}).trials
+    X = _regression(ship, trial).features["r"]
+    assert np.sqrt(np.mean(X**2, axis=0)).min() < 0.1
+    scaled = X / np.sqrt(np.mean(X**2, axis=0))
+    assert known.condition_number["r"] == pytest.approx(np.linalg.cond(scaled), rel=1e-9)
+    moment = np.linalg.inv(scaled.T @ scaled / len(scaled))
+    np.testing.assert_allclose(list(known.inflation.values()), np.diag(moment), rtol=1e-6)

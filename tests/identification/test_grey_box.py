@@ -129,6 +129,13 @@ def test_a_weak_regularisation_finds_a_linear_law(regression: str) -> None:
     assert free.coef_ == pytest.approx([2.0, -500.0], rel=1e-3)
 
 
+@pytest.mark.parametrize("regression", ["svr", "ls-svm"])
+def test_a_feature_that_is_zero_throughout_gets_no_correction(regression: str) -> None:
+    X = np.column_stack([np.random.default_rng(0).standard_normal(200), np.zeros(200)])
+    estimator = RMSVM(C=1e6, epsilon=0.0, regression=regression).fit(X, 2.0 * X[:, 0])
+    assert estimator.coef_ == pytest.approx([2.0, 0.0], rel=1e-3)
+
+
 @pytest.mark.parametrize(("weight", "band"), [(0.1, 0.1), (1.0, 0.5), (30.0, 0.0)])
 def test_coordinate_descent_and_minimal_optimisation_agree(
     weight: float, band: float, monkeypatch: pytest.MonkeyPatch
@@ -256,3 +263,15 @@ def test_what_does_not_fit_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         identify(trials, particulars=target.particulars, steering=target.steering, **settings)
+
+
+def test_a_feature_that_never_moves_is_left_out_of_the_bands() -> None:
+    """Its coefficient is 0, and the others are as without it."""
+    rng = np.random.default_rng(0)
+    X = rng.standard_normal((60, 2))
+    y = X @ [1.0, -2.0] + 0.01 * rng.standard_normal(60)
+    settings: dict[str, Any] = {"C": 100.0, "epsilon": 0.01}
+    alone = RMSVM(**settings).fit(X, y)
+    still = RMSVM(**settings).fit(np.column_stack([X, np.zeros(60)]), y)
+    np.testing.assert_allclose(still.coef_, [*alone.coef_, 0.0], atol=1e-3)
+    np.testing.assert_allclose(alone.coef_, [1.0, -2.0], atol=0.05)

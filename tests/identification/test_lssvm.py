@@ -13,6 +13,7 @@ from sklearn.utils.estimator_checks import check_estimator
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.decomposition import decompose_triangle, triangle
+from identification.estimators.l_curve import variance_rank
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -337,3 +338,10 @@ def test_what_an_estimator_cannot_do_is_refused() -> None:
             TruncatedLSSVM(selection="explained-variance", explained_variance=share).fit(X, y)
     with pytest.raises(InputError, match="objective: 'free-running' found"):
         TunedLSSVM(objective="free-running").fit(X, y)
+
+
+def test_variance_is_held_by_squares_of_singular_values() -> None:
+    """Of 2, 1 and 1 the first holds four sixths, the first two five sixths."""
+    values = np.array([2.0, 1.0, 1.0])
+    ranks = [variance_rank(values, share) for share in (0.5, 0.66, 0.67, 0.83, 0.84, 1.0)]
+    assert ranks == [1, 1, 2, 2, 3, 3]

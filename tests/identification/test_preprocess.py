@@ -14,6 +14,7 @@ from identification.regression.preprocess import (
     savitzky_golay,
     smooth,
     smooth_kinematics,
+    smoothed_channels,
 )
 from identification.regression.preprocess.kinematics import current_of
 from identification.regression.preprocess.noise import is_noisy, noise_ratio
@@ -155,3 +156,16 @@ def test_a_channel_of_outliers_is_refused() -> None:
             found = repaired(trial)
             np.testing.assert_allclose(found["u"], clean, atol=0.05)
             assert found.raw is not None
+
+
+def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
+    t, _, values = signal(0.05)
+    trial = Trial(t, {"u": 5.0 + values, "delta": np.where(t % 100.0 < 50.0, 0.1, -0.1)}, name="noisy")
+    for name, one in (("spline", smooth), ("savgol", savitzky_golay), ("median", median)):
+        found = smoothed_channels(trial, ["u", "delta"], name)
+        np.testing.assert_array_equal(found["u"], one(t, trial["u"]))
+        assert not np.array_equal(found["u"], trial["u"])
+        np.testing.assert_array_equal(found["delta"], trial["delta"])
+    np.testing.assert_array_equal(smoothed_channels(trial, ["u"], "none")["u"], trial["u"])
+    with pytest.raises(InputError, match="preprocessing: 'splines' found"):
+        smoothed_channels(trial, ["u"], "splines")

@@ -132,3 +132,34 @@ def test_wrong_arguments(identified):
         manoeuvres.index_intervals(identified, n_draws=1)
     with pytest.raises(InputError, match="has no covariance"):
         manoeuvres.imo_assessment(load_model("mariner"), n_draws=10)
+
+
+def index(value, values, ran_away=()):
+    return IndexInterval(value, np.array(values, dtype=float), np.isin(np.arange(len(values)), ran_away))
+
+
+def test_an_interval_is_told_in_numbers_and_words():
+    """41 draws from 7 to 9, one that ran away and one that never got so far."""
+    values = [*np.linspace(7.0, 9.0, 41), np.nan, np.nan]
+    found = index(7.77777, values, ran_away=[41])
+    assert found.interval == pytest.approx((7.05, 8.95))
+    assert found.quantiles(0.0, 0.5, 1.0) == pytest.approx((7.0, 8.0, 9.0))
+    assert (found.n_ran_away, found.n_never_reached) == (1, 1)
+    assert str(found) == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws never got so far)"
+    assert found.to_dict() == {
+        "value": 7.77777, "interval_95": found.interval, "draws": 43, "ran_away": 1, "never_reached": 1
+    }  # fmt: skip
+    assert str(index(None, [])) == "-"
+    assert str(index(2.0, [1.0, 3.0])).startswith("2 [1.05, 2.95]")
+    assert index(2.0, [np.nan]).interval is None
+    assert index(2.0, [np.nan]).quantiles(0.5, 0.9) == (None, None)
+
+
+def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():
+    """One that never got so far is the worst of all."""
+    one, other = index(2.0, [1.0, 5.0, np.nan], [2]), index(3.0, [2.0, 4.0, 1.0])
+    found = worst([one, other])
+    assert found.value == 3.0
+    np.testing.assert_array_equal(found.values, [2.0, 5.0, np.nan])
+    assert found.ran_away.tolist() == [False, False, True]
+    assert worst([one, index(None, [1.0, 1.0, 1.0])]).value is None

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shipgym.checks import did_you_mean
 from shipgym.errors import InputError
 from shipgym.ships.particulars import ADDED_MASSES, FIELDS, Particulars, clarke_added_masses
 
@@ -166,3 +167,11 @@ def test_inertia_is_about_midship():
     assert ship.mass_prime == pytest.approx(8e6 / unit)
     assert ship.xg_prime == pytest.approx(0.05)
     assert ship.inertia_prime == pytest.approx(8e6 * (25.0**2 + 5.0**2) / (unit * 100.0**2))
+
+
+def test_the_nearest_known_name_is_suggested_where_it_is_near():
+    """Twice the letters in common by those of both: from 0.6 on, whatever the case."""
+    assert did_you_mean("wxyzabcd", ["abcdk"]) == " Did you mean 'abcdk'?"  # 8 of 13
+    assert did_you_mean("wxyzabcd", ["abcdkl"]) == ""  # 8 of 14
+    assert did_you_mean("LENGHT", ["beam", "Length"]) == " Did you mean 'Length'?"
+    assert did_you_mean("x", []) == ""

@@ -160,7 +160,7 @@ def test_what_is_wrong_is_said():
         with pytest.raises(InputError, match=message):
             make()
     env = ours(COURSE, 2)
-    env.set_options({"depth": 3.0})
+    env.set_options([{}, {"depth": 3.0}])
     with pytest.raises(InputError, match=r"options: .*depth.* found, expected none"):
         env.reset()
     env.reset()

@@ -103,3 +103,28 @@ def test_fresh_water_at_model_scale_becomes_salt_water():
 def test_what_cannot_be_scaled_is_refused(name, arguments, message):
     with pytest.raises(InputError, match=message):
         scale_model(shipgym.load_model(name), **arguments)
+
+
+def test_each_particular_grows_with_its_power_of_the_length():
+    """Four times as long: lengths 4, areas 16, the roll period 2, mass 64 (in denser water more)."""
+    small = replace(
+        shipgym.load_model("mariner").particulars,
+        rudder_area=30.0, propeller_diameter=6.0, length_overall=170.0,
+        frontal_area=500.0, lateral_area=2000.0, lateral_centroid=-3.0, lateral_centroid_height=8.0,
+        metacentric_height=1.2, roll_period=14.0, xg=-2.0, yaw_gyradius=40.0, mass=1.7e7,
+        block_coefficient=0.6,
+    )  # fmt: skip
+    ship = replace(shipgym.load_model("mariner"), particulars=small)
+    large = scale_model(ship, 4.0 * small.length).particulars
+    lengths = ("length", "beam", "draught", "xg", "yaw_gyradius", "propeller_diameter", "length_overall")
+    lengths += ("lateral_centroid", "lateral_centroid_height", "metacentric_height")
+    growth = dict.fromkeys(lengths, 4.0) | dict.fromkeys(
+        ("rudder_area", "frontal_area", "lateral_area"), 16.0
+    )
+    growth |= {"roll_period": 2.0, "speed": 2.0, "mass": 64.0, "block_coefficient": 1.0}
+    for name, factor in growth.items():
+        assert large[name] == pytest.approx(factor * small[name]), name
+    salt = scale_model(
+        ship, 4.0 * small.length, water_density=1.1 * small.require("water_density")
+    ).particulars
+    assert salt["mass"] == pytest.approx(1.1 * 64.0 * small["mass"])

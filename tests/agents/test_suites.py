@@ -1,0 +1,78 @@
+"""Suites of tasks: how they are read, and what is refused with its field."""
+
+import numpy as np
+import pytest
+
+from agents.suites.suite import list_suites, load_suite, parse_suite, suite_file, suite_hash
+from shipgym import InputError, Weather
+
+TEXT = """
+name = "mine-v1"
+[tasks.calm]
+environment = "course-keeping"
+model = "mariner"
+why = "the easiest"
+options = { noise = 1.0 }
+[tasks.drift]
+environment = "path-following"
+model = "kvlcc2"
+sea = { current = { speed = 0.5, towards_deg = 90.0 } }
+[tasks.rough]
+environment = "course-keeping"
+model = "mariner"
+sea = "rough"
+"""
+
+
+def test_a_suite_is_read_task_by_task():
+    suite = parse_suite(TEXT, "mine")
+    assert suite.name == "mine-v1"
+    assert [task.name for task in suite.tasks] == ["calm", "drift", "rough"]
+    calm, drift, rough = suite.tasks
+    assert (calm.env_id, calm.model, calm.why) == ("shipgym/CourseKeeping-v0", "mariner", "the easiest")
+    assert (drift.env_id, drift.ship.name) == ("shipgym/PathFollowing-v0", "kvlcc2")
+    assert calm.options == {"noise": 1.0}
+    assert calm.task.weather.calm
+    assert isinstance(drift.options["sea"], Weather)
+    assert drift.task.weather.current.speed == 0.5
+    assert rough.task.weather.name == "rough"
+    assert suite.task("drift") is drift
+    np.testing.assert_array_equal(calm.seeds, 1_000_000 + np.arange(100))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('name = "mine-v1"', "name = mine", "mine: not TOML"),
+        ('name = "mine-v1"', "", "mine: name: None found"),
+        ('name = "mine-v1"', 'name = "m"\nnote = 1', "mine: unknown key 'note'"),
+        ('why = "the easiest"', 'what = "x"', r"tasks\.calm: unknown key 'what'"),
+        (
+            'environment = "course-keeping"',
+            'environment = "course-keping"',
+            r"calm: .*Did you mean 'course-k",
+        ),
+        ('model = "kvlcc2"', 'model = "kvlcc3"', r"tasks\.drift: .*kvlcc3"),
+        ('model = "kvlcc2"', "", r"tasks\.drift\.model: None found"),
+        ("options = { noise = 1.0 }", "options = 3", r"tasks\.calm\.options: 3 found"),
+        ("options = { noise = 1.0 }", "options = { nois = 1.0 }", r"tasks\.calm: .*Did you mean 'noise'"),
+        ("speed = 0.5", "sped = 0.5", r"tasks\.drift\.sea.*sped"),
+    ],
+)
+def test_a_wrong_field_is_named(old, new, message):
+    with pytest.raises(InputError, match=message):
+        parse_suite(TEXT.replace(old, new, 1), "mine")
+
+
+def test_shipped_suites_are_known_by_name():
+    assert "shipgym-v1" in list_suites()
+    assert load_suite().name == "shipgym-v1"
+    assert len(suite_hash()) == 64
+    assert suite_hash() == suite_hash("shipgym-v1")
+    assert suite_file("shipgym-v1", "reference").name == "shipgym-v1-reference.json"
+    assert suite_file("shipgym-v1", "reference").is_file()
+    for call in (load_suite, suite_hash):
+        with pytest.raises(InputError, match="suite: 'shipgym-v2' found"):
+            call("shipgym-v2")
+    with pytest.raises(InputError, match=r"of suite 'shipgym-v1': .*Did you mean 'mariner-calm'"):
+        load_suite().task("mariner-clam")
