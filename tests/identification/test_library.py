@@ -38,6 +38,9 @@ def test_mariner_tls_svm_is_what_its_trials_give():
     shipped = shipgym.load_model("mariner-tls-svm")
     assert off_in_standard_errors(result.model, shipped) < 1e-3
     assert result.model.provenance["trials"] == shipped.provenance["trials"]
+    factors = [one.provenance["model_error"]["factor"] for one in (result.model, shipped)]
+    assert factors[0] == pytest.approx(factors[1], rel=0.02)
+    np.testing.assert_allclose(result.model.covariance, shipped.covariance, rtol=0.05)
 
 
 @pytest.mark.parametrize("angle", [10, 15, 20, 30])
