@@ -14,6 +14,7 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
@@ -156,11 +157,13 @@ def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refu
         "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to" in r for r in remarks
     )
     assert any(r.startswith("L/B 10 is outside") for r in remarks)
-    for reference in ("auto", "kvlcc2"):
-        with pytest.raises(
-            InputError, match=r"is not like this ship: similarity -?[01]\.\d\d, expected at least 0.5"
-        ):
-            mmg_prior(reference, slim)
+    with pytest.raises(
+        InputError, match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -"
+    ):
+        mmg_prior("auto", slim)
+    named = mmg_prior("kvlcc2", slim)
+    assert named.source == "kvlcc2"
+    assert named.remarks[0].startswith("reference ship 'kvlcc2' is not like this one: similarity -")
     with pytest.raises(InputError, match="'tanker' found, which is not written in the MMG form"):
         mmg_prior("tanker", L7)
     assert mmg_prior("auto", L7).source == "kvlcc2-l7"
@@ -247,6 +250,10 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
     assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
     assert "outside the range" not in (tmp_path / "report.html").read_text()
+    remarked = replace(
+        found.model, provenance=(found.model.provenance or {}) | {"prior_remarks": ["L/B 10 is"]}
+    )
+    assert "L/B 10 is" in model_warnings(replace(found, model=remarked))
 
 
 @pytest.mark.parametrize(
