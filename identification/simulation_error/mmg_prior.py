@@ -95,12 +95,20 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
         mean, like = reference_coefficients(model), similarity.get(model.name, 1.0)
         remarks = () if like >= LEAST_SIMILARITY else (UNLIKE.format(model.name, like),)
         prior = MMGPrior(model.name, ship, mean, _deviations(0), remarks, similarity)
+    prior.mean.update(_given_added_mass(particulars))
     prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
     return prior
 
 
 def _deviations(which: int) -> Floats:
     return np.array([(DEVIATIONS[name] * 2)[which] for name in IDENTIFIED])
+
+
+def _given_added_mass(p: Particulars) -> dict[str, float]:
+    """What the particulars give of it and did not estimate, by rho L^2 d / 2."""
+    names = {"mx": "X_udot", "my": "Y_vdot", "Jz": "N_rdot"}
+    given = {name: p[d] for name, d in names.items() if p[d] is not None and d not in p.estimated}
+    return {name: -value * p.length / p.require("draught") for name, value in given.items()}
 
 
 def completed(particulars: Particulars) -> Particulars:

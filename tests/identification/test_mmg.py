@@ -19,6 +19,7 @@ from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import kvlcc2, mmg
+from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.scaling import scale_model
 
 L7 = mmg.SHIP.particulars
@@ -123,7 +124,10 @@ def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> N
 
 def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
-    prior = mmg_prior("yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None))
+    estimated = frozenset(ADDED_MASSES)
+    prior = mmg_prior(
+        "yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None, estimated=estimated)
+    )
     mean, own = prior.mean, ship_of({}).coefficients
     assert [round(mean[name], 3) for name in ("my", "Jz")] == [own["my"], own["Jz"]]
     assert mean["mx"] == pytest.approx(own["mx"], abs=0.002)
@@ -139,6 +143,10 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     assert mean["f_alpha"] == pytest.approx(2.747, abs=0.5)
     assert prior.ship.estimated >= {"rudder_area", "rudder_aspect_ratio"}
     assert not prior.remarks
+    heavy = mmg_prior(
+        "yoshimura", replace(L7, Y_vdot=-0.02, estimated=estimated - {"Y_vdot"})
+    ).mean  # given, not estimated
+    assert (heavy["my"], heavy["mx"]) == pytest.approx((0.02 * 7.0 / 0.46, mean["mx"]))
     kijima = formula_coefficients("kijima", prior.ship)
     assert kijima["N_vrr"] == pytest.approx(0.097, abs=0.003)  # -(0.5 d Cb / B - 0.05) for beta
     assert kijima["X_vv"] == mean["X_vv"]
@@ -260,6 +268,7 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     ("options", "message"),
     [
         ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
+        ({"uncertainty": "bootstrap"}, r"settings: uncertainty found, which structure 'mmg' does not know"),
         ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
         (
             {"prior": "kijima", "reference_model": "auto"},
