@@ -70,7 +70,7 @@ def checked_mmg(options: Options) -> Options:
             f"method: {method!r} found with structure 'mmg', which is not linear in its coefficients: it is "
             "fitted by simulation error with a prior; leave the method out, or choose another structure"
         )
-    others = [name for name in options.settings() if getattr(options, name) is not None]
+    others = [*options.settings(), *(["uncertainty"] if options.uncertainty != Options.uncertainty else [])]
     if others:
         raise InputError(
             f"settings: {', '.join(others)} found, which structure 'mmg' does not know; leave them out, or "

@@ -14,10 +14,12 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import kvlcc2, mmg
+from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.scaling import scale_model
 
 L7 = mmg.SHIP.particulars
@@ -122,7 +124,10 @@ def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> N
 
 def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
-    prior = mmg_prior("yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None))
+    estimated = frozenset(ADDED_MASSES)
+    prior = mmg_prior(
+        "yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None, estimated=estimated)
+    )
     mean, own = prior.mean, ship_of({}).coefficients
     assert [round(mean[name], 3) for name in ("my", "Jz")] == [own["my"], own["Jz"]]
     assert mean["mx"] == pytest.approx(own["mx"], abs=0.002)
@@ -138,6 +143,10 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     assert mean["f_alpha"] == pytest.approx(2.747, abs=0.5)
     assert prior.ship.estimated >= {"rudder_area", "rudder_aspect_ratio"}
     assert not prior.remarks
+    heavy = mmg_prior(
+        "yoshimura", replace(L7, Y_vdot=-0.02, estimated=estimated - {"Y_vdot"})
+    ).mean  # given, not estimated
+    assert (heavy["my"], heavy["mx"]) == pytest.approx((0.02 * 7.0 / 0.46, mean["mx"]))
     kijima = formula_coefficients("kijima", prior.ship)
     assert kijima["N_vrr"] == pytest.approx(0.097, abs=0.003)  # -(0.5 d Cb / B - 0.05) for beta
     assert kijima["X_vv"] == mean["X_vv"]
@@ -156,11 +165,13 @@ def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refu
         "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to" in r for r in remarks
     )
     assert any(r.startswith("L/B 10 is outside") for r in remarks)
-    for reference in ("auto", "kvlcc2"):
-        with pytest.raises(
-            InputError, match=r"is not like this ship: similarity -?[01]\.\d\d, expected at least 0.5"
-        ):
-            mmg_prior(reference, slim)
+    with pytest.raises(
+        InputError, match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -"
+    ):
+        mmg_prior("auto", slim)
+    named = mmg_prior("kvlcc2", slim)
+    assert named.source == "kvlcc2"
+    assert named.remarks[0].startswith("reference ship 'kvlcc2' is not like this one: similarity -")
     with pytest.raises(InputError, match="'tanker' found, which is not written in the MMG form"):
         mmg_prior("tanker", L7)
     assert mmg_prior("auto", L7).source == "kvlcc2-l7"
@@ -247,12 +258,17 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
     assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
     assert "outside the range" not in (tmp_path / "report.html").read_text()
+    remarked = replace(
+        found.model, provenance=(found.model.provenance or {}) | {"prior_remarks": ["L/B 10 is"]}
+    )
+    assert "L/B 10 is" in model_warnings(replace(found, model=remarked))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
+        ({"uncertainty": "bootstrap"}, r"settings: uncertainty found, which structure 'mmg' does not know"),
         ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
         (
             {"prior": "kijima", "reference_model": "auto"},
