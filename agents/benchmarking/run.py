@@ -60,9 +60,9 @@ def benchmark(
     progress : callable, optional
         Told what is done, how many of it, and the total.
     resume : bool
-        Whether to go on in a folder where results are: what is there already is not run again.
+        Whether to go on in a folder of results: what is there already is not run again.
     episodes : int
-        How many of the scored ones. Fewer than all are for a quick look, not for a ranking.
+        How many of the scored ones; fewer are for a quick look, not for a ranking.
 
     Returns
     -------
@@ -87,11 +87,20 @@ def benchmark(
             keep=None if folder is None else folder / PARTS,
             progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
         )  # fmt: skip
-        parts = (checked_part(one, job) for job, one in zip(jobs, found, strict=True))
-        done = {(job["contestant"], job["task"]): part for job, part in zip(jobs, parts, strict=True)}
-        for one, task in ((one, task) for one in who if not one.is_text for task in chosen):
-            done[one.name, task.name] = results_of(one, task, suite, episodes)
+        pairs = zip(jobs, found, strict=True)
+        done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
+        done |= _of_objects(who, chosen, suite, episodes)
         return gathered(suite, chosen, who, done, episodes).save(folder)
+
+
+def _of_objects(
+    who: Sequence[Contestant], tasks: Sequence[BenchmarkTask], suite: str, episodes: int
+) -> dict[tuple[str, str], dict[str, Any]]:
+    """Results of contestants that were given as objects, which steer in this process."""
+    objects = [one for one in who if not one.is_text]
+    return {
+        (one.name, task.name): results_of(one, task, suite, episodes) for one in objects for task in tasks
+    }
 
 
 def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:
