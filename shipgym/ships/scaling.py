@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,6 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
-
-if TYPE_CHECKING:
-    pass
-
 
 #: Powers of the length with which the particulars grow; those without unit stay.
 GROWTH = {
