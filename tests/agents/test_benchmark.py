@@ -253,6 +253,8 @@ def test_a_result_that_was_touched_up_is_found_out(copy):
     assert checks["pid"].passed
     assert not checks["lq"].passed
     assert checks["lq"].difference == pytest.approx(0.01, rel=0.02)
+    told = checks["lq"].to_dict()
+    assert (told["passed"], told["difference"]) == (False, checks["lq"].difference)
     answer = shipgym("--verify", copy, "--workers", 1)
     assert answer.exit_code == 1
     assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
