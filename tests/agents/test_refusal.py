@@ -5,18 +5,20 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from agents import PID
+from agents.cli import app
 from agents.cli import standard_trials as module
 from agents.cli.standard_trials import standard_trials
+from agents.identifying import identification_settings, identify_ship
 from agents.verification import chain as links
 from agents.verification import refusal
-from agents.verification.chain import build_autopilot
 from agents.verification.page import verification_view
 from agents.verification.refusal import lost_control, rudder_effect, why_refused
 from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
-from shipgym import InputError, UnstableModelError, load_model
+from shipgym import InputError, ShipFile, UnstableModelError, load_model
 from shipgym.manoeuvres.standard import families_of
 from shipgym.ships.conversions import nomoto1_ship
 
@@ -72,8 +74,11 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
 
 def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatch):
     monkeypatch.setattr(links, "why_refused", lambda fit: "its steering is wrong; run a turn")
-    result = build_autopilot(demo, tmp_path / "report", draws=2)
-    assert result.stable
+    done = CliRunner().invoke(
+        app, ["autopilot", str(demo), "--out", str(tmp_path / "report"), "--draws", "2"]
+    )
+    assert done.exit_code == 1
+    assert "no autopilot is given: its steering is wrong; run a turn; see" in " ".join(done.stderr.split())
     names = sorted(path.name for path in (tmp_path / "report").iterdir())
     assert names == ["metrics.json", "report.html"]
     page = (tmp_path / "report" / "report.html").read_text()
@@ -108,6 +113,14 @@ def test_one_manoeuvre_that_fails_does_not_lose_the_others(monkeypatch):
     monkeypatch.setattr(module, "families_of", lambda *_: {"spirals": spirals})
     with pytest.raises(UnstableModelError):
         standard_trials(ship)
+
+
+def test_the_reason_why_a_model_is_unstable_stands_in_the_metrics_too(unstable_ship):
+    ship = ShipFile.load(unstable_ship)
+    result = identify_ship(ship, identification_settings(ship, {}))
+    assert not result.stable
+    assert result.metrics["instability"].startswith("runs away: ")
+    assert "deg" in result.metrics["instability"] or "trial" in result.metrics["instability"]
 
 
 def test_an_unstable_design_names_the_options_to_change():

@@ -15,7 +15,13 @@ from identification.regression.grey_box import chosen_box
 from identification.uncertainty.model_error import DEFAULT, scale_of, without_trial
 from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import predict
-from identification.validation.warnings import _not_corrected, _not_refined, _shaft_ignored, held_out_error
+from identification.validation.warnings import (
+    _not_corrected,
+    _not_refined,
+    _shaft_ignored,
+    _why_lost,
+    held_out_error,
+)
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from tests.ships.mmg import mmg_ship
@@ -135,3 +141,13 @@ def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> N
     assert "such as cubic" in said
     steady = Trial(t, {"u": 0.0 * t + 7.7, "v": 0.0 * t, "n": 0.0 * t + 1.0}, name="z.csv", use="fit")
     assert not _shaft_ignored(Found(mariner, trials=[steady]))
+
+
+def test_only_a_ship_that_is_unstable_for_sure_is_said_to_be(noisy_fit: IdentificationResult) -> None:
+    """Of a stable ship whose model is uncertain nothing is said about her course stability."""
+    assert _why_lost(noisy_fit.model).startswith("likely the model is taken beyond")
+    unstable = {**noisy_fit.coefficients, "N_r": noisy_fit.coefficients["N_r"] * 0.5}
+    sure = replace(noisy_fit.model, coefficients=unstable, covariance=1e-6 * noisy_fit.model.covariance)
+    assert _why_lost(sure).startswith("a ship that is unstable on a straight course")
+    unsure = replace(sure, covariance=400.0 * noisy_fit.model.covariance)
+    assert not _why_lost(unsure).startswith("a ship that is unstable")
