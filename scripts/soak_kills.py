@@ -47,7 +47,9 @@ def bytes_of(*patterns: str) -> Callable[[Path], Any]:
 def benchmarked(out: Path) -> Any:
     """What a benchmark found, without times."""
     found = load_results(out)
-    return found.ranking, {name: column.tolist() for name, column in found.episodes.items()}
+    return found.ranking, {
+        name: column.tobytes() for name, column in found.episodes.items() if column.dtype != object
+    }
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import functools
 import os
 import sys
 from collections.abc import Callable
+from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
 from typing import Annotated, Any, ParamSpec
 
@@ -15,6 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 P = ParamSpec("P")
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
+OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
 LONGEST_NAME = 200  # characters of a path that are told
 
 ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
@@ -71,13 +73,14 @@ def told_failure(error: OSError) -> int:
     """Say what could not be read or written; the exit code."""
     from agents.cli.terminal import fail as tell
 
-    if error.filename is not None:
-        tell(f"{str(error.filename)[:LONGEST_NAME]}: {error.strerror}")
-        return WRONG_INPUT
-    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in buffers fails no more
-    if not isinstance(error, BrokenPipeError):  # the reader of the output went away
-        tell(f"the output cannot be written ({error.strerror or error})")
-    return FAILED
+    if error.filename is None and error.errno in OUTPUT_GONE:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in buffers fails no more
+        if error.errno != EPIPE:  # the reader of the output went away
+            tell(f"the output cannot be written ({error.strerror})")
+        return FAILED
+    name = "" if error.filename is None else f"{str(error.filename)[:LONGEST_NAME]}: "
+    tell(f"{name}{error.strerror or error}")
+    return WRONG_INPUT
 
 
 class Commands(TyperGroup):
