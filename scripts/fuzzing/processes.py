@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import shutil
 import tempfile
 import time
@@ -16,7 +17,8 @@ from typing import Any
 from fuzzing.reading import SCRATCH, Finding, Kind, Reader, Report, _status
 
 CHUNK = 500  # inputs
-STUCK_S = 120.0  # without a new input: code that no signal reaches
+STUCK_S = 30.0  # of processor time without a new input: code that no signal reaches
+LOST_S = 900.0  # by the clock, on whatever busy machine
 LARGEST_MIB = 1500  # resident; a process that has grown so far is replaced
 PROCESSES = multiprocessing.get_context("fork")
 
@@ -39,7 +41,16 @@ class Worker:
     pipe: Connection
     at: Any  # shared: number of the input
     chunk: Chunk | None = None
-    seen: tuple[int, float] = field(default=(-1, 0.0))  # that number, and since when
+    #: that number, and since when: by the clock, and by the process's own time
+    seen: tuple[int, float, float] = field(default=(-1, 0.0, 0.0))
+
+    def spent(self) -> float:
+        """Processor time of the process, s."""
+        try:
+            numbers = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+        except OSError:
+            return 0.0
+        return (int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def chunks(kinds: Iterable[Kind], inputs: int) -> deque[Chunk]:
@@ -71,7 +82,7 @@ def run(
             for worker in team:
                 if worker.chunk is None and work and time.monotonic() < until:
                     worker.chunk = work.popleft()
-                    worker.seen = (-1, time.monotonic())
+                    worker.seen = (-1, time.monotonic(), worker.spent())
                     worker.pipe.send(worker.chunk)
             busy = [worker for worker in team if worker.chunk is not None]
             if not busy:
@@ -125,9 +136,9 @@ def _answer(worker: Worker, ready: bool) -> Report | None:
         return report
     at = worker.at.value
     if at != worker.seen[0]:
-        worker.seen = (at, time.monotonic())
-    elif time.monotonic() - worker.seen[1] > STUCK_S:
-        return _lost(worker, f"stuck for {STUCK_S:g} s where no signal is heard")
+        worker.seen = (at, time.monotonic(), worker.spent())
+    elif worker.spent() - worker.seen[2] > STUCK_S or time.monotonic() - worker.seen[1] > LOST_S:
+        return _lost(worker, "stuck where no signal is heard")
     return None
 
 

@@ -1,5 +1,6 @@
 """The shipped models by name: reference ships, and identified models in `library/`."""
 
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -119,7 +120,8 @@ def load_model(name: str | Path) -> ShipModel:
     path = Path(name)
     if path.suffix == ".py":
         return model_of(register_ship_equations(path))
-    if name not in list_models() and (path.suffix == ".json" or path.exists() or isinstance(name, Path)):
+    there = os.path.exists(path)  # noqa: PTH110 - a Path raises OSError for a text too long for one
+    if name not in list_models() and (path.suffix == ".json" or there or isinstance(name, Path)):
         return ShipModel.load(path)
     known = check_choice(name, list_models(), "model (a name, or the path of a model file)")
     if known in REFERENCE_SHIPS:
