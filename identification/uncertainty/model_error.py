@@ -145,12 +145,12 @@ def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clea
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
     measured, predicted = read(clean), read(sail(own, clean))
-    draws = [read(sail(draw, clean)) for draw in drawn[::2]]
+    draws = [read(sail(draw, clean)) for draw in drawn]
     found = []
     for name in INDICES:
         values = [value for value in (getattr(one, name, None) for one in draws) if value is not None]
         truth, mine = getattr(measured, name, None), getattr(predicted, name, None)
-        if truth is None or mine is None or len(values) < DRAWS / 4:
+        if truth is None or mine is None or len(values) < DRAWS / 2:
             continue
         variance = float(np.median((np.array(values) - mine) ** 2)) / MEDIAN
         if variance > 0.0:
