@@ -167,6 +167,30 @@ def exponential(x: float) -> float:
     return value if x == x else x
 
 
+def two_to(x: float) -> float:
+    """2 to the power of x <= 0, at least 2^-1000; by a polynomial of degree 7, error below 6e-11 of it."""
+    within = max(x, -1000.0)
+    shifted = within + (SHIFT + 1023.0)  # in its lowest bits the biased exponent
+    f = within - (shifted - (SHIFT + 1023.0))
+    mantissa = 0.9999999999595488 + f * (
+        0.6931471805459299
+        + f
+        * (
+            0.24022651213596133
+            + f
+            * (
+                0.05550410941216465
+                + f
+                * (
+                    0.009618025602865104
+                    + f * (0.0013333450559416982 + f * (0.0001546973200175844 + f * 1.5310081406904916e-05))
+                )
+            )
+        )
+    )
+    return mantissa * np.int64(np.float64(shifted).view(np.int64) << 52).view(np.float64)
+
+
 def arctan2(y: float, x: float) -> float:
     """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
     a, b = fabs(y), fabs(x)
