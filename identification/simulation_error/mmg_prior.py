@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +107,8 @@ def completed(particulars: Particulars) -> Particulars:
     Det Norske Veritas, L T / 100 (1 + 25 (B / L)^2).
     """
     ship = particulars.completed()
-    ship = replace(ship, **dict.fromkeys(ADDED_MASSES), estimated=ship.estimated - set(ADDED_MASSES))
+    none: dict[str, Any] = dict.fromkeys(ADDED_MASSES)
+    ship = replace(ship, **none, estimated=ship.estimated - none.keys())
     L, B, T = ship.length, ship.require("beam"), ship.require("draught")
     area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
     usual = {
@@ -114,7 +116,7 @@ def completed(particulars: Particulars) -> Particulars:
         "propeller_diameter": DIAMETER * T,
         "rudder_aspect_ratio": (SPAN * T) ** 2 * (ship.rudders or 1.0) / area,
     }
-    absent = {name: value for name, value in usual.items() if ship[name] is None}
+    absent: dict[str, Any] = {name: value for name, value in usual.items() if ship[name] is None}
     return replace(ship, **absent, estimated=ship.estimated | absent.keys())
 
 

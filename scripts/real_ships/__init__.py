@@ -13,7 +13,7 @@ from real_ships.data import Data
 from real_ships.section import Section
 
 #: Module of each case, in the order of the document.
-CASES = {"a": "hsva", "b": "marin", "c": "mei", "d": "esso_osaka", "e": "captive"}
+CASES = {"a": "hsva", "b": "marin", "c": "mei", "d": "esso_osaka", "e": "captive", "f": "mmg"}
 
 
 def get_case(name: str) -> Callable[[Data], Section]:

@@ -1,0 +1,95 @@
+"""A measured zigzag sailed again by a model, its rudder reversed at the headings at which it was reversed.
+
+Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10 zigzag by two degrees,
+because the rudder is reversed when the measured ship got there, not the simulated one.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shipgym.errors import UnstableModelError
+from shipgym.manoeuvres.execution import reversals, rudder
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+STEP = 0.02  # of the time to sail one ship length
+LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by then is never reached
+
+
+def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
+    """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
+
+    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts. None where the
+    model runs away or a heading is never reached, without a reversal, and for a model whose state is not
+    recorded.
+    """
+    if not set(model.state_names) <= {*trial.channels, "x", "y"}:
+        return None
+    start, turns = reversals(trial)
+    delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
+    state = np.array([trial[c][0] if c in trial.channels else 0.0 for c in model.state_names])
+    t, states, orders = [edges[0]], [state], []
+    for leg, (begin, end) in enumerate(pairwise(edges)):
+        held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
+        if end <= begin or not held.any():
+            continue
+        order = float(np.median(delta[held]))
+        target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
+        try:
+            times, sailed = _leg(model, trial, states[-1], order, (t[-1], end - begin), target)
+        except UnstableModelError:
+            return None
+        if not len(times):
+            return None
+        t += times.tolist()
+        states += list(sailed)
+        orders += [order] * len(times)
+    channels = dict(zip(model.state_names, np.array(states).T, strict=True))
+    channels["delta_command"] = np.array([*orders, orders[-1]])
+    return Trial(np.array(t), channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
+
+
+def _leg(
+    model: ShipModel,
+    trial: Trial,
+    state: Floats,
+    order: float,
+    time: tuple[float, float],
+    target: float | None,
+) -> tuple[Floats, Floats]:
+    """Times and states of a leg from its begin and measured duration, up to a heading where one is given.
+
+    Neither holds a row where it is never reached.
+    """
+    begin, duration = time
+    dt = STEP * model.particulars["length"] / model.particulars["speed"]
+    count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
+    sailed = _sailed(model, trial, state, order, begin + dt * np.arange(count), dt)
+    psi = sailed[:, model.state_names.index("psi")]
+    if target is None:
+        return begin + dt * np.arange(1, count + 1), sailed[1:]
+    beyond = np.flatnonzero((psi - target) * np.sign(target - psi[0]) >= 0.0)
+    if not len(beyond) or beyond[0] == 0:
+        return np.empty(0), sailed[:0]
+    k = int(beyond[0]) - 1
+    part = 0.5 * dt * float((target - psi[k]) / (psi[k + 1] - psi[k]))
+    last = _sailed(model, trial, sailed[k], order, np.full(2, begin + k * dt), part)[-1:]
+    return begin + dt * np.append(np.arange(1, k + 1), k + 2.0 * part / dt), np.vstack(
+        [sailed[1 : k + 1], last]
+    )
+
+
+def _sailed(model: ShipModel, trial: Trial, state: Floats, order: float, t: Floats, dt: float) -> Floats:
+    """States with an order held, from each of some times over a step, the shaft as measured."""
+    commands = np.tile(model.service_command, (len(t), 1))
+    commands[:, 0] = order
+    if "n" in model.command_names and "n" in trial.channels:
+        commands[:, 1] = np.interp(t, trial.t, trial["n"])
+    run = model.simulate(commands, max(dt, 1e-6), state)
+    return np.stack([run[name] for name in model.state_names], axis=-1)
