@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import shipgym
 from identification.estimators.estimator import FitTask
+from identification.estimators.kernel_residual import fit_kernel, reference_options
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
@@ -28,6 +29,7 @@ from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -78,6 +80,8 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    if asked.kernel is not None:
+        return _identified_with_kernel(trials, asked, particulars, steering)
     if structure == MMG:
         return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
     chosen = get_method(method)
@@ -88,6 +92,43 @@ def identify(
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
+
+
+def _identified_with_kernel(
+    trials: Sequence[Trial],
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
+    steering: SteeringGear | None,
+) -> IdentificationResult:
+    """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
+    beneath = reference_options(options)
+    problem = pose(trials, beneath, particulars, steering)
+    blank, box = problem.blank, problem.table
+    if not isinstance(box, GreyBox):
+        fitted = identify(
+            trials, particulars=particulars, steering=steering, **beneath.own(), **beneath.settings()
+        ).model
+        blank, box = fitted, fitted_box(fitted)
+    smooth = options.preprocessing or options.smooth
+    sampling = {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+    found = fit_kernel(blank, problem.used, box, options, sampling)
+    reasons = reasons_unstable(found.model, problem.used)
+    report = {"decision": "runs away", "rejected": reasons} if reasons else {"decision": "stable as fitted"}
+    fit = GuardedFit(found.model, found.estimators, not reasons, report)
+    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
+    covariance = _covariance(fit, found.samples, found.model, None, options.uncertainty)
+    provenance = {
+        "structure": beneath.structure,
+        "method": name_of(options.method),
+        "samples": options.samples,
+        "settings": provenance_settings(options, options.settings()),
+        **_reference(problem),
+        **_origin(fit, found.samples, problem.used),
+        "kernel": found.report,
+        "steering": "estimated" if steering is None else "given",
+    }
+    model = replace(found.model, covariance=covariance, provenance=provenance)
+    return _evaluated(model, fit, problem, whole_call(options, problem.trials, particulars, steering))
 
 
 def _identified_mmg(

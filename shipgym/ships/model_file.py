@@ -9,7 +9,9 @@ Format 1:
                    absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
                    [{"coefficient", "name", "powers", "sign"}, ...]}};
                    for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether
-                   the shaft speed is known) and "reference": a reference ship, as a whole model file
+                   the shaft speed is known) and "reference": a reference ship, as a whole model file; one
+                   with a kernel has in place of "equations" its "kernel": {"offset", "scale", "centres",
+                   "basis"}
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s
@@ -33,11 +35,14 @@ from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
+from shipgym.ships.structures import (
+    EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure, Term,
+)  # fmt: skip
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
@@ -103,10 +108,15 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
 def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:
     """A table of terms, or the equations of a ship that has her own, by name."""
     table = check_table(value, where)
-    keys = ("name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares")
+    keys = (
+        "name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares", "kernel",
+    )  # fmt: skip
     check_keys(table, keys, where)
     if "shares" in table:
         return _shared(table, where)
+    if "kernel" in table:
+        named = Structure(str(table.get("name")), str(table.get("source")), {"u": (Term("0", ()),)})
+        return kernel_box(_grey_box(named, table, where, make), _kernel(table["kernel"], f"{where}.kernel"))
     if "equations" in table:
         structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
         if {"reference", "shaft"} & table.keys():
@@ -133,6 +143,18 @@ def _grey_box(
         structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
         read_model(reference, f"{where}.reference", make), shaft,
     )  # fmt: skip
+
+
+def _kernel(value: Any, where: str) -> Kernel:
+    """The radial basis functions of a kernel."""
+    table = check_table(value, where)
+    fields = ("offset", "scale", "centres", "basis")
+    check_keys(table, fields, where)
+    try:
+        arrays = [np.array(table.get(name), dtype=float) for name in fields]
+        return Kernel(*(_numbers(table[name], a.shape, f"{where}.{name}") for name, a in zip(fields, arrays)))
+    except (TypeError, ValueError, KeyError) as error:
+        raise InputError(f"{where}: expected lists of numbers {quoted(fields)}, all rows of one length") from error
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:

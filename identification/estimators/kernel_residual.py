@@ -1,0 +1,237 @@
+"""Fixed-size LS-SVM with an RBF kernel on what a reference ship leaves of the accelerations.
+
+Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines,
+chapter 6: the kernel is approximated on a few centres, here of k-means in mirrored pairs, and the ridge
+regression solved in the primal, in the leading principal components of the data in feature space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from sklearn.cluster import KMeans
+
+from identification.estimators.estimator import Estimators
+from identification.estimators.lssvm import LSSVM
+from identification.estimators.rm_svm import ERROR_TOLERANCE, heading_error
+from identification.regression.coefficients import with_accelerations
+from identification.regression.grey_box import structure_samples
+from identification.regression.preprocess import smoothed_channels
+from identification.regression.samples import Samples
+from identification.validation.folds import TRIALS, held_out_rows
+from shipgym.checks import check_number, check_whole
+from shipgym.errors import InputError
+from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.grey_boxes import GREY_BOX
+from shipgym.ships.kernel_boxes import INPUTS, RBF, SIZES, Kernel, KernelBox, gaussians, kernel_box, kernel_inputs
+from shipgym.trials.identify_table import Options
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options that are the kernel's, not the reference's
+BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
+METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", "map")
+CENTRES = 64
+LENGTHS = (1.4, 1.0, 0.7, 0.5)  # of the functions, in root mean squares of the inputs
+WEIGHTS = tuple(np.geomspace(0.05, 50.0, 7).tolist())  # of squared errors over a ship length
+MOST_FEATURES = 40  # of each equation, so that their covariance stays small
+LEAST_SCALE = 0.02  # of an input that hardly changes
+MOST_SAMPLES = 4000  # among which centres are sought
+MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
+EVERY_CENTRE_NEEDS = 3  # rows of the regression
+
+
+@dataclass(frozen=True, eq=False)
+class KernelFit:
+    """A kernel fitted to what a reference ship leaves."""
+
+    model: ShipModel
+    samples: Samples
+    estimators: Estimators
+    report: dict[str, Any]  # for the provenance
+
+
+def reference_options(options: Options) -> Options:
+    """The options by which the reference ship beneath a kernel is identified; a grey box names hers.
+
+    Raises InputError for a kernel that does not exist, and for a method that has none.
+    """
+    if options.kernel != RBF:
+        raise InputError(f"kernel: {options.kernel!r} found, expected {RBF!r}, or none")
+    if options.method not in METHODS:
+        raise InputError(
+            f"kernel: {RBF!r} found with method {options.method!r}, which has none, expected method "
+            "'rm-svm' or 'ls-svm'; or leave the kernel out"
+        )
+    if options.regression not in (None, "ls-svm") or options.epsilon is not None:
+        raise InputError(f"regression: epsilon-SVR found with kernel {RBF!r}, which is fitted by LS-SVM only")
+    structure, method = options.structure, options.method
+    if structure == Options.structure:  # none was named
+        structure = BLACK_BOX if options.reference_model is None else GREY_BOX
+    if structure != GREY_BOX:
+        method = "ls-svm" if method == "rm-svm" else method
+    return replace(options, structure=structure, method=method, **dict.fromkeys(OWN))
+
+
+def fit_kernel(
+    blank: ShipModel, trials: Sequence[Trial], box: GreyBox, options: Options, sampling: Mapping[str, Any]
+) -> KernelFit:
+    """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
+
+    Where not given these are the smoothest whose simulated headings of the trials held out are within a tenth
+    of the best; a fitted reference ship knows these trials.
+
+    Parameters
+    ----------
+    blank : ShipModel
+        Of the ship; its structure is not used.
+    trials : sequence of Trial
+        To fit.
+    box : GreyBox
+        With the reference ship.
+    options : Options
+        With `centres`, at most 100; `kernel_length`; `C`; `folds`.
+    sampling : mapping
+        As of `build_samples`.
+
+    Raises
+    ------
+    InputError
+        For too few samples, and settings that cannot be.
+    """
+    asked = CENTRES if options.centres is None else options.centres
+    check_whole(asked, "centres", at_least=2)
+    check_number(asked, "centres", at_least=2, at_most=SIZES[-1])
+    smoothing = sampling["smooth"] if isinstance(sampling["smooth"], str) else "spline"
+    names = ("u", "v", "r", "delta")
+    channels = [smoothed_channels(trial, names, smoothing) for trial in trials]
+    x = np.concatenate([kernel_inputs(one, blank.particulars) for one in channels])
+    search = _Search(blank, trials, box, sampling, options.folds or TRIALS)
+    lengths = LENGTHS if options.kernel_length is None else (options.kernel_length,)
+    weights = WEIGHTS if options.C is None else (check_number(options.C, "C", above=0.0),)
+    offset, scale, centres = chosen_centres(x, asked)
+    tried: dict[tuple[float, float], float] = {}
+    stages = {}
+    for length in lengths:
+        check_number(length, "kernel_length", above=0.0)
+        kernel = Kernel(offset, scale * length, centres / length, np.eye(len(centres)))
+        stages[length] = search.stage(principal(kernel, x))
+        if len(lengths) * len(weights) > 1:
+            tried |= {(length, weight): search.error(stages[length], weight) for weight in weights}
+    length, weight = lengths[0], weights[0]
+    if tried:
+        least = ERROR_TOLERANCE * min(tried.values())
+        length, weight = next(
+            (pair for weight in weights for pair in ((length, weight) for length in lengths)
+             if tried[pair] <= least), (lengths[0], weights[0]),
+        )  # fmt: skip
+    fit = search.fitted(stages[length], weight)
+    bare = search.error(stages[length], 0.0)
+    errors = {"reference": bare, **({"kernel": tried[length, weight]} if tried else {})}
+    remarks = []
+    if tried and not errors["kernel"] < bare:
+        remarks.append(
+            "on trials held out the kernel predicts the heading no better than its reference ship alone "
+            f"({np.degrees(errors['kernel']):.2g} and {np.degrees(bare):.2g} deg rms)"
+        )
+    report = {
+        "kind": RBF, "centres": len(centres), "features": fit.model.table.functions.basis.shape[1],
+        "inputs": list(INPUTS), "length": length, "C": weight,
+        "heading_errors_held_out": errors, "remarks": remarks,
+    }  # fmt: skip
+    return replace(fit, report=report)
+
+
+def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
+    """Offset and scale of inputs, and centres in these, mirrored to the other side in pairs.
+
+    x has shape (n_samples, 4). Centres are those of k-means of all samples brought to one side. Raises
+    InputError for fewer samples than it takes.
+    """
+    offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
+    scale = np.maximum(np.sqrt(np.mean((x - offset) ** 2, axis=0)), LEAST_SCALE)
+    z = (x - offset) / scale
+    folded = z * np.where(z[:, 1:2] < 0.0, MIRROR, 1.0)
+    if len(np.unique(folded, axis=0)) < EVERY_CENTRE_NEEDS * number:
+        raise InputError(
+            f"trials: {len(x)} samples found for {number} centres of the kernel, expected at least "
+            f"{EVERY_CENTRE_NEEDS} different ones for each; add trials, or give fewer centres"
+        )
+    means = KMeans(number // 2, n_init=1, random_state=0).fit(_thinned(folded)).cluster_centers_
+    return offset, scale, np.concatenate([means, means * MIRROR])
+
+
+def principal(kernel: Kernel, x: Floats) -> Kernel:
+    """The kernel with the leading principal components of the samples x in feature space as features."""
+    both = _thinned((x - kernel.offset) / kernel.scale)
+    both = np.concatenate([both, both * MIRROR])
+    values = gaussians(both, kernel.centres)
+    own = gaussians(kernel.centres, kernel.centres)
+    moment = values.T @ values / len(values)
+    _, vectors = eigh(moment, own + 1e-9 * np.eye(len(own)))
+    return replace(kernel, basis=np.ascontiguousarray(vectors[:, ::-1][:, :MOST_FEATURES]))
+
+
+def _thinned(x: Floats) -> Floats:
+    return x[:: max(1, -(-len(x) // MOST_SAMPLES))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Stage:
+    """The regression with one kernel."""
+
+    blank: ShipModel
+    samples: Samples
+
+
+class _Search:
+    """Fits with different kernels and weights of the errors, and what they predict."""
+
+    def __init__(
+        self, blank: ShipModel, trials: Sequence[Trial], box: GreyBox, sampling: Mapping[str, Any], folds: Any
+    ) -> None:
+        self.blank, self.trials, self.box, self.sampling, self.folds = blank, trials, box, sampling, folds
+
+    def stage(self, kernel: Kernel) -> _Stage:
+        """The regression, and the model but for its coefficients."""
+        table = kernel_box(self.box, kernel)
+        blank = replace(
+            self.blank, structure=table.name, own_table=table, covariance=None, provenance=None,
+            coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        )  # fmt: skip
+        samples = structure_samples(
+            self.trials, table, blank.particulars, shaft_speed=blank.service_shaft_speed, **self.sampling
+        )
+        return _Stage(blank, samples)
+
+    def unit(self, samples: Samples) -> float:
+        """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""
+        ship = self.blank.particulars
+        return float(1.0 / (ship["length"] * np.mean(samples.duration) * ship["speed"] ** 3))
+
+    def error(self, stage: _Stage, weight: float) -> float:
+        """Mean error of the simulated headings of what is held out; 0: of the reference ship."""
+        samples, C, errors = stage.samples, weight * self.unit(stage.samples), []
+        for rows, held in held_out_rows(self.trials, samples, self.folds):
+            found = {}
+            for q, X in samples.features.items():
+                moment = X[rows].T @ X[rows] * C + np.eye(X.shape[1])
+                found[q] = np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows]))
+            errors.append(heading_error(with_accelerations(stage.blank, found), held, "rmse"))
+        return float(np.mean(errors))
+
+    def fitted(self, stage: _Stage, weight: float) -> KernelFit:
+        """The fit to all rows."""
+        samples, C = stage.samples, weight * self.unit(stage.samples)
+        estimators: Estimators = {
+            q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
+            for q, X in samples.features.items()
+        }
+        model = with_accelerations(stage.blank, {q: one.coef_ for q, one in estimators.items()})
+        return KernelFit(model, samples, estimators, {})
