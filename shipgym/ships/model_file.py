@@ -40,9 +40,7 @@ from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import (
-    EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure, Term,
-)  # fmt: skip
+from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
@@ -115,8 +113,9 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
     if "shares" in table:
         return _shared(table, where)
     if "kernel" in table:
-        named = Structure(str(table.get("name")), str(table.get("source")), {"u": (Term("0", ()),)})
-        return kernel_box(_grey_box(named, table, where, make), _kernel(table["kernel"], f"{where}.kernel"))
+        named = {key: table[key] for key in keys[:4] if key in table}
+        structure = _structure({**named, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
+        return kernel_box(_grey_box(structure, table, where, make), _kernel(table["kernel"], f"{where}.kernel"))
     if "equations" in table:
         structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
         if {"reference", "shaft"} & table.keys():
