@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import shipgym
 from identification.estimators.estimator import FitTask
-from identification.estimators.kernel_residual import fit_kernel, reference_options
+from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
@@ -108,6 +108,7 @@ def _identified_with_kernel(
         fitted = identify(
             trials, particulars=particulars, steering=steering, **beneath.own(), **beneath.settings()
         ).model
+        fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
         blank, box = fitted, fitted_box(fitted)
     smooth = options.preprocessing or options.smooth
     sampling = {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}

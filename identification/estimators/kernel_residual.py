@@ -44,6 +44,9 @@ MOST_FEATURES = 40  # of each equation, so that their covariance stays small
 LEAST_SCALE = 0.02  # of an input that hardly changes
 MOST_SAMPLES = 4000  # among which centres are sought
 MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
+# Of the linear model beneath a black box, prime system: eigenvalues of steering, drift and turn with the rudder
+# hard over, damping of surge
+LEAST_DAMPING, HARDEST_TURN, LEAST_SURGE_DAMPING = -0.2, (0.5, 1.2), -0.05
 EVERY_CENTRE_NEEDS = 3  # rows of the regression
 
 
@@ -77,6 +80,26 @@ def reference_options(options: Options) -> Options:
     if structure != GREY_BOX:
         method = "ls-svm" if method == "rm-svm" else method
     return replace(options, structure=structure, method=method, **dict.fromkeys(OWN))
+
+
+def stabilised(model: ShipModel) -> ShipModel:
+    """The linear model beneath a black box, damped until a hard turn that is in no trial keeps within bounds.
+
+    Where the kernel fades the ship is linear: she must be stable, and neither drift nor turn beyond any ship.
+    """
+    c = dict(model.coefficients)
+    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]])
+    rudder = model.steering.limit * np.array([c["b_d"], c["c_d"]])
+    shift = 0.0
+    while True:
+        damped = A - shift * np.eye(2)
+        turn = np.abs(np.linalg.solve(damped, rudder))
+        if np.linalg.eigvals(damped).real.max() < LEAST_DAMPING and np.all(turn < HARDEST_TURN):
+            break
+        shift += 0.05
+    c |= {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift}
+    c["a_du"] = min(c["a_du"], LEAST_SURGE_DAMPING - 2.0 * c["a_0"])
+    return replace(model, coefficients=c)
 
 
 def fit_kernel(

@@ -149,11 +149,8 @@ def _kernel(value: Any, where: str) -> Kernel:
     table = check_table(value, where)
     fields = ("offset", "scale", "centres", "basis")
     check_keys(table, fields, where)
-    try:
-        arrays = [np.array(table.get(name), dtype=float) for name in fields]
-        return Kernel(*(_numbers(table[name], a.shape, f"{where}.{name}") for name, a in zip(fields, arrays)))
-    except (TypeError, ValueError, KeyError) as error:
-        raise InputError(f"{where}: expected lists of numbers {quoted(fields)}, all rows of one length") from error
+    shapes = [(4,), (4,), (-1, 4), (-1, -1)]
+    return Kernel(*(_numbers(table.get(n), shape, f"{where}.{n}") for n, shape in zip(fields, shapes, strict=True)))
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
@@ -235,11 +232,13 @@ def read_envelope(value: Any, where: str) -> Envelope | None:
 
 
 def _numbers(value: Any, shape: tuple[int, ...], where: str) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """An array of finite numbers of the given shape."""
+    """An array of finite numbers of the given shape, whose -1 stand for any length."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{where}: expected numbers of shape {shape}, all rows of one length") from None
+    if array.ndim == len(shape):
+        shape = tuple(n if m < 0 else m for n, m in zip(array.shape, shape, strict=True))
     if array.shape != shape or not np.all(np.isfinite(array)):
         raise InputError(f"{where}: shape {array.shape} found, expected {shape} finite numbers")
     return array
