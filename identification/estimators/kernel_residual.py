@@ -28,13 +28,19 @@ from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.kernel_boxes import INPUTS, RBF, SIZES, Kernel, KernelBox, gaussians, kernel_box, kernel_inputs
+from shipgym.ships.kernel_boxes import INPUTS, RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import Options
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
-OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options that are the kernel's, not the reference's
+OWN = (
+    "kernel",
+    "centres",
+    "kernel_length",
+    "C",
+    "folds",
+)  # options that are the kernel's, not the reference's
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
 METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", "map")
 CENTRES = 64
@@ -44,8 +50,8 @@ MOST_FEATURES = 40  # of each equation, so that their covariance stays small
 LEAST_SCALE = 0.02  # of an input that hardly changes
 MOST_SAMPLES = 4000  # among which centres are sought
 MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
-# Of the linear model beneath a black box, prime system: eigenvalues of steering, drift and turn with the rudder
-# hard over, damping of surge
+# Of the linear model beneath a black box, prime system: eigenvalues of steering, drift and turn with the
+# rudder hard over, damping of surge
 LEAST_DAMPING, HARDEST_TURN, LEAST_SURGE_DAMPING = -0.2, (0.5, 1.2), -0.05
 EVERY_CENTRE_NEEDS = 3  # rows of the regression
 

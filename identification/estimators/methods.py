@@ -140,8 +140,8 @@ def get_method(method: str | Any) -> Method:
         )
     if isinstance(method, LSSVM) and method.kernel != "linear":
         raise InputError(
-            f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; write "
-            "identify(..., kernel='rbf') for a ship with a kernel"
+            f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; "
+            "write identify(..., kernel='rbf') for a ship with a kernel"
         )
     together = [fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)]
     fit = together[0] if together else each_equation

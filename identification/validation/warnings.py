@@ -49,7 +49,8 @@ def model_warnings(fit: Fit) -> list[str]:
             f"the fit by itself ran away ({guard['rejected'][0]}), so terms that the data hardly shows were "
             "held back; predictions far from the recorded manoeuvres are doubtful"
         )
-    found += [*provenance.get("prior_remarks", []), *exactly_collinear(fit), *_lost_headings(fit)]
+    remarks = [*provenance.get("prior_remarks", []), *provenance.get("kernel", {}).get("remarks", [])]
+    found += [*remarks, *exactly_collinear(fit), *_lost_headings(fit)]
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
     if derived:
         found.append(

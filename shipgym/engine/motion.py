@@ -225,7 +225,7 @@ def arrival(
     motion: Motion, one: Motion, k: Rates, ahead: float, aside: float, order: float, h: float, push: Push,
     ship: Ship,
 ) -> Motion:  # fmt: skip
-    """State after a step from the sums of its stages: of the rates, and of the way made from the state `one`."""
+    """State after a step from what its stages sum up to: rates, and the way made from the state `one`."""
     sixth = h / 6.0
     end = along(one, k, sixth, rudder_after(one.delta, k.delta / 6.0, order, h, ship))
     ahead, aside = sixth * ahead, sixth * aside

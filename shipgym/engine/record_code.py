@@ -50,7 +50,7 @@ def loader(rows: Rows, lanes: int = LANES) -> Part:
 
 
 def row_reader(lanes: int = LANES) -> Part:
-    """`row_of(table, row)`: a number of a table (`records.Table`), which is where the first of them stands."""
+    """`row_of(table, row)`: a number of a table (`records.Table`), which is where its first one stands."""
 
     def row_of(table: Any, row: int) -> Any:
         return table[row]
@@ -210,7 +210,10 @@ def _constant(context: Any, number: float) -> Any:
 def _shape(record: Record) -> tuple[Any, ...]:
     """Names in a record and in those within it."""
     kinds = field_types(record)
-    shapes = {n: k.rows if is_table(k) else _shape(k) if is_record(k) else is_list(k) for n, k in kinds.items()}
+    shapes = {
+        name: kind.rows if is_table(kind) else _shape(kind) if is_record(kind) else is_list(kind)
+        for name, kind in kinds.items()
+    }
     return (record.__name__, *shapes.items())
 
 

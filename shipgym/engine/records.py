@@ -24,7 +24,7 @@ def is_record(kind: Any) -> bool:
 
 
 class Table:
-    """Kind of a field that is a table of numbers in so many rows, read one by one (`record_code.row_reader`)."""
+    """Kind of a field that is a table of numbers, read one by one (`record_code.row_reader`)."""
 
     rows = 0
 

@@ -13,8 +13,24 @@ from shipgym.engine.episodes import Tile, conclude_step
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
 from shipgym.engine.places import (
-    common_sea, common_ship, load_course, load_motion, load_passed, load_point, load_sea, load_slope,
-    load_sums, point_of, push, row_sums, sea_at, ship_at, store_passed, store_point, store_slope, store_sums,
+    common_sea,
+    common_ship,
+    load_course,
+    load_motion,
+    load_passed,
+    load_point,
+    load_sea,
+    load_slope,
+    load_sums,
+    point_of,
+    push,
+    row_sums,
+    sea_at,
+    ship_at,
+    store_passed,
+    store_point,
+    store_slope,
+    store_sums,
     sum_accelerations,
 )  # fmt: skip
 
@@ -97,7 +113,9 @@ def conclude(tile: Tile, h: float, weight: float, lanes: int) -> None:
     for lane in range(lanes):
         start, order, shaft, ship, coefficients = start_of(tile, common, lane)
         at = stage(start, load_slope(result, lane), h, order, ship)
-        pushed = push(load_motion(tile.state, lane), load_sea(tile.state, lane), sea_at(sea_common, tile.ships, lane))
+        pushed = push(
+            load_motion(tile.state, lane), load_sea(tile.state, lane), sea_at(sea_common, tile.ships, lane)
+        )
         k = rates(at, order, shaft, pushed, coefficients, ship)
         udot, vdot, rdot = sum_accelerations(at, load_sums(result, lane), ship)
         k = Rates(k.psi, k.u + udot, k.v + vdot, k.r + rdot, k.p, k.phi, k.q, k.delta, k.n)
@@ -125,9 +143,7 @@ def arrive(tile: Tile, h: float, lanes: int) -> None:
         passed, before = load_passed(tile.result, lane), load_motion(tile.state, lane)
         p = sea_at(sea_common, tile.ships, lane)
         pushed = push(before, load_sea(tile.state, lane), p)
-        after = arrival(
-            before, start, passed.total, passed.ahead, passed.aside, order, h, pushed, ship
-        )
+        after = arrival(before, start, passed.total, passed.ahead, passed.aside, order, h, pushed, ship)
         conclude_step(tile, lane, after, h, ship, p)
 
 

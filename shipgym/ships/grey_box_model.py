@@ -48,7 +48,8 @@ def grey_box(
 
 def fitted_box(ship: ShipModel) -> GreyBox:
     """A grey box on a model of the very same ship, whose covariance and provenance it keeps."""
-    return replace(grey_box(ship), reference=replace(ship, envelope=None))
+    named = f"{ship.name}, {ship.structure}"
+    return replace(grey_box(ship), reference=replace(ship, name=named, envelope=None))
 
 
 def converted_model(

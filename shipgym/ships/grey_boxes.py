@@ -222,7 +222,7 @@ def grey_box_vessel(
     reference: Vessel, terms: Record, functions: Mapping[str, Any], shaft: bool,
     state_names: tuple[str, ...], lag: bool, summed: Mapping[str, Any] | None = None,
 ) -> Vessel:  # fmt: skip
-    """Functions of the reference ship, those of the terms with their record of coefficients, and their sum."""
+    """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
     fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
     parts = {
         **reference.functions,

@@ -1,14 +1,14 @@
-"""A reference ship and a correction of her accelerations by radial basis functions, which fades outside its data.
+"""A reference ship, and radial basis functions that correct her accelerations and fade outside their data.
 
 Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines,
-chapter 6 (fixed-size LS-SVM: a kernel on a few centres, Nystroem features), on what a reference ship leaves of
-the accelerations (RM-SVM, Mei, Sun & Shi 2019). With a linear reference fitted to the same trials it is a
+chapter 6 (fixed-size LS-SVM: a kernel on a few centres, Nystroem features), on what a reference ship leaves
+of the accelerations (RM-SVM, Mei, Sun & Shi 2019). With a linear reference fitted to the same trials it is a
 kernel ship of its own, a black box.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache
 from math import sqrt
 from typing import Any, NamedTuple
 
@@ -71,8 +71,8 @@ class Kernel:
         whole = shapes[:3] == [(4,), (4,), (n, 4)] and np.ndim(self.basis) == 2 and len(self.basis) == n
         if not whole or not 0 < n <= SIZES[-1] or not np.all(self.scale > 0.0):
             raise InputError(
-                f"kernel: offset, scale, centres and basis of shapes {shapes} found, expected (4,), (4,) above 0, "
-                f"(n, 4) and (n, n_features) with n at most {SIZES[-1]}"
+                f"kernel: offset, scale, centres and basis of shapes {shapes} found, expected (4,), (4,) "
+                f"above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}"
             )
 
     @property
@@ -81,7 +81,7 @@ class Kernel:
         return next(size for size in SIZES if size >= len(self.centres))
 
     def coordinates(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
-        """x of samples, shape (n_samples, 4); channels u, v, r and delta, SI units."""
+        """Inputs of samples in their scales, shape (n_samples, 4); channels u, v, r and delta, SI units."""
         return (kernel_inputs(channels, particulars) - self.offset) / self.scale
 
     def features(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
@@ -95,7 +95,7 @@ class Kernel:
 
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
-    """v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
+    """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
     u, v, r, delta = (np.asarray(channels[name], dtype=float) for name in ("u", "v", "r", "delta"))
     speed = particulars["speed"]
     U = np.maximum(np.hypot(u, v), SLOWEST * speed)
@@ -146,7 +146,7 @@ class KernelBox(GreyBox):
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Numbers of the vessel's coefficients: the reference ship's, scales, offset and the table of centres."""
+        """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
         kernel = self.functions
         weights = self.acceleration_matrix(particulars, shaft_speed) @ np.array(list(coefficients.values()))
         table = np.zeros((kernel.size, ROW))

@@ -115,7 +115,9 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
     if "kernel" in table:
         named = {key: table[key] for key in keys[:4] if key in table}
         structure = _structure({**named, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
-        return kernel_box(_grey_box(structure, table, where, make), _kernel(table["kernel"], f"{where}.kernel"))
+        return kernel_box(
+            _grey_box(structure, table, where, make), _kernel(table["kernel"], f"{where}.kernel")
+        )
     if "equations" in table:
         structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
         if {"reference", "shaft"} & table.keys():
@@ -150,7 +152,9 @@ def _kernel(value: Any, where: str) -> Kernel:
     fields = ("offset", "scale", "centres", "basis")
     check_keys(table, fields, where)
     shapes = [(4,), (4,), (-1, 4), (-1, -1)]
-    return Kernel(*(_numbers(table.get(n), shape, f"{where}.{n}") for n, shape in zip(fields, shapes, strict=True)))
+    return Kernel(
+        *(_numbers(table.get(n), shape, f"{where}.{n}") for n, shape in zip(fields, shapes, strict=True))
+    )
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:

@@ -11,7 +11,6 @@ import gymnasium
 import numpy as np
 import pytest
 
-import shipgym
 from identification import LSSVM, IdentificationResult, identify
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -49,7 +48,9 @@ def truth(reference: ShipModel) -> ShipModel:
     even, odd = np.ones(2), np.array([1.0, -1.0])
     values = np.concatenate([
         np.outer(side, weights).ravel()
-        for side, weights in ((even, [-0.02, -0.01, -0.03]), (odd, [0.05, 0.02, 0.04]), (odd, [0.2, 0.3, -0.3]))
+        for side, weights in (
+            (even, [-0.02, -0.01, -0.03]), (odd, [0.05, 0.02, 0.04]), (odd, [0.2, 0.3, -0.3])
+        )
     ])  # fmt: skip
     coefficients = dict(zip(table.coefficient_names, values.tolist(), strict=True))
     return ShipModel("truth", table.name, SHIP, GEAR, coefficients, own_table=table)
@@ -99,7 +100,7 @@ def test_a_known_smooth_residual_is_recovered(
 ) -> None:
     for trial in trials:
         found, true, bare = (accelerations(m, trial) for m in (corrected.model, truth, reference))
-        left, there = np.sqrt(np.mean((found - true) ** 2, axis=0)), np.sqrt(np.mean((true - bare) ** 2, axis=0))
+        left, there = (np.sqrt(np.mean((one - true) ** 2, axis=0)) for one in (found, bare))
         assert np.all(left < 0.2 * there)
     assert errors(corrected, "validate") < 0.5 < 10.0 < errors(corrected, "validate", "reference")
 
