@@ -134,47 +134,50 @@ def fit_kernel(
     InputError
         For too few samples, and settings that cannot be.
     """
-    asked = CENTRES if options.centres is None else options.centres
-    check_whole(asked, "centres", at_least=2)
-    check_number(asked, "centres", at_least=2, at_most=SIZES[-1])
-    smoothing = sampling["smooth"] if isinstance(sampling["smooth"], str) else "spline"
-    names = ("u", "v", "r", "delta")
-    channels = [smoothed_channels(trial, names, smoothing) for trial in trials]
-    x = np.concatenate([kernel_inputs(one, blank.particulars) for one in channels])
     search = _Search(blank, trials, box, sampling, options.folds or TRIALS)
-    lengths = LENGTHS if options.kernel_length is None else (options.kernel_length,)
+    kernels = _kernels(search, options)
     weights = WEIGHTS if options.C is None else (check_number(options.C, "C", above=0.0),)
-    offset, scale, centres = chosen_centres(x, asked)
-    tried: dict[tuple[float, float], float] = {}
-    stages = {}
-    for length in lengths:
-        check_number(length, "kernel_length", above=0.0)
-        kernel = Kernel(offset, scale * length, centres / length, np.eye(len(centres)))
-        stages[length] = search.stage(principal(kernel, x))
-        if len(lengths) * len(weights) > 1:
-            tried |= {(length, weight): search.error(stages[length], weight) for weight in weights}
-    length, weight = lengths[0], weights[0]
-    if tried:
+    stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
+    pairs = [(length, weight) for weight in weights for length in stages]  # the smoothest first
+    (length, weight), errors = pairs[0], {}
+    if len(pairs) > 1:
+        tried = {pair: search.error(stages[pair[0]], pair[1]) for pair in pairs}
         least = ERROR_TOLERANCE * min(tried.values())
-        length, weight = next(
-            (pair for weight in weights for pair in ((length, weight) for length in lengths)
-             if tried[pair] <= least), (lengths[0], weights[0]),
-        )  # fmt: skip
-    fit = search.fitted(stages[length], weight)
-    bare = search.error(stages[length], 0.0)
-    errors = {"reference": bare, **({"kernel": tried[length, weight]} if tried else {})}
+        length, weight = next((pair for pair in pairs if tried[pair] <= least), pairs[0])
+        errors = {"kernel": tried[length, weight]}
+    errors["reference"] = search.error(stages[length], 0.0)
     remarks = []
-    if tried and not errors["kernel"] < bare:
+    if not errors.get("kernel", 0.0) < errors["reference"]:
         remarks.append(
             "on trials held out the kernel predicts the heading no better than its reference ship alone "
-            f"({np.degrees(errors['kernel']):.2g} and {np.degrees(bare):.2g} deg rms)"
+            f"({np.degrees(errors['kernel']):.2g} and {np.degrees(errors['reference']):.2g} deg rms)"
         )
+    kernel = kernels[length]
     report = {
-        "kind": RBF, "centres": len(centres), "features": fit.model.table.functions.basis.shape[1],
+        "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
         "inputs": list(INPUTS), "length": length, "C": weight,
         "heading_errors_held_out": errors, "remarks": remarks,
     }  # fmt: skip
-    return replace(fit, report=report)
+    return replace(search.fitted(stages[length], weight), report=report)
+
+
+def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
+    """Kernels by their length, on centres among the samples."""
+    number = CENTRES if options.centres is None else options.centres
+    check_whole(number, "centres", at_least=2)
+    check_number(number, "centres", at_most=SIZES[-1])
+    smooth = search.sampling["smooth"]
+    method = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
+    channels = [smoothed_channels(trial, ("u", "v", "r", "delta"), method) for trial in search.trials]
+    x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
+    offset, scale, centres = chosen_centres(x, number)
+    lengths = LENGTHS
+    if options.kernel_length is not None:
+        lengths = (check_number(options.kernel_length, "kernel_length", above=0.0),)
+    return {
+        length: principal(Kernel(offset, scale * length, centres / length, np.eye(len(centres))), x)
+        for length in lengths
+    }
 
 
 def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:

@@ -237,7 +237,7 @@ def _type(record: Record) -> Any:
 
     def typed(kind: Any) -> Any:
         if is_table(kind):
-            return types.CPointer(types.float64)
+            return types.CPointer(types.float64)  # type: ignore[attr-defined]
         return _type(kind) if is_record(kind) else types.float64[::1] if is_list(kind) else types.float64
 
     kinds = [typed(kind) for kind in field_types(record).values()]

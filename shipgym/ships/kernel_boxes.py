@@ -137,7 +137,8 @@ class KernelBox(GreyBox):
     ) -> Floats:
         """As of `Structure`: the features of the kernel by U^2, shape (n_samples, n_features)."""
         u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
-        return (u * u + v * v)[:, None] * self.functions.features(channels, particulars)
+        found: Floats = (u * u + v * v)[:, None] * self.functions.features(channels, particulars)
+        return found
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
