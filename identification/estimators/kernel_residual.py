@@ -28,7 +28,7 @@ from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.ships.kernel_boxes import INPUTS, RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
+from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import Options
 from shipgym.trials.trial import Trial
 
@@ -85,7 +85,8 @@ def reference_options(options: Options) -> Options:
         structure = BLACK_BOX if options.reference_model is None else GREY_BOX
     if structure != GREY_BOX:
         method = "ls-svm" if method == "rm-svm" else method
-    return replace(options, structure=structure, method=method, **dict.fromkeys(OWN))
+    cleared: dict[str, Any] = dict.fromkeys(OWN)
+    return replace(options, structure=structure, method=method, **cleared)
 
 
 def stabilised(model: ShipModel) -> ShipModel:
@@ -114,25 +115,9 @@ def fit_kernel(
     """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
 
     Where not given these are the smoothest whose simulated headings of the trials held out are within a tenth
-    of the best; a fitted reference ship knows these trials.
-
-    Parameters
-    ----------
-    blank : ShipModel
-        Of the ship; its structure is not used.
-    trials : sequence of Trial
-        To fit.
-    box : GreyBox
-        With the reference ship.
-    options : Options
-        With `centres`, at most 100; `kernel_length`; `C`; `folds`.
-    sampling : mapping
-        As of `build_samples`.
-
-    Raises
-    ------
-    InputError
-        For too few samples, and settings that cannot be.
+    of the best; a fitted reference ship knows these trials. `blank`: the ship, whose structure is not used;
+    `trials`: to fit; `box`: has the reference ship; `options`: `centres`, `kernel_length`, `C`, `folds`;
+    `sampling`: as of `build_samples`. Raises InputError for too few samples and settings that cannot be.
     """
     search = _Search(blank, trials, box, sampling, options.folds or TRIALS)
     kernels = _kernels(search, options)
@@ -155,7 +140,7 @@ def fit_kernel(
     kernel = kernels[length]
     report = {
         "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
-        "inputs": list(INPUTS), "length": length, "C": weight,
+        "length": length, "C": weight,
         "heading_errors_held_out": errors, "remarks": remarks,
     }  # fmt: skip
     return replace(search.fitted(stages[length], weight), report=report)
@@ -251,10 +236,12 @@ class _Search:
         """Mean error of the simulated headings of what is held out; 0: of the reference ship."""
         samples, C, errors = stage.samples, weight * self.unit(stage.samples), []
         for rows, held in held_out_rows(self.trials, samples, self.folds):
-            found = {}
+            found: dict[str, Floats] = {}
             for q, X in samples.features.items():
                 moment = X[rows].T @ X[rows] * C + np.eye(X.shape[1])
-                found[q] = np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows]))
+                found[q] = np.asarray(
+                    np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
+                )
             errors.append(heading_error(with_accelerations(stage.blank, found), held, "rmse"))
         return float(np.mean(errors))
 

@@ -77,11 +77,9 @@ def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
         for row in range(0, N_ROWS, ROWS_AT_ONCE):
             for lane in range(lanes):
                 _, coefficients = ship_at(common, tile.ships, lane)
-                point, sums = load_point(result, lane), load_sums(result, lane)
-                sums = row_sums(point, sums, coefficients, row)
-                sums = row_sums(point, sums, coefficients, row + 1)
-                sums = row_sums(point, sums, coefficients, row + 2)
-                sums = row_sums(point, sums, coefficients, row + 3)
+                at, sums, terms = load_point(result, lane), load_sums(result, lane), coefficients.terms
+                sums = row_sums(at, row_sums(at, sums, terms, row), terms, row + 1)
+                sums = row_sums(at, row_sums(at, sums, terms, row + 2), terms, row + 3)
                 store_sums(result, lane, sums)
         conclude(tile, part * h, 2.0 if number == 1 or number == 2 else 1.0, lanes)
     arrive(tile, h, lanes)
@@ -103,7 +101,7 @@ def prepare(tile: Tile, h: float, lanes: int) -> None:
     for lane in range(lanes):
         start, order, _, ship, coefficients = start_of(tile, common, lane)
         at = stage(start, load_slope(result, lane), h, order, ship)
-        store_point(result, lane, point_of(at, coefficients, ship))
+        store_point(result, lane, point_of(at, coefficients.terms, ship))
         store_sums(result, lane, Sums(0.0, 0.0, 0.0))
 
 

@@ -31,9 +31,13 @@ from shipgym.ships.terms import Term
 RBF = "rbf"
 SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
 ROW = 8  # numbers of a centre: coordinates, minus half their square, weights of surge, sway and yaw
-INPUTS = ("v'", "r'", "delta", "U/U0")
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
 PER_ROOT_LN_2 = 1.0 / sqrt(np.log(2.0))  # of coordinates, so that the kernel is a power of 2
+
+SOURCE = (
+    "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines, "
+    "chapter 6; Mei, Sun & Shi 2019"
+)
 
 
 @dataclass(frozen=True)
@@ -80,13 +84,10 @@ class Kernel:
         """Number of centres that is compiled."""
         return next(size for size in SIZES if size >= len(self.centres))
 
-    def coordinates(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
-        """Inputs of samples in their scales, shape (n_samples, 4); channels u, v, r and delta, SI units."""
-        return (kernel_inputs(channels, particulars) - self.offset) / self.scale
-
     def features(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
         """Features of samples, shape (n_samples, n_features)."""
-        found: Floats = gaussians(self.coordinates(channels, particulars), self.centres) @ self.basis
+        x = (kernel_inputs(channels, particulars) - self.offset) / self.scale
+        found: Floats = gaussians(x, self.centres) @ self.basis
         return found
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,36 +120,30 @@ class KernelBox(GreyBox):
         For no kernel, and as `GreyBox`.
     """
 
-    kernel: Kernel | None = None
+    kernel: Kernel = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        if self.kernel is None:
+        if not isinstance(self.kernel, Kernel):
             raise InputError(f"structure '{self.name}': no kernel found, expected a Kernel")
         super().__post_init__()
-
-    @property
-    def functions(self) -> Kernel:
-        """The kernel."""
-        assert self.kernel is not None
-        return self.kernel
 
     def features(
         self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """As of `Structure`: the features of the kernel by U^2, shape (n_samples, n_features)."""
         u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
-        found: Floats = (u * u + v * v)[:, None] * self.functions.features(channels, particulars)
+        found: Floats = (u * u + v * v)[:, None] * self.kernel.features(channels, particulars)
         return found
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
-        return _vessel(self.ship.vessel, self.functions.size, self.shaft, self.state_names, lag)
+        return _vessel(self.ship.vessel, self.kernel.size, self.shaft, self.state_names, lag)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
-        kernel = self.functions
+        kernel = self.kernel
         weights = self.acceleration_matrix(particulars, shaft_speed) @ np.array(list(coefficients.values()))
         table = np.zeros((kernel.size, ROW))
         rows = table[: len(kernel.centres)]
@@ -161,7 +156,7 @@ class KernelBox(GreyBox):
     def to_dict(self) -> dict[str, Any]:
         """Reference ship and kernel, as they stand in a model file."""
         table = {k: v for k, v in super().to_dict().items() if k != "equations"}
-        return {**table, "kernel": self.functions.to_dict()}
+        return {**table, "kernel": self.kernel.to_dict()}
 
 
 def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
@@ -169,12 +164,6 @@ def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
     terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(kernel.basis.shape[1]))
     table = dict.fromkeys("uvr", terms)
     return KernelBox(box.name, SOURCE, table, "prime", "acceleration", box.reference, box.shaft, kernel)
-
-
-SOURCE = (
-    "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines, "
-    "chapter 6; Mei, Sun & Shi 2019"
-)
 
 
 class KernelCoefficients(NamedTuple):
@@ -231,16 +220,6 @@ def kernel_accelerations(
     return udot, vdot, rdot, 0.0, 0.0
 
 
-def point_of(motion: Motion, c: Any, ship: Ship) -> Point:
-    """`coordinates` of a grey box."""
-    return coordinates(motion, c.terms, ship)
-
-
-def row_sums(at: Point, sums: Sums, c: Any, number: int) -> Sums:
-    """`add_centre` of a grey box."""
-    return add_centre(at, sums, c.terms, number)
-
-
 @cache
 def _vessel(reference: Vessel, size: int, shaft: bool, state_names: tuple[str, ...], lag: bool) -> Vessel:
     fields = [(name, float) for name in KernelCoefficients._fields[:-1]]
@@ -249,8 +228,8 @@ def _vessel(reference: Vessel, size: int, shaft: bool, state_names: tuple[str, .
     summed = {
         "sail_lanes": Part(stages.sail_lanes, inline=False),
         "term_accelerations": Part(no_accelerations),
-        "point_of": Part(point_of),
-        "row_sums": Part(row_sums),
+        "point_of": Part(coordinates),
+        "row_sums": Part(add_centre),
         "sum_accelerations": Part(sum_accelerations),
         "N_ROWS": size,
     }
