@@ -8,7 +8,7 @@ regression solved in the primal, in the leading principal components of the data
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -34,13 +34,7 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
-OWN = (
-    "kernel",
-    "centres",
-    "kernel_length",
-    "C",
-    "folds",
-)  # options that are the kernel's, not the reference's
+OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
 METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", "map")
 CENTRES = 64
@@ -62,8 +56,8 @@ class KernelFit:
 
     model: ShipModel
     samples: Samples
-    estimators: Estimators
-    report: dict[str, Any]  # for the provenance
+    estimators: Estimators = field(default_factory=dict)  # none where it is not fitted yet
+    report: dict[str, Any] = field(default_factory=dict)  # for the provenance
 
 
 def reference_options(options: Options) -> Options:
@@ -140,8 +134,8 @@ def fit_kernel(
     kernel = kernels[length]
     report = {
         "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
-        "length": length, "C": weight,
-        "heading_errors_held_out": errors, "remarks": remarks,
+        "length": length, "C": weight, "remarks": remarks,
+        "heading_errors_held_out": {k: e if np.isfinite(e) else None for k, e in errors.items()},
     }  # fmt: skip
     return replace(search.fitted(stages[length], weight), report=report)
 
@@ -156,7 +150,7 @@ def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
     channels = [smoothed_channels(trial, ("u", "v", "r", "delta"), method) for trial in search.trials]
     x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
     offset, scale, centres = chosen_centres(x, number)
-    lengths = LENGTHS
+    lengths: tuple[float, ...] = LENGTHS
     if options.kernel_length is not None:
         lengths = (check_number(options.kernel_length, "kernel_length", above=0.0),)
     return {
@@ -200,22 +194,16 @@ def _thinned(x: Floats) -> Floats:
 
 
 @dataclass(frozen=True, eq=False)
-class _Stage:
-    """The regression with one kernel."""
-
-    blank: ShipModel
-    samples: Samples
-
-
 class _Search:
     """Fits with different kernels and weights of the errors, and what they predict."""
 
-    def __init__(
-        self, blank: ShipModel, trials: Sequence[Trial], box: GreyBox, sampling: Mapping[str, Any], folds: Any
-    ) -> None:
-        self.blank, self.trials, self.box, self.sampling, self.folds = blank, trials, box, sampling, folds
+    blank: ShipModel
+    trials: Sequence[Trial]
+    box: GreyBox
+    sampling: Mapping[str, Any]
+    folds: Any
 
-    def stage(self, kernel: Kernel) -> _Stage:
+    def stage(self, kernel: Kernel) -> KernelFit:
         """The regression, and the model but for its coefficients."""
         table = kernel_box(self.box, kernel)
         blank = replace(
@@ -225,14 +213,14 @@ class _Search:
         samples = structure_samples(
             self.trials, table, blank.particulars, shaft_speed=blank.service_shaft_speed, **self.sampling
         )
-        return _Stage(blank, samples)
+        return KernelFit(blank, samples)
 
     def unit(self, samples: Samples) -> float:
         """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""
         ship = self.blank.particulars
         return float(1.0 / (ship["length"] * np.mean(samples.duration) * ship["speed"] ** 3))
 
-    def error(self, stage: _Stage, weight: float) -> float:
+    def error(self, stage: KernelFit, weight: float) -> float:
         """Mean error of the simulated headings of what is held out; 0: of the reference ship."""
         samples, C, errors = stage.samples, weight * self.unit(stage.samples), []
         for rows, held in held_out_rows(self.trials, samples, self.folds):
@@ -242,15 +230,15 @@ class _Search:
                 found[q] = np.asarray(
                     np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
                 )
-            errors.append(heading_error(with_accelerations(stage.blank, found), held, "rmse"))
+            errors.append(heading_error(with_accelerations(stage.model, found), held, "rmse"))
         return float(np.mean(errors))
 
-    def fitted(self, stage: _Stage, weight: float) -> KernelFit:
+    def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""
         samples, C = stage.samples, weight * self.unit(stage.samples)
         estimators: Estimators = {
             q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
             for q, X in samples.features.items()
         }
-        model = with_accelerations(stage.blank, {q: one.coef_ for q, one in estimators.items()})
-        return KernelFit(model, samples, estimators, {})
+        model = with_accelerations(stage.model, {q: one.coef_ for q, one in estimators.items()})
+        return KernelFit(model, samples, estimators)

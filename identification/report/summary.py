@@ -43,9 +43,8 @@ def summary_table(fit: Fit) -> str:
 
 def _kernel(report: dict[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
-    held_out = (
-        f"{name} {degrees(error):.2g} deg" for name, error in report["heading_errors_held_out"].items()
-    )
+    errors = report["heading_errors_held_out"].items()
+    held_out = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
     return (
         f"Kernel: {report['centres']} radial basis functions of length {report['length']:g} in "
         f"{report['features']} features an equation, C {report['C']:g}; heading held out, rms: "
