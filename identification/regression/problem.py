@@ -27,7 +27,9 @@ from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 #: Stands for the MMG form where channels, excitation and particulars are checked.
-MMG_CHANNELS = Structure(MMG, "stand-in", dict.fromkeys("uvr", (Term("mmg", (("n", 1),)),)), "service")
+MMG_CHANNELS = Structure(
+    MMG, "stand-in", dict.fromkeys("uvr", (Term("mmg", (("delta", 1), ("n", 1))),)), "service"
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -70,7 +70,7 @@ def checked_mmg(options: Options) -> Options:
             f"method: {method!r} found with structure 'mmg', which is not linear in its coefficients: it is "
             "fitted by simulation error with a prior; leave the method out, or choose another structure"
         )
-    others = [name for name in options.settings() if getattr(options, name) is not None]
+    others = [*options.settings(), *(["uncertainty"] if options.uncertainty != Options.uncertainty else [])]
     if others:
         raise InputError(
             f"settings: {', '.join(others)} found, which structure 'mmg' does not know; leave them out, or "
@@ -134,7 +134,7 @@ def maximum_a_posteriori(
         **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
         "prior_strength": chosen,
         "errors_held_out": {f"{value:g}": error for value, error in errors.items()},
-        "covariance_factor": factors[chosen],
+        "model_error": {"factor": factors[chosen], "how": "simulated segments of trials left out in turn"},
         "segments": len(problem.segments),
         "evaluations": evaluations,
         "residual_rms": dict(zip(problem.channels, best.scales.tolist(), strict=True)),
@@ -142,7 +142,9 @@ def maximum_a_posteriori(
     }
     covariance = np.zeros((len(prior.mean),) * 2)
     inner = slice(len(IDENTIFIED))
-    covariance[inner, inner] = factors[chosen] * best.covariance * np.outer(prior.deviation, prior.deviation)
+    covariance[inner, inner] = (
+        factors[chosen] ** 2 * best.covariance * np.outer(prior.deviation, prior.deviation)
+    )
     return Posterior(replace(problem.model(best.z), covariance=covariance), report)
 
 
@@ -157,7 +159,7 @@ class _Problem:
         self.channels = compared_channels(blank, trials)
         self.columns = [blank.state_names.index(name) for name in self.channels]
         ship = blank.particulars
-        self.travel = ship["length"] / ship["speed"]
+        self.travel = ship.length / ship.require("speed")
         units = {"u": ship["speed"], "v": ship["speed"], "r": 1.0 / self.travel, "psi": 1.0}
         self.floors = np.array([FLOORS[name] * units[name] for name in self.channels])
         self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL)
@@ -207,15 +209,16 @@ class _Problem:
         shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
             rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
-        return np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
+        found: Floats = np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
+        return found
 
     def _weight(self, segment: Segment) -> float:
         return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.travel)
 
     def solve(self, start: Floats, strength: float) -> Estimate:
-        """Fit all segments, the scales of the residuals renewed between rounds."""
+        """Fit all segments, the scales of the residuals renewed between rounds, fewer from an earlier fit."""
         everything, z, evaluations = np.arange(len(self.segments)), start, 0
-        for last in (False, False, True):
+        for last in (False, False, True) if not start.any() else (False, True):
             scales = self.scales(self.at(z, everything)[0], everything)
             shots = _Shots(self, everything, scales, strength)
             tolerance = 1e-4 if last else 1e-2
@@ -223,10 +226,10 @@ class _Problem:
                 shots.residuals, z, shots.jacobian, method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30
             )
             z, evaluations = found.x, evaluations + found.nfev
-        return Estimate(z, scales, strength, _inverse(shots.jacobian(z)), evaluations)
+        return Estimate(z, scales, strength, _covariance(shots.at(z)[1]), evaluations)
 
     def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
-        """Error of each group of segments by a fit of the others, and the factor on the covariance.
+        """Error of each group of segments by a fit of the others, and the factor on the standard errors.
 
         The fit of the others takes Gauss-Newton steps from that of all. The error is in the scales given; the
         factor makes the errors held out, by those that the covariance of the others' fit and the scatter of
@@ -239,21 +242,22 @@ class _Problem:
             for _ in range(STEPS_HELD_OUT):
                 shots = _Shots(self, rest, whole.scales, whole.strength)
                 jacobian = shots.jacobian(z)
-                covariance = _inverse(jacobian)
-                z = z - covariance @ (jacobian.T @ shots.residuals(z))
+                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ shots.residuals(z))
+            covariance = _covariance(jacobian[: -len(z)])
             tested = _Shots(self, held, whole.scales, 0.0)
             error, slopes = tested.at(z)
             weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
             errors.append(np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2) / weight)
             excess += float(error @ error) - weight
             expected += float(np.sum((slopes @ covariance) * slopes))
-        return float(np.sqrt(np.mean(errors))), max(excess / max(expected, 1e-12), 1.0)
+        return float(np.sqrt(np.mean(errors))), float(np.sqrt(max(excess / expected, 1.0)))
 
 
-def _inverse(jacobian: Floats) -> Floats:
-    """Gauss-Newton covariance."""
-    inverse: Floats = np.linalg.inv(jacobian.T @ jacobian)
-    return inverse
+def _covariance(slopes: Floats) -> Floats:
+    """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
+    symmetric: Floats = 0.5 * (inverse + inverse.T)
+    return symmetric
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,8 @@ Floats = NDArray[np.float64]
 
 YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)
-LEAST_SIMILARITY = 0.5  # correlation of main dimensions below which a reference ship is like no ship at hand
+LEAST_SIMILARITY = 0.5  # correlation of main dimensions below which a reference ship is unlike a ship
+UNLIKE = "reference ship {!r} is not like this one: similarity {:.2f}; compare with prior = 'yoshimura'"
 #: Main dimensions of the ships behind the formulas.
 RANGES = {"block coefficient": (0.50, 0.86), "L/B": (3.5, 7.5), "B/T": (2.0, 4.5)}
 SPAN, DIAMETER, PITCH = 0.76, 0.6, 0.8  # of rudder and propeller by draught, pitch by diameter: usual ones
@@ -91,13 +92,23 @@ def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
         )
     else:
         model, similarity = _reference(source, ship)
-        prior = MMGPrior(model.name, ship, reference_coefficients(model), _deviations(0), (), similarity)
+        mean, like = reference_coefficients(model), similarity.get(model.name, 1.0)
+        remarks = () if like >= LEAST_SIMILARITY else (UNLIKE.format(model.name, like),)
+        prior = MMGPrior(model.name, ship, mean, _deviations(0), remarks, similarity)
+    prior.mean.update(_given_added_mass(particulars))
     prior.mean["nD_U0"] = _self_propulsion(prior.mean, ship)
     return prior
 
 
 def _deviations(which: int) -> Floats:
     return np.array([(DEVIATIONS[name] * 2)[which] for name in IDENTIFIED])
+
+
+def _given_added_mass(p: Particulars) -> dict[str, float]:
+    """What the particulars give of it and did not estimate, by rho L^2 d / 2."""
+    names = {"mx": "X_udot", "my": "Y_vdot", "Jz": "N_rdot"}
+    given = {name: p[d] for name, d in names.items() if p[d] is not None and d not in p.estimated}
+    return {name: -value * p.length / p.require("draught") for name, value in given.items()}
 
 
 def completed(particulars: Particulars) -> Particulars:
@@ -121,10 +132,14 @@ def completed(particulars: Particulars) -> Particulars:
 
 
 def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, dict[str, float]]:
-    """The reference ship and its similarity; refused where it has other equations or is unlike the ship."""
+    """The reference ship and the similarity of the candidates; refused where it has other equations.
+
+    So is the best of the candidates where none is like the ship.
+    """
     of_form = [name for name, make in REFERENCE_SHIPS.items() if make().structure in ("kvlcc2", MMG)]
-    if source == AUTO:
-        source, found = select_reference(ship, candidates=of_form)
+    asked = source
+    if asked == AUTO:
+        source, _ = select_reference(ship, candidates=of_form)
     model = source if isinstance(source, ShipModel) else load_model(source)
     if model.structure not in ("kvlcc2", MMG):
         raise InputError(
@@ -141,11 +156,12 @@ def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, d
         found = correlations(similarity_vector(ship), vectors)
     except InputError:  # too little is known to compare
         return model, {}
-    if found[model.name] < LEAST_SIMILARITY:
+    if asked == AUTO and found[model.name] < LEAST_SIMILARITY:
         raise InputError(
-            f"reference_model: {model.name!r} found, which is not like this ship: similarity "
-            f"{found[model.name]:.2f}, expected at least {LEAST_SIMILARITY:g}; give prior = 'yoshimura' for "
-            "formulas of the main dimensions, or a model of a ship more like this one"
+            f"reference_model: 'auto' found, but none is like this ship; the best is {model.name!r} with a "
+            f"similarity of {found[model.name]:.2f}, expected at least {LEAST_SIMILARITY:g}; give prior = "
+            "'yoshimura' for formulas of the main dimensions, or name the ship all the same: "
+            f"reference_model = {model.name!r}"
         )
     return model, found
 

@@ -70,26 +70,20 @@ def _leg(
     begin, duration = time
     dt = STEP * model.particulars["length"] / model.particulars["speed"]
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
-    sailed = _sailed(model, trial, state, order, begin + dt * np.arange(count), dt)
-    psi = sailed[:, model.state_names.index("psi")]
+    t = begin + dt * np.arange(count + 1)
+    commands = np.tile(model.service_command, (count, 1))
+    commands[:, 0] = order
+    if "n" in model.command_names and "n" in trial.channels:
+        commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
+    run = model.simulate(commands, dt, state)
+    sailed = np.stack([run[name] for name in model.state_names], axis=-1)
     if target is None:
-        return begin + dt * np.arange(1, count + 1), sailed[1:]
+        return t[1:], sailed[1:]
+    psi = run["psi"]
     beyond = np.flatnonzero((psi - target) * np.sign(target - psi[0]) >= 0.0)
     if not len(beyond) or beyond[0] == 0:
         return np.empty(0), sailed[:0]
-    k = int(beyond[0]) - 1
-    part = 0.5 * dt * float((target - psi[k]) / (psi[k + 1] - psi[k]))
-    last = _sailed(model, trial, sailed[k], order, np.full(2, begin + k * dt), part)[-1:]
-    return begin + dt * np.append(np.arange(1, k + 1), k + 2.0 * part / dt), np.vstack(
-        [sailed[1 : k + 1], last]
-    )
-
-
-def _sailed(model: ShipModel, trial: Trial, state: Floats, order: float, t: Floats, dt: float) -> Floats:
-    """States with an order held, from each of some times over a step, the shaft as measured."""
-    commands = np.tile(model.service_command, (len(t), 1))
-    commands[:, 0] = order
-    if "n" in model.command_names and "n" in trial.channels:
-        commands[:, 1] = np.interp(t, trial.t, trial["n"])
-    run = model.simulate(commands, max(dt, 1e-6), state)
-    return np.stack([run[name] for name in model.state_names], axis=-1)
+    k = int(beyond[0])  # the state between two steps is straight enough: a step is a fiftieth of a length
+    part = float((target - psi[k - 1]) / (psi[k] - psi[k - 1]))
+    t[k], sailed[k] = t[k - 1] + part * dt, (1.0 - part) * sailed[k - 1] + part * sailed[k]
+    return t[1 : k + 1], sailed[1 : k + 1]

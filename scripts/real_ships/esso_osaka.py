@@ -29,6 +29,7 @@ METHODS: dict[str, dict[str, Any]] = {
     "tls-svm, grey box of the tanker, repaired": {
         "structure": "grey-box", "method": "tls-svm", "reference_model": REFERENCE, "repair": True,
     },
+    "mmg, prior of formulas, repaired": {"structure": "mmg", "repair": True},
 }  # fmt: skip
 BARE = f"{REFERENCE}, nothing fitted"
 BEST = "tls-svm, cubic, repaired"

@@ -233,8 +233,8 @@ deg):
 
 {circles}
 
-A fit, its strength chosen and every trial predicted, takes about {seconds:.0f} s of processor time with a warm
-cache.
+A fit, its strength chosen and every trial predicted, takes about {seconds:.0f} s of processor time with a
+warm cache.
 
 **Limits.** {limits}
 

@@ -88,9 +88,9 @@ class Engine:
             sensors = Sensors(task.sensors)
         own = self.pool if drawn else [(model, task.seas[0]) for model in fleet]
         self._voyages = voyages(self.model.vessel, task.definition, sensors, self.windy, len(own) == 1)
-        self._run = self._voyages.run
         self._threads = Threads(-(-num_envs // LANES), threads)
         self._allocate(own, drawn)
+        self._run = self._voyages.run  # compiled last, when nothing is left that may be refused
         self.reset(np.arange(num_envs))
 
     def _allocate(self, own: Any, drawn: bool) -> None:

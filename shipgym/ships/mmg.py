@@ -23,7 +23,7 @@ from shipgym.ships.equations import ShipEquations
 from shipgym.ships.particulars import Particulars
 
 MMG = "mmg"
-SLOWEST = 1e-6  # m/s; a ship at rest has no drift angle
+SLOWEST = 0.02  # of service speed, below which v' and r' lose their meaning
 LEAST_SPEED, MOST_SPEED = 0.01, 4.0  # over service speed, for which the power law of the damping holds
 
 
@@ -112,7 +112,7 @@ def power_law(x: float, power: float) -> float:
 def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
     u, v, r, L = motion.u, motion.v, motion.r, ship.length
-    U = max(sqrt(u * u + v * v), SLOWEST)
+    U = max(sqrt(u * u + v * v), SLOWEST * ship.speed)
     drift = arctan2(-v, u)
     per_U = 1.0 / U
     v_, r_ = v * per_U, r * L * per_U

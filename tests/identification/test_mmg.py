@@ -14,9 +14,12 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
+from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import kvlcc2, mmg
+from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.scaling import scale_model
 
 L7 = mmg.SHIP.particulars
@@ -121,7 +124,10 @@ def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> N
 
 def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
-    prior = mmg_prior("yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None))
+    estimated = frozenset(ADDED_MASSES)
+    prior = mmg_prior(
+        "yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None, estimated=estimated)
+    )
     mean, own = prior.mean, ship_of({}).coefficients
     assert [round(mean[name], 3) for name in ("my", "Jz")] == [own["my"], own["Jz"]]
     assert mean["mx"] == pytest.approx(own["mx"], abs=0.002)
@@ -137,6 +143,10 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     assert mean["f_alpha"] == pytest.approx(2.747, abs=0.5)
     assert prior.ship.estimated >= {"rudder_area", "rudder_aspect_ratio"}
     assert not prior.remarks
+    heavy = mmg_prior(
+        "yoshimura", replace(L7, Y_vdot=-0.02, estimated=estimated - {"Y_vdot"})
+    ).mean  # given, not estimated
+    assert (heavy["my"], heavy["mx"]) == pytest.approx((0.02 * 7.0 / 0.46, mean["mx"]))
     kijima = formula_coefficients("kijima", prior.ship)
     assert kijima["N_vrr"] == pytest.approx(0.097, abs=0.003)  # -(0.5 d Cb / B - 0.05) for beta
     assert kijima["X_vv"] == mean["X_vv"]
@@ -155,11 +165,13 @@ def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refu
         "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to" in r for r in remarks
     )
     assert any(r.startswith("L/B 10 is outside") for r in remarks)
-    for reference in ("auto", "kvlcc2"):
-        with pytest.raises(
-            InputError, match=r"is not like this ship: similarity -?[01]\.\d\d, expected at least 0.5"
-        ):
-            mmg_prior(reference, slim)
+    with pytest.raises(
+        InputError, match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -"
+    ):
+        mmg_prior("auto", slim)
+    named = mmg_prior("kvlcc2", slim)
+    assert named.source == "kvlcc2"
+    assert named.remarks[0].startswith("reference ship 'kvlcc2' is not like this one: similarity -")
     with pytest.raises(InputError, match="'tanker' found, which is not written in the MMG form"):
         mmg_prior("tanker", L7)
     assert mmg_prior("auto", L7).source == "kvlcc2-l7"
@@ -213,6 +225,25 @@ def test_coefficients_are_recovered_within_their_errors(
     assert set(provenance["errors_held_out"]) == {"1", "2", "3"}
 
 
+def test_models_drawn_hold_the_turn_that_no_trial_shows(
+    fitted: tuple[ShipModel, IdentificationResult],
+) -> None:
+    ship, found = fitted
+    truth, *drawn = (turn_lengths(model) for model in (ship, *found.model.sample(40, 0)))
+    low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
+    assert np.all((low < truth) & (truth < high))
+    assert np.all((high - low) / truth < 0.25)  # and say something
+
+
+def turn_lengths(model: ShipModel) -> tuple[float, float]:
+    """Advance and tactical diameter of a 35 deg turn, ship lengths."""
+    travel = model.particulars.length / model.particulars["speed"]
+    found = turning_indices(turning_circle(model, 35.0, duration=20 * travel, dt=0.05 * travel), 7.0)
+    assert found.advance_lengths is not None
+    assert found.tactical_diameter_lengths is not None
+    return found.advance_lengths, found.tactical_diameter_lengths
+
+
 def test_its_result_is_saved_and_loaded_like_any_other(
     fitted: tuple[ShipModel, IdentificationResult], tmp_path: Path
 ) -> None:
@@ -222,16 +253,22 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     again = shipgym.load_model(tmp_path / "model.json")
     state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
     np.testing.assert_array_equal(again.derivatives(state, command), found.model.derivatives(state, command))
+    np.testing.assert_array_equal(again.covariance, found.model.covariance)
     drawn = again.sample(2, 0)
     assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
     assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
     assert "outside the range" not in (tmp_path / "report.html").read_text()
+    remarked = replace(
+        found.model, provenance=(found.model.provenance or {}) | {"prior_remarks": ["L/B 10 is"]}
+    )
+    assert "L/B 10 is" in model_warnings(replace(found, model=remarked))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
         ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
+        ({"uncertainty": "bootstrap"}, r"settings: uncertainty found, which structure 'mmg' does not know"),
         ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
         (
             {"prior": "kijima", "reference_model": "auto"},
@@ -248,8 +285,11 @@ def test_options_it_does_not_have(options: dict[str, Any], message: str) -> None
         identify([trial], "mmg", particulars=L7, steering=mmg.SHIP.steering, **options)
 
 
-def test_a_trial_without_shaft_speed_is_refused() -> None:
+def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None:
     trial = sailed(ship_of({}), 20.0, 9.0, 0)
+    idle = Trial(trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle")
+    with pytest.raises(InputError, match=r"'idle': the rudder stays at 0\.00 deg throughout"):
+        identify([idle], "mmg", particulars=L7)
     without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
     with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
         identify([without], "mmg", particulars=L7)

@@ -11,7 +11,8 @@ from real_ships.captive import FORCES, combined, held_out, least_squares, read, 
 from real_ships.esso_osaka import LEAST_SPEED, under_way
 from real_ships.hsva import RUNS, SHIP, TRIPLES
 from real_ships.marin import MEASURED, full_scale
-from real_ships.measures import turns, zigzag_errors
+from real_ships.measures import mean_errors, turns, zigzag_errors
+from real_ships.mmg import CIRCLES, OTHERS, circle, fitted
 from real_ships.section import Section, marks, number, put, table
 
 from shipgym import InputError, ShipModel
@@ -88,6 +89,17 @@ def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> No
     assert small is not None
     assert large is not None
     assert large.advance_lengths == pytest.approx(small.advance_lengths, rel=0.02)
+
+
+@measured
+def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(data: Data) -> None:
+    """Aims of 0.095 deg/s, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
+    hsva = data.ship(SHIP, 4)
+    model = fitted(hsva, reference_model="kvlcc2-l7")
+    assert mean_errors(zigzag_errors(model, hsva.runs[name]) for name in OTHERS)[0] < 0.095
+    _, diameter, drift, _ = circle(full_scale(model, data.ship("kvlcc2_marin", 10)), 1.0)
+    assert diameter == pytest.approx(CIRCLES[0][1], rel=0.04)
+    assert drift == pytest.approx(CIRCLES[0][2], abs=1.5)
 
 
 @measured

@@ -66,19 +66,29 @@ def recorded(run: Trial, name: str, every: int = 5, use: str = "fit") -> Trial:
     return Trial(run.t[::every], channels, name=name, kind=run.kind, use=use)
 
 
-def zigzags(ship: ShipModel, limit_deg: float = 35.0, use: str = "fit") -> list[Trial]:
+def zigzags(ship: ShipModel) -> list[Trial]:
     """To both sides."""
-    plan = [(angle, port_first) for angle, port_first in ((10, False), (20, True), (35, False))]
-    runs = {
-        a: zigzag(ship, a, a, p, duration=600, dt=0.1, must_reverse=False) for a, p in plan if a <= limit_deg
-    }
-    return [recorded(run, f"zigzag_{angle}", use=use) for angle, run in runs.items()]
+    plan = ((10, False), (20, True), (35, False))
+    runs = {a: zigzag(ship, a, a, p, duration=600, dt=0.1, must_reverse=False) for a, p in plan}
+    return [recorded(run, f"zigzag_{angle}") for angle, run in runs.items()]
+
+
+def weaves(ship: ShipModel) -> list[Trial]:
+    """The rudder to both sides in turn, twenty seconds on each: no loop of its own to compile."""
+    sides = np.repeat([1.0, -1.0] * 15, 200)
+    runs = {}
+    for angle, first in ((10, 1.0), (20, -1.0), (35, 1.0)):
+        orders = np.full((len(sides), len(ship.command_names)), N0)
+        orders[:, 0] = first * np.radians(angle) * sides
+        runs[angle] = ship.simulate(orders, 0.1)
+    return [recorded(run, f"weave_{angle}") for angle, run in runs.items()]
 
 
 @pytest.mark.parametrize("name", STEERED)
 def test_a_ship_of_each_structure_is_recovered(name: str) -> None:
     ship = ship_of(name, own(name))
-    fit = identify(zigzags(ship), name, particulars=PARTICULARS)
+    # zhu-9 is nearly neutral on her course, and only rudder that follows her heading keeps her in range
+    fit = identify(zigzags(ship) if name == "zhu-9" else weaves(ship), name, particulars=PARTICULARS)
     assert fit.stable
     for coefficient, value in ship.coefficients.items():
         assert fit.coefficients[coefficient] == pytest.approx(value, rel=5e-4), coefficient
@@ -194,7 +204,7 @@ def test_song_s_regressors_predict_the_rolling_container_ship() -> None:
     assert any("heel" in problem for problem in shipgym.check_ship_model(capsizing).problems)
 
 
-@pytest.mark.parametrize("name", ["nomoto", "nomoto2", "cubic"])
+@pytest.mark.parametrize("name", ["nomoto2", "cubic"])
 def test_an_autopilot_can_be_trained_in_the_identified_model(name: str) -> None:
     ship = ship_of(name, own(name))
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=ship)
@@ -210,14 +220,14 @@ def test_a_registered_table_is_identified_by_its_name(monkeypatch: pytest.Monkey
     monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
     shipgym.register_structure("drag", {"u": "du, r^2", "r": "r, |r| r, delta"}, source="a user's own")
     ship = ship_of("drag", {"a_du": -0.01, "a_r2": -300.0, "c_r": -0.03, "c_|r|r": -3.0, "c_d": 2e-3})
-    fit = identify(zigzags(ship), "drag", particulars=PARTICULARS)
+    fit = identify(weaves(ship), "drag", particulars=PARTICULARS)
     for coefficient, value in ship.coefficients.items():
         assert fit.coefficients[coefficient] == pytest.approx(value, rel=1e-4), coefficient
 
 
 def test_a_missing_shaft_speed_is_named() -> None:
-    still = zigzags(ship_of("nomoto", own("nomoto")), 10.0)[0]
-    with pytest.raises(InputError, match=r"zigzag_10.*channel 'n' is missing, structure 'cubic' needs"):
+    still = weaves(ship_of("nomoto", own("nomoto")))[0]
+    with pytest.raises(InputError, match=r"weave_10.*channel 'n' is missing, structure 'cubic' needs"):
         identify([still], "cubic", particulars=PARTICULARS)
     stopped = Trial(still.t, {**still.channels, "n": np.zeros(len(still.t))}, name="stopped")
     with pytest.raises(InputError, match=r"stopped.*shaft speed of 0 1/s.*give service_shaft_speed"):

@@ -25,7 +25,10 @@ BY_KEYWORD = [
     (COURSE, {"model": "mariner", "sea": "rough", "noise": 1.0, "measurement": "filtered"}),
     (COURSE, {"model": "mariner", "course_changes_deg": [10.0, -5.0], "change_interval_steps": 20}),
     (COURSE, {"model": "mariner", "speed_range": (0.5, 1.0), "loading_range": (0.8, 1.2)}),
-    (PATH, {"model": "mariner", "waypoints": [[0.0, 0.0], [2000.0, 500.0]], "sea": ["calm", SEA]}),
+    (
+        PATH,
+        {"model": "mariner", "waypoints": [[0.0, 0.0], [2000.0, 500.0]], "sea": ["calm", SEA], "noise": 1.0},
+    ),
     (PATH, {"model": "kvlcc2", "action": "rudder-shaft", "noise": 0.5}),
 ]
 EVERY = [*((name, {}) for name in IDS), *BY_KEYWORD]
@@ -75,10 +78,9 @@ def test_episodes_are_replayed_exactly_from_their_seed(name, options):
 
 @pytest.mark.parametrize("context", ["spawn", "forkserver", "fork"])
 def test_workers_of_gymnasium(context):
-    env = gymnasium.make_vec(
-        f"shipgym:{PATH}", 1, "async", vector_kwargs={"context": context}, model="mariner", sea="moderate"
-    )
-    ours = gymnasium.make(PATH, model="mariner", sea="moderate")
+    options = {"model": "mariner", "sea": ["calm", "moderate"], "noise": 1.0}
+    env = gymnasium.make_vec(f"shipgym:{PATH}", 1, "async", vector_kwargs={"context": context}, **options)
+    ours = gymnasium.make(PATH, **options)
     np.testing.assert_array_equal(env.reset(seed=4)[0][0], ours.reset(seed=4)[0])
     action = np.array([0.3], dtype=np.float32)
     np.testing.assert_array_equal(env.step(action[None])[0][0], ours.step(action)[0])

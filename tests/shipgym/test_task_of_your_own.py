@@ -129,7 +129,7 @@ def test_a_reward_of_ones_own_is_paid_for_the_same_voyage(tmp_path):
 
 def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
     path = written(tmp_path, "my_sensors.py", SENSORS)
-    assert check_task("PathFollowing", sensors=path, sea="rough").problems == ()
+    assert check_task("CourseKeeping", sensors=path).problems == ()
     plain = gymnasium.make(COURSE, model="mariner").unwrapped
     env = gymnasium.make(COURSE, model="mariner", sensors=str(path), compass_error=0.2).unwrapped
     for one in (plain, env):
@@ -187,9 +187,9 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
     found = check_task(path, **SHIP)
     assert len(found.problems) == 1
     assert re.search(message, found.problems[0])
-    with pytest.raises(InputError, match=message):
-        gymnasium.make(COURSE, task=str(path), **SHIP)
     if "in " not in message:  # what compiling would find is found when an environment is made
+        with pytest.raises(InputError, match=message):
+            gymnasium.make(COURSE, task=str(path), **SHIP)
         with pytest.raises(InputError, match=message):
             register_task("harbour/Wrong-v0", path, **SHIP)
         assert "harbour/Wrong-v0" not in gymnasium.registry

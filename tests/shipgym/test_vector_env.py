@@ -42,7 +42,7 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
     ("name", "options"),
     [
         (COURSE, {"sea": "rough", "noise": 1.0, "measurement": "filtered"}),
-        (PATH, {"sea": ["calm", "moderate"], "noise": 2.0, "model": "mariner-tls-svm"}),
+        (PATH, {"sea": ["calm", "moderate"], "noise": 2.0}),
         (PATH, {"model": "mariner-tls-svm", "model_uncertainty": "posterior", "speed_range": (0.7, 1.0)}),
         (COURSE, {"action": "rudder-discrete"}),
         (PATH, {"model": "kvlcc2", "action": "rudder-shaft"}),
