@@ -7,7 +7,7 @@ kernel ship of its own, a black box.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -120,7 +120,7 @@ class KernelBox(GreyBox):
         For no kernel, and as `GreyBox`.
     """
 
-    kernel: Kernel = None  # type: ignore[assignment]
+    kernel: Kernel = field(default=None, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         if not isinstance(self.kernel, Kernel):
