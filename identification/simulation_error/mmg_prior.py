@@ -33,7 +33,8 @@ YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)
 LEAST_SIMILARITY = 0.5  # correlation of main dimensions below which a reference ship is unlike a ship
 UNLIKE = "reference ship {!r} is not like this one: similarity {:.2f}; compare with prior = 'yoshimura'"
-#: Main dimensions of the ships behind the formulas.
+#: Main dimensions of the kinds of ships that the formulas were made for; read with caution, the databases
+#: behind them are not published whole.
 RANGES = {"block coefficient": (0.50, 0.86), "L/B": (3.5, 7.5), "B/T": (2.0, 4.5)}
 SPAN, DIAMETER, PITCH = 0.76, 0.6, 0.8  # of rudder and propeller by draught, pitch by diameter: usual ones
 VISCOSITY = 1.19e-6  # m^2/s, sea water at 15 deg
@@ -202,6 +203,7 @@ def _yoshimura(ship: Particulars, mx: float, my: float) -> dict[str, float]:
     """The hull by Yoshimura & Masumoto 2012, written there for the drift angle beta = -v'."""
     L, B, d, Cb = _proportions(ship)
     slender, k, fine = Cb * B / L, 2.0 * d / L, (1.0 - Cb) * L / B
+    # others cite N_vrr with the opposite sign of its constant; this one is near KVLCC2's and Kijima's
     return {
         "X_vv": 1.15 * slender - 0.18, "X_vr": -(my - 1.91 * slender + 0.08),
         "X_rr": -0.085 * slender + 0.008 - ship.xg_prime * my, "X_vvvv": -6.68 * slender + 1.1,

@@ -214,9 +214,11 @@ helm hardly touches.
 
 {zigzags}
 
-Nothing of the recipe was chosen by these runs: the strength of the prior is the strongest of 1, 2, 3 whose
-error, each of the three fitted runs predicted from the two others, is within a tenth of the least; that tenth
-was set before any measured run was looked at. The errors, by the scatter of the residuals:
+The terms beyond the standard form and the prior's standard deviations come from an earlier study that had
+seen all of these runs. The rest of the recipe was not chosen by them: the strength of the prior is the
+strongest of 1, 2, 3 whose error, each of the three fitted runs predicted from the two others, is within a
+tenth of the least; that tenth was set before any measured run was looked at. The errors, by the scatter of
+the residuals:
 
 {chosen}
 
