@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from identification.estimators.estimator import FitTask
+from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
@@ -110,12 +110,8 @@ def _identified_with_kernel(
         ).model
         fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
         blank, box = fitted, fitted_box(fitted)
-    smooth = options.preprocessing or options.smooth
-    sampling = {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
-    found = fit_kernel(blank, problem.used, box, options, sampling)
-    reasons = reasons_unstable(found.model, problem.used)
-    report = {"decision": "runs away", "rejected": reasons} if reasons else {"decision": "stable as fitted"}
-    fit = GuardedFit(found.model, found.estimators, not reasons, report)
+    found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
+    fit = _simulated(found.model, found.estimators, problem.used)
     problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
     covariance = _covariance(fit, found.samples, found.model, None, options.uncertainty)
     provenance = {
@@ -141,18 +137,8 @@ def _identified_mmg(
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
-    sampling = {
-        "samples": options.samples,
-        "gear": steering,
-        "smooth": options.preprocessing or options.smooth,
-    }
-    samples, estimators = explained_samples(problem.used, found.model, window=options.window, **sampling)
-    reasons = reasons_unstable(found.model, problem.used)
-    report = {
-        "decision": "runs away" if reasons else "stable as fitted",
-        **({"rejected": reasons} if reasons else {}),
-    }
-    fit = GuardedFit(found.model, estimators, not reasons, report)
+    samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
+    fit = _simulated(found.model, estimators, problem.used)
     provenance = {
         "structure": MMG,
         "method": MAP,
@@ -165,6 +151,19 @@ def _identified_mmg(
     model = replace(found.model, provenance=provenance)
     call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(model, fit, replace(problem, samples=samples, blank=model), call)
+
+
+def _sampling(options: Options, steering: SteeringGear | None) -> dict[str, Any]:
+    """Arguments of `build_samples`."""
+    smooth = options.preprocessing or options.smooth
+    return {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+
+
+def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
+    """A fit that was not guarded, and whether it runs away."""
+    reasons = reasons_unstable(model, used)
+    report = {"decision": "runs away", "rejected": reasons} if reasons else {"decision": "stable as fitted"}
+    return GuardedFit(model, estimators, not reasons, report)
 
 
 def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
