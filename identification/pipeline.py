@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import shipgym
-from identification.estimators.estimator import FitTask
+from identification.estimators.estimator import Estimator, FitTask
+from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
@@ -29,6 +30,7 @@ from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -79,20 +81,52 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    if asked.kernel is not None:
+        return _identified_with_kernel(trials, asked, particulars, steering)
     if structure == MMG:
         return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
     chosen = get_method(method)
     problem = pose(trials, asked, particulars, steering)
     fit, refined = _fitted(chosen, asked, problem)
-    covariance = _covariance(fit, problem.samples, problem.blank, refined, asked.uncertainty)
     provenance = _provenance(asked, chosen, fit, refined, problem)
-    if asked.model_error:
-        error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
-        covariance = error["factor"] ** 2 * covariance
-        provenance["model_error"] = error
+    covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
     provenance["steering"] = "estimated" if steering is None else "given"
     model = replace(fit.model, covariance=covariance, provenance=provenance)
     return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
+
+
+def _identified_with_kernel(
+    trials: Sequence[Trial],
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
+    steering: SteeringGear | None,
+) -> IdentificationResult:
+    """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
+    beneath = reference_options(options)
+    problem = pose(trials, beneath, particulars, steering)
+    blank, box = problem.blank, problem.table
+    if not isinstance(box, GreyBox):
+        fitted = identify(
+            trials, particulars=particulars, steering=steering, **beneath.own(), **beneath.settings()
+        ).model
+        fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
+        blank, box = fitted, fitted_box(fitted)
+    found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
+    fit = _simulated(found.model, found.estimators, problem.used)
+    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
+    provenance: dict[str, Any] = {
+        "structure": beneath.structure,
+        "method": name_of(options.method),
+        "samples": options.samples,
+        "settings": provenance_settings(options, options.settings()),
+        **_reference(problem),
+        **_origin(fit, found.samples, problem.used),
+        "kernel": found.report,
+        "steering": "estimated" if steering is None else "given",
+    }
+    covariance = _scaled_covariance(options, fit, None, problem, provenance)
+    model = replace(found.model, covariance=covariance, provenance=provenance)
+    return _evaluated(model, fit, problem, whole_call(options, problem.trials, particulars, steering))
 
 
 def _identified_mmg(
@@ -104,18 +138,8 @@ def _identified_mmg(
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
-    sampling = {
-        "samples": options.samples,
-        "gear": steering,
-        "smooth": options.preprocessing or options.smooth,
-    }
-    samples, estimators = explained_samples(problem.used, found.model, window=options.window, **sampling)
-    reasons = reasons_unstable(found.model, problem.used)
-    report = {
-        "decision": "runs away" if reasons else "stable as fitted",
-        **({"rejected": reasons} if reasons else {}),
-    }
-    fit = GuardedFit(found.model, estimators, not reasons, report)
+    samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
+    fit = _simulated(found.model, estimators, problem.used)
     provenance = {
         "structure": MMG,
         "method": MAP,
@@ -128,6 +152,19 @@ def _identified_mmg(
     model = replace(found.model, provenance=provenance)
     call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(model, fit, replace(problem, samples=samples, blank=model), call)
+
+
+def _sampling(options: Options, steering: SteeringGear | None) -> dict[str, Any]:
+    """Arguments of `build_samples`."""
+    smooth = options.preprocessing or options.smooth
+    return {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+
+
+def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
+    """A fit that was not guarded, and whether it runs away."""
+    reasons = reasons_unstable(model, used)
+    report = {"decision": "runs away", "rejected": reasons} if reasons else {"decision": "stable as fitted"}
+    return GuardedFit(model, estimators, not reasons, report)
 
 
 def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
@@ -169,6 +206,19 @@ def _provenance(
 def _memory(ship: Particulars) -> float:
     """Time over which errors are correlated, s."""
     return float(MEMORY * ship["length"] / ship["speed"])
+
+
+def _scaled_covariance(
+    options: Options, fit: GuardedFit, refined: Refined | None, problem: Problem, provenance: dict[str, Any]
+) -> Floats:
+    """Covariance of the coefficients, scaled by the model error, of which the provenance tells."""
+    covariance = _covariance(fit, problem.samples, problem.blank, refined, options.uncertainty)
+    if not options.model_error:
+        return covariance
+    error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
+    provenance["model_error"] = error
+    factor: float = error["factor"]
+    return factor**2 * covariance
 
 
 def _covariance(

@@ -276,6 +276,31 @@ def weather(n_envs: int) -> Row:
     )
 
 
+def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
+    """A black-box ship with radial basis functions, against their sums alone on NumPy arrays."""
+    ship = shipgym.load_model("kvlcc2-l7")
+    trials = [
+        zigzag(ship, angle, angle, duration=100.0, dt=0.2, port_first=port).with_(name=f"{angle} {port}")
+        for angle in (10, 20)
+        for port in (False, True)
+    ]
+    model = identify(
+        trials, kernel="rbf", centres=centres, kernel_length=1.4, C=100.0, particulars=ship.particulars,
+        steering=ship.steering,
+    ).model  # fmt: skip
+    native = native_speed("shipgym/CourseKeeping-v0", n_envs, model=model)
+    states = {name: np.full(n_envs, value) for name, value in zip("uvr", (1.0, 0.1, 0.01), strict=True)}
+    states["delta"] = np.linspace(-0.5, 0.5, n_envs)
+    stage = best_time(lambda: model.table.features("r", states, model.particulars), 50)
+    return Row(
+        f"CourseKeeping, {n_envs} kernel ships of {centres} centres",
+        f"{native / 1e6:.1f} M steps/s",
+        f"their centres alone in NumPy {n_envs / (4.0 * stage) / 1e6:.2f} M steps/s",
+        native * 4.0 * stage / n_envs,
+        "3 M steps/s",
+    )
+
+
 def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
     """Correlated features and noisy targets."""
     random = np.random.default_rng(0)
@@ -401,6 +426,8 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
             for n, aim in ((64, "15 M steps/s"), (1024, "35 M steps/s"), (4096, "40 M steps/s"))
         ),
         *(partial(weather, n) for n in (1024, 4096)),
+        kernel_ship,
+        partial(kernel_ship, centres=100),
         two_threads,
         *(partial(native_against_python, task) for task in TASKS),
         native_against_cart_pole,

@@ -138,6 +138,11 @@ def get_method(method: str | Any) -> Method:
             f"method: {method!r} found, expected one of {quoted(METHODS)}, or an estimator "
             "with scikit-learn's interface: fit(X, y) that sets coef_"
         )
+    if isinstance(method, LSSVM) and method.kernel != "linear":
+        raise InputError(
+            f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; "
+            "write identify(..., kernel='rbf') for a ship with a kernel"
+        )
     together = [fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)]
     fit = together[0] if together else each_equation
     return Method(type(method).__name__, lambda: without_constant(method), regularised=False, fit=fit)

@@ -8,9 +8,8 @@ the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regress
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any, Self
 
 import numpy as np
@@ -25,7 +24,7 @@ from identification.estimators.linear import LinearRegressor, settings
 from identification.regression.coefficients import with_accelerations
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
-from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
+from identification.validation.folds import FOLDS, TRIALS, held_out_rows
 from identification.validation.prediction import predict
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -42,7 +41,6 @@ ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
 FIRST_BAND = 0.1
 MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
 MOST_SWEEPS = 20_000  # of coordinate descent through the samples
-PIECES = 3  # into which a single trial is cut to choose the weight of the errors
 
 
 @settings()
@@ -238,7 +236,7 @@ class _Tuner:
         bands = [FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon] * len(
             self.samples.features
         )
-        folds = list(self._folds())
+        folds = list(held_out_rows(self.trials, self.samples, self.asked.folds))
         errors = np.array([
             np.mean([heading_error(self.model(weight, bands, rows), held, "rmse") for rows, held in folds])
             for weight in WEIGHTS
@@ -246,26 +244,6 @@ class _Tuner:
         if not np.isfinite(errors.min()):
             return NO_CORRECTION
         return float(WEIGHTS[int(np.flatnonzero(errors <= ERROR_TOLERANCE * errors.min())[0])])
-
-    def _folds(self) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
-        """Rows to fit, and the trial or the piece of the only trial that is held out."""
-        if self.asked.folds == LARGEST_RUDDER:
-            largest = of_largest_rudder(self.trials, "folds")
-            rows = ~largest[self.samples.trial]
-            yield from ((rows, trial) for trial, held in zip(self.trials, largest, strict=True) if held)
-            return
-        if len(self.trials) > 1:
-            for index, trial in enumerate(self.trials):
-                yield self.samples.trial != index, trial
-            return
-        (trial,) = self.trials
-        edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
-        start, end = self.samples.start, self.samples.start + self.samples.duration
-        for first, last in pairwise(edges):
-            held = slice(first, last)
-            channels = {name: values[held] for name, values in trial.channels.items()}
-            piece = Trial(trial.t[held], channels, name=trial.name)
-            yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
 
     def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""

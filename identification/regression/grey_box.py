@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,15 +24,20 @@ Floats = NDArray[np.float64]
 LIKE = 0.5  # similarity (a correlation) from which on a reference ship is taken without being named
 
 
-@dataclass(frozen=True)
-class _Widened(GreyBox):
+class _Widened:
     """A grey box whose features have one more column: the reference ship's converted acceleration."""
 
-    def features(
-        self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
-    ) -> Floats:
-        known = self.converted_accelerations(channels, particulars, shaft_speed)[equation]
-        return np.column_stack([super().features(equation, channels, particulars, shaft_speed), known])
+    def __init__(self, box: GreyBox) -> None:
+        self._box = box
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._box, name)
+
+    def features(self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float) -> Floats:
+        """As of the grey box, shape (n_samples, n_terms + 1)."""
+        known = self._box.converted_accelerations(channels, particulars, shaft_speed)[equation]
+        own = self._box.features(equation, channels, particulars, shaft_speed)
+        return np.column_stack([own, known])
 
 
 def chosen_box(
@@ -75,7 +80,7 @@ def structure_samples(
     """
     if not isinstance(structure, GreyBox):
         return build_samples(trials, structure, particulars, **sampling)
-    widened = _Widened(**{field.name: getattr(structure, field.name) for field in fields(structure)})
+    widened: Any = _Widened(structure)
     built = build_samples(trials, widened, particulars, **sampling)
     return replace(
         built,
@@ -92,7 +97,7 @@ def explained_samples(
     For models that were not fitted by regression; `sampling` as in `build_samples`.
     """
     box = grey_box(model, shaft=True)
-    widened = _Widened(**{field.name: getattr(box, field.name) for field in fields(box)})
+    widened: Any = _Widened(box)
     built = build_samples(
         trials, widened, model.particulars, shaft_speed=model.service_shaft_speed, **sampling
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from io import StringIO
 from math import degrees
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
@@ -26,7 +27,11 @@ def summary_table(fit: Fit) -> str:
         f"{fit.model.name}: {provenance.get('structure')} by {provenance.get('method')}, "
         f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
     )
-    console.print(_coefficients(fit), _inertia(fit), _equations(fit))
+    if "kernel" in provenance:
+        console.print(_kernel(provenance["kernel"]), highlight=False, soft_wrap=True)
+    else:
+        console.print(_coefficients(fit))
+    console.print(_inertia(fit), _equations(fit))
     if "model_error" in provenance:
         error = provenance["model_error"]
         console.print(
@@ -39,6 +44,17 @@ def summary_table(fit: Fit) -> str:
     file = console.file
     assert isinstance(file, StringIO)
     return file.getvalue()
+
+
+def _kernel(report: dict[str, Any]) -> str:
+    """What was added to the reference ship, whose weights tell a reader nothing."""
+    errors = report["heading_errors_held_out"].items()
+    held_out = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
+    return (
+        f"Kernel: {report['centres']} radial basis functions of length {report['length']:g} in "
+        f"{report['features']} features an equation, C {report['C']:g}; heading held out, rms: "
+        + ", ".join(held_out)
+    )
 
 
 def _coefficients(fit: Fit) -> Table:

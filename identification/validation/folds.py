@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.regression.samples import Samples
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 
 TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
 LEAST_RUDDER_SHARE = 0.9  # of the largest rudder; from there on a rudder counts as the largest
+PIECES = 3  # into which a single trial is cut
 
 
 def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
@@ -31,3 +35,26 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
             f"{TRIALS!r}, or add trials of another rudder angle"
         )
     return largest
+
+
+def held_out_rows(
+    trials: Sequence[Trial], samples: Samples, folds: str
+) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
+    """Rows to fit, and the trial or the piece of the only trial that is held out, by a choice of `FOLDS`."""
+    if check_choice(folds, FOLDS, "folds") == LARGEST_RUDDER:
+        largest = of_largest_rudder(trials, "folds")
+        rows = ~largest[samples.trial]
+        yield from ((rows, trial) for trial, held in zip(trials, largest, strict=True) if held)
+        return
+    if len(trials) > 1:
+        for index, trial in enumerate(trials):
+            yield samples.trial != index, trial
+        return
+    (trial,) = trials
+    edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
+    start, end = samples.start, samples.start + samples.duration
+    for first, last in pairwise(edges):
+        held = slice(first, last)
+        channels = {name: values[held] for name, values in trial.channels.items()}
+        piece = Trial(trial.t[held], channels, name=trial.name)
+        yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece

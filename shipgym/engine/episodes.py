@@ -144,7 +144,7 @@ def take_commands(tile: Tile, actions: Any) -> None:
 
 def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
     """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
-    state, words = tile.state, tile.keys[2]
+    state = tile.state
     common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
     for lane in range(lanes):
         ship, coefficients = ship_at(common, tile.ships, lane)
@@ -152,15 +152,22 @@ def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
         before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
         rudder, shaft = course.rudder_command * ship.rudder_limit, course.shaft_command * ship.shaft
         after = sail(before, rudder, shaft, h, push(before, sea, p), coefficients, ship)
-        away = lost(after, ship)
-        over = course.ended != 0.0
-        motion = choose_motion(away | over, before, after)
-        store_motion(state, lane, motion)
-        store_ran_away(state, lane, pick(away, 1.0, course.ran_away))
-        if HAS_SEA:
-            word = words[lane]
-            words[lane] = word + EVOLVE_WORDS
-            store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
+        conclude_step(tile, lane, after, h, ship, p)
+
+
+def conclude_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) -> None:
+    """Put a ship where her step of h seconds leads, and let the sea of parameters p go on."""
+    state, words = tile.state, tile.keys[2]
+    before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
+    away = lost(after, ship)
+    over = course.ended != 0.0
+    motion = choose_motion(away | over, before, after)
+    store_motion(state, lane, motion)
+    store_ran_away(state, lane, pick(away, 1.0, course.ran_away))
+    if HAS_SEA:
+        word = words[lane]
+        words[lane] = word + EVOLVE_WORDS
+        store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
 
 
 def conclude_lanes(tile: Tile, lanes: int) -> tuple[int, int]:

@@ -167,6 +167,19 @@ def exponential(x: float) -> float:
     return value if x == x else x
 
 
+def two_to(x: float) -> float:
+    """2 to the power of x <= 0, at least 2^-1000; by a polynomial of degree 9, error below 2e-14 of it."""
+    within = max(x, -1000.0)
+    shifted = within + (SHIFT + 1023.0)  # in its lowest bits the biased exponent
+    f = within - (shifted - (SHIFT + 1023.0))
+    mantissa = 0.00015403433646322688 + f * (
+        1.5252654813770773e-05 + f * (1.3259667128066899e-06 + f * 1.0209003757888788e-07)
+    )
+    mantissa = 0.05550410866438316 + f * (0.009618129194101738 + f * (0.001333355823666942 + f * mantissa))
+    mantissa = 1.0000000000000144 + f * (0.6931471805599516 + f * (0.24022650695639336 + f * mantissa))
+    return mantissa * np.int64(np.float64(shifted).view(np.int64) << 52).view(np.float64)
+
+
 def arctan2(y: float, x: float) -> float:
     """Angle in [-pi, pi] of the point with the finite coordinates x and y, rad."""
     a, b = fabs(y), fabs(x)

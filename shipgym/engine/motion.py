@@ -213,14 +213,22 @@ def sail(
     c = rates(three, order, shaft, push, coefficients, ship)
     four = stage(one, c, h, order, ship)
     d = rates(four, order, shaft, push, coefficients, ship)
-    k, sixth = weighted(a, b, c, d), h / 6.0
-    end = along(one, k, sixth, rudder_after(one.delta, k.delta / 6.0, order, h, ship))
-
     ahead_2, aside_2 = way(two)
     ahead_3, aside_3 = way(three)
     ahead_4, aside_4 = way(four)
-    ahead = sixth * (one.u + 2.0 * (ahead_2 + ahead_3) + ahead_4)
-    aside = sixth * (one.v * upright(one) + 2.0 * (aside_2 + aside_3) + aside_4)
+    ahead = one.u + 2.0 * (ahead_2 + ahead_3) + ahead_4
+    aside = one.v * upright(one) + 2.0 * (aside_2 + aside_3) + aside_4
+    return arrival(motion, one, weighted(a, b, c, d), ahead, aside, order, h, push, ship)
+
+
+def arrival(
+    motion: Motion, one: Motion, k: Rates, ahead: float, aside: float, order: float, h: float, push: Push,
+    ship: Ship,
+) -> Motion:  # fmt: skip
+    """State after a step from what its stages sum up to: rates, and the way made from the state `one`."""
+    sixth = h / 6.0
+    end = along(one, k, sixth, rudder_after(one.delta, k.delta / 6.0, order, h, ship))
+    ahead, aside = sixth * ahead, sixth * aside
     sine, cosine = sin_cos(motion.psi)
     x, y = motion.x + (ahead * cosine - aside * sine), motion.y + (ahead * sine + aside * cosine)
     if HAS_SEA:

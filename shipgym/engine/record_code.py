@@ -11,7 +11,7 @@ from functools import partial, reduce
 from typing import Any
 
 from shipgym.engine.parts import Part
-from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is_record, leaves
+from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is_record, is_table, leaves
 
 Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
@@ -24,6 +24,8 @@ def loader(rows: Rows, lanes: int = LANES) -> Part:
 
     def load(array: Any, lane: int) -> Any:
         def number(path: str, kind: Any) -> Any:
+            if is_table(kind):
+                return array[places[f"{path}.0"] * lanes + (lane if lanes > 1 else 0) :: lanes]
             if path not in places:
                 return 0.0
             at = places[path]
@@ -33,6 +35,9 @@ def loader(rows: Rows, lanes: int = LANES) -> Part:
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         def number(path: str, kind: Any) -> Any:
+            if is_table(kind):
+                first = places[f"{path}.0"]
+                return _entry(context, builder, kinds[0], values[0], first, lanes, values[1])
             if path not in places:
                 return _constant(context, 0.0)
             if is_list(kind):
@@ -42,6 +47,20 @@ def loader(rows: Rows, lanes: int = LANES) -> Part:
         return _coded(context, builder, rows.record, number)
 
     return _part("load", rows, lanes, load, generate, lambda: _type(rows.record))
+
+
+def row_reader(lanes: int = LANES) -> Part:
+    """`row_of(table, row)`: a number of a table (`records.Table`), which is where its first one stands."""
+
+    def row_of(table: Any, row: int) -> Any:
+        return table[row]
+
+    def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        word = context.get_value_type(kinds[1])
+        index = builder.mul(values[1], word(lanes), flags=("nsw",))
+        return builder.load(builder.gep(values[0], [index], inbounds=True))
+
+    return Part(row_of, code=partial(_intrinsic, generate, 2, _double), key=("row", lanes))
 
 
 def storer(rows: Rows, lanes: int = LANES) -> Part:
@@ -191,7 +210,11 @@ def _constant(context: Any, number: float) -> Any:
 def _shape(record: Record) -> tuple[Any, ...]:
     """Names in a record and in those within it."""
     kinds = field_types(record)
-    return (record.__name__, *((n, _shape(k) if is_record(k) else is_list(k)) for n, k in kinds.items()))
+    shapes = {
+        name: kind.rows if is_table(kind) else _shape(kind) if is_record(kind) else is_list(kind)
+        for name, kind in kinds.items()
+    }
+    return (record.__name__, *shapes.items())
 
 
 def _made(record: Record, number: Callable[[str, Any], Any], prefix: str = "") -> Any:
@@ -212,10 +235,12 @@ def _type(record: Record) -> Any:
     """Numba's type of a record whose numbers are floats."""
     from numba.core import types
 
-    kinds = [
-        _type(kind) if is_record(kind) else types.float64[::1] if is_list(kind) else types.float64
-        for kind in field_types(record).values()
-    ]
+    def typed(kind: Any) -> Any:
+        if is_table(kind):
+            return types.CPointer(types.float64)  # type: ignore[attr-defined]
+        return _type(kind) if is_record(kind) else types.float64[::1] if is_list(kind) else types.float64
+
+    kinds = [typed(kind) for kind in field_types(record).values()]
     return types.Tuple.from_types(kinds, record)  # type: ignore[attr-defined]
 
 

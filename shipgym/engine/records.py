@@ -23,6 +23,23 @@ def is_record(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
 
 
+class Table:
+    """Kind of a field that is a table of numbers, read one by one (`record_code.row_reader`)."""
+
+    rows = 0
+
+
+@cache
+def table_of(rows: int) -> type[Table]:
+    """The kind of a table of so many numbers."""
+    return type(f"Table{rows}", (Table,), {"rows": rows})
+
+
+def is_table(kind: Any) -> bool:
+    """Whether a field is a table."""
+    return isinstance(kind, type) and issubclass(kind, Table)
+
+
 @cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields, with or without what they are annotated with."""
@@ -35,7 +52,10 @@ def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
     """Paths of all numbers in a record and the records within it, in order: `u`, `steering.rudder`."""
     paths: list[str] = []
     for name, kind in field_types(record).items():
-        paths += leaves(kind, f"{prefix}{name}.") if is_record(kind) else [prefix + name]
+        if is_table(kind):
+            paths += [f"{prefix}{name}.{row}" for row in range(kind.rows)]
+        else:
+            paths += leaves(kind, f"{prefix}{name}.") if is_record(kind) else [prefix + name]
     return tuple(paths)
 
 
@@ -97,7 +117,7 @@ class Layout:
 
 def is_list(kind: Any) -> bool:
     """Whether a field is a list of numbers; only the last one of settings may be."""
-    return kind not in (float, int, bool, Any) and not is_record(kind)
+    return kind not in (float, int, bool, Any) and not is_record(kind) and not is_table(kind)
 
 
 def flat(record: Any) -> list[float]:

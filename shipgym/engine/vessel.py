@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.places import load_coefficients, load_ship
-from shipgym.engine.record_code import loader, storer
+from shipgym.engine.record_code import loader, row_reader, storer
 from shipgym.engine.records import LANES, Layout, Record, Rows
 
 
@@ -30,6 +30,9 @@ class Vessel:
         `accelerations`, `shaft_acceleration`, and what these name in turn (see `shipgym.engine.motion`).
     lag : bool
         Whether her steering gear has a time constant.
+    summed : mapping of str to Part
+        Of a ship part of whose accelerations is a sum over a table: what takes the place of her functions
+        where many ships are sailed (`shipgym.engine.stages`).
     """
 
     name: str
@@ -37,6 +40,7 @@ class Vessel:
     coefficients: Record
     functions: Mapping[str, Any]
     lag: bool
+    summed: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
     def motion(self) -> Rows:
@@ -71,6 +75,7 @@ class Vessel:
             "store_motion": storer(self.motion, lanes),
             "load_ship": loader(self.layout["ship"], 1 if shared else LANES),
             "load_coefficients": loader(self.layout["coefficients"], 1 if shared else LANES),
+            "row_of": row_reader(1 if shared else LANES),
             "common_ship": Part(read_ship if shared else nothing),
             "ship_at": Part(the_common if shared else ship_of_lane),
         }

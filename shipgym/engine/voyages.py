@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.engine import episodes
+from shipgym.engine import episodes, stages
 from shipgym.engine.addresses import array_at, plan_at
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
@@ -90,7 +90,8 @@ class Voyages:
     @cached_property
     def result(self) -> Layout:
         """Rows of what comes of an interval in one tile."""
-        return Layout(outcome=episodes.Outcome, reward=self.task.Reward, observation=self.task.Observation)
+        seen = {"outcome": episodes.Outcome, "reward": self.task.Reward, "observation": self.task.Observation}
+        return Layout(**seen, **(stages.ROOM if self.vessel.summed else {}))
 
     @cached_property
     def ship(self) -> Layout:
@@ -128,7 +129,7 @@ class Voyages:
     @cached_property
     def parts(self) -> dict[str, Any]:
         """What takes the place of the globals of `shipgym.engine.episodes`."""
-        return {**self._records(), **self._ships(), **self._functions()}
+        return {**self._records(), **self._ships(), **self._functions(), **self.vessel.summed}
 
     def _records(self) -> dict[str, Any]:
         rows, result = self.state, self.result

@@ -156,8 +156,7 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
     """Accelerations as sums of the table's terms, shape (n, n_rates)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     shaft = model.service_shaft_speed
-    n_terms = sum(map(len, table.equations.values()))
-    theta = table.numbers(model.coefficients, model.particulars, shaft)[-n_terms:]  # those of the terms
+    theta = table.acceleration_matrix(model.particulars, shaft) @ np.array(list(model.coefficients.values()))
     rates = _rates(model)
     accelerations = np.zeros((SAMPLES, len(rates)))
     accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)

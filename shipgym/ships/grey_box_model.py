@@ -46,6 +46,12 @@ def grey_box(
     return GreyBox(name, SOURCE, table, "service", "acceleration", stripped, known)
 
 
+def fitted_box(ship: ShipModel) -> GreyBox:
+    """A grey box on a model of the very same ship, whose covariance and provenance it keeps."""
+    named = f"{ship.name}, {ship.structure}"
+    return replace(grey_box(ship), reference=replace(ship, name=named, envelope=None))
+
+
 def converted_model(
     reference: str | ShipModel | GreyBox,
     particulars: Particulars,

@@ -15,6 +15,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
+from shipgym.engine.records import Record
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
@@ -212,16 +213,24 @@ def accelerations(
 def _vessel(
     reference: Vessel, source: str, n_terms: int, shaft: bool, state_names: tuple[str, ...], lag: bool
 ) -> Vessel:
-    """Functions of the reference ship, the terms and their sum."""
-    terms = coefficients_record(n_terms, "GreyBoxTerms")
+    parts = {"term_accelerations": Part(accelerations_function(source))}
+    record = coefficients_record(n_terms, "GreyBoxTerms")
+    return grey_box_vessel(reference, record, parts, shaft, state_names, lag)
+
+
+def grey_box_vessel(
+    reference: Vessel, terms: Record, functions: Mapping[str, Any], shaft: bool,
+    state_names: tuple[str, ...], lag: bool, summed: Mapping[str, Any] | None = None,
+) -> Vessel:  # fmt: skip
+    """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
     fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
     parts = {
         **reference.functions,
         "accelerations": Part(accelerations),
         "reference_accelerations": reference.functions["accelerations"],
-        "term_accelerations": Part(accelerations_function(source)),
         "KNOWS_SHAFT": shaft,
+        **functions,
     }
     parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
     record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
-    return Vessel("a grey box", state_names, record, parts, lag)
+    return Vessel("a grey box", state_names, record, parts, lag, summed or {})

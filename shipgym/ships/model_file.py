@@ -9,7 +9,9 @@ Format 1:
                    absent; for a table of captive tests {"name", "source", "shares": {"u" | "v" | "r":
                    [{"coefficient", "name", "powers", "sign"}, ...]}};
                    for a reference ship {"name", "source"}; a grey box has besides its terms "shaft" (whether
-                   the shaft speed is known) and "reference": a reference ship, as a whole model file
+                   the shaft speed is known) and "reference": a reference ship, as a whole model file; one
+                   with a kernel has in place of "equations" its "kernel": {"offset", "scale", "centres",
+                   "basis"}
     normalisation  that of the structure: "prime", "service" or "si"; "own" for the equations of a reference
                    ship
     service_shaft_speed  1/s
@@ -48,6 +50,7 @@ from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
@@ -124,10 +127,18 @@ def numbers_hash(model: ManoeuvringModel) -> str:
 def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:
     """A table of terms, or the equations of a ship that has her own, by name."""
     table = check_table(value, where)
-    keys = ("name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares")
+    keys = (
+        "name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares", "kernel",
+    )  # fmt: skip
     check_keys(table, keys, where)
     if "shares" in table:
         return _shared(table, where)
+    if "kernel" in table:
+        named = {key: table[key] for key in keys[:4] if key in table}
+        structure = _structure({**named, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
+        return kernel_box(
+            _grey_box(structure, table, where, make), _kernel(table["kernel"], f"{where}.kernel")
+        )
     if "equations" in table:
         structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
         if {"reference", "shaft"} & table.keys():
@@ -152,6 +163,17 @@ def _grey_box(
         structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
         read_model(reference, f"{where}.reference", make), shaft,
     )  # fmt: skip
+
+
+def _kernel(value: Any, where: str) -> Kernel:
+    """The radial basis functions of a kernel."""
+    table = check_table(value, where)
+    fields = ("offset", "scale", "centres", "basis")
+    check_keys(table, fields, where)
+    shapes: list[tuple[int | None, ...]] = [(4,), (4,), (None, 4), (None, None)]
+    return Kernel(
+        *(check_array(table.get(n), shape, f"{where}.{n}") for n, shape in zip(fields, shapes, strict=True))
+    )
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:

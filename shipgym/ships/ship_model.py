@@ -15,9 +15,12 @@ from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
+from shipgym.ships.equations import ShipEquations
+from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import load, numbers_hash, read_model
 from shipgym.ships.simulate import simulate
+from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 
 
@@ -104,16 +107,27 @@ class ShipModel(ManoeuvringModel):
         mean = np.array(list(self.coefficients.values()))
         values, vectors = np.linalg.eigh(_scaled(self.covariance))
         root = _scale(self.covariance)[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
-        draws = mean + np.random.default_rng(seed).standard_normal((n, len(mean))) @ root.T
+        rng = np.random.default_rng(seed)
+        draws = mean + rng.standard_normal((n, len(mean))) @ root.T
+        tables = self._drawn_tables(n, rng)
         return [
             replace(
                 self,
                 name=f"{self.name}-draw-{i}",
                 coefficients=dict(zip(self.coefficients, draw.tolist(), strict=True)),
                 covariance=None,
+                own_table=tables[i],
             )
             for i, draw in enumerate(draws)
         ]
+
+    def _drawn_tables(self, n: int, rng: np.random.Generator) -> list[Structure | ShipEquations | None]:
+        """Its table n times, with a fitted reference ship drawn anew each time."""
+        box = self.own_table
+        if not isinstance(box, GreyBox) or box.ship.covariance is None:
+            return [box] * n
+        assert isinstance(box.reference, ShipModel)
+        return [replace(box, reference=drawn) for drawn in box.reference.sample(n, rng)]
 
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.ships.model_file`)."""

@@ -76,6 +76,14 @@ LINEAR_STEERING = accelerations(
     v="v, r, delta",
     r="v, r, delta",
 )
+LINEAR = accelerations(
+    "linear",
+    "Surge, sway and yaw to first order about straight running, asymmetries included (Abkowitz 1964)",
+    normalisation="prime",
+    u="1, du",
+    v="1, v, r, delta",
+    r="1, v, r, delta",
+)
 SURGE = accelerations("surge", f"{ZHU}, equation 4.7", u="u, |u| u, u^3, |n| n")
 SURGE_PERTURBED = accelerations("surge-perturbed", f"{ZHU}, equation 5.8", u="du, du^3, dn")
 
@@ -134,8 +142,8 @@ MMG_4DOF = accelerations(
 STRUCTURES: dict[str, Structure] = {
     structure.name: structure
     for structure in (
-        NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, SURGE, SURGE_PERTURBED, STEERING7, STEERING5, *ZHU_REDUCED,
-        ABKOWITZ, ABKOWITZ_FULL, CUBIC, MMG_4DOF, PMM38, PMM18,
+        NOMOTO, NORRBIN, NOMOTO2, LINEAR_STEERING, LINEAR, SURGE, SURGE_PERTURBED, STEERING7, STEERING5,
+        *ZHU_REDUCED, ABKOWITZ, ABKOWITZ_FULL, CUBIC, MMG_4DOF, PMM38, PMM18,
     )
 }  # fmt: skip
 PRINTED = frozenset(STRUCTURES)

@@ -371,7 +371,7 @@ def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> Non
                 "choose the 'service' or 'si' normalisation"
             )
     names = [term.name for term in terms]
-    products = [frozenset(term.powers) for term in terms]
+    products = [term.product for term in terms]
     for i, (name, product) in enumerate(zip(names, products, strict=True)):
         if name in names[:i] or product in products[:i]:
             raise InputError(f"{where}: a term stands twice in one equation: '{name}'")

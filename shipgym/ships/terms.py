@@ -31,6 +31,11 @@ class Term:
     # symbols (`SYMBOLS`) and their powers, 1 to 9; that of the speed U may be negative
     powers: tuple[tuple[str, int], ...]
 
+    @property
+    def product(self) -> object:
+        """What it is, whatever its name."""
+        return frozenset(self.powers)
+
     def power(self, *symbols: str) -> int:
         """Sum of the powers of the given symbols."""
         return sum(power for symbol, power in self.powers if symbol in symbols)

@@ -168,6 +168,19 @@ class Options:
             "svr": "epsilon-SVR", "ls-svm": "LS-SVM, as the Lagrangian of the paper has it"
         },
     )  # fmt: skip
+    kernel: str | None = _rm_svm(
+        TEXT, "kernel of an LS-SVM on what a reference ship leaves: that of `grey-box`, the fitted model of "
+        "the structure named, or, as a black box, a linear one", common=True, choices={
+            "rbf": "radial basis functions on a few centres (fixed-size LS-SVM); fades outside its data",
+        },
+    )  # fmt: skip
+    centres: int | None = _rm_svm(
+        WHOLE, "of these functions, by default 64, at most 100", at_least=2, at_most=100
+    )
+    kernel_length: float | None = _rm_svm(
+        NUMBER, "of these functions, in root mean squares of the data; by default by trials held out, as `C`",
+        above=0.0,
+    )  # fmt: skip
     free_constant: bool | None = _rm_svm(
         FLAG, "whether the constant is left without a penalty, as in the paper"
     )

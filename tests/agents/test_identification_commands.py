@@ -86,6 +86,7 @@ def test_options_of_identify_come_from_the_ship_file(ship, demo):
 def test_the_options_tested_and_the_rest_are_all_there_are():
     known = {line.split(" = ")[0] for lines in (GENERAL, *SETTINGS.values()) for line in lines}
     of_grey_box = {"reference_model", "regression", "free_constant", "constant"}
+    of_kernels = {"kernel", "centres", "kernel_length"}
     of_refinement = {
         "segment_lengths",
         "staggered",
@@ -96,7 +97,7 @@ def test_the_options_tested_and_the_rest_are_all_there_are():
         "anchor_weight",
     }
     extra = {"extra_trials", "extra_weight", "service_shaft_speed", "method", "model_error"}
-    assert known | of_grey_box | of_refinement | extra == OPTIONS.keys()
+    assert known | of_grey_box | of_kernels | of_refinement | extra == OPTIONS.keys()
 
 
 @pytest.mark.parametrize(

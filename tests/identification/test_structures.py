@@ -46,6 +46,7 @@ def own(name: str) -> dict[str, float]:
         },
         "norrbin": {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0},
         "linear-steering": PRIME,
+        "linear": {"a_0": -2e-3, "a_du": -0.05, "b_0": 1e-3, "c_0": 5e-4} | PRIME,
         "cubic": CUBIC,
         "zhu-9": {"b_r": -2.3, "b_|v|v": -0.02, "b_d": -0.08, "c_v": 2e-3, "c_|v|v": 1e-3, "c_d": 3.7e-3},
     }

@@ -1,0 +1,244 @@
+"""Fixed-size LS-SVM with an RBF kernel on what a reference ship leaves of the accelerations.
+
+Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines,
+chapter 6: the kernel is approximated on a few centres, here of k-means in mirrored pairs, and the ridge
+regression solved in the primal, in the leading principal components of the data in feature space.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+from sklearn.cluster import KMeans
+
+from identification.estimators.estimator import Estimators
+from identification.estimators.lssvm import LSSVM
+from identification.estimators.rm_svm import ERROR_TOLERANCE, heading_error
+from identification.regression.coefficients import with_accelerations
+from identification.regression.grey_box import structure_samples
+from identification.regression.preprocess import smoothed_channels
+from identification.regression.samples import Samples
+from identification.validation.folds import TRIALS, held_out_rows
+from shipgym.checks import check_number, check_whole
+from shipgym.errors import InputError
+from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships.grey_boxes import GREY_BOX
+from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
+from shipgym.trials.identify_table import Options
+from shipgym.trials.trial import Trial
+
+Floats = NDArray[np.float64]
+
+OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
+BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
+METHODS = ("tls-svm", "ls-svm", "rm-svm", "output-error", "map")
+CENTRES = 64
+LENGTHS = (2.8, 2.0, 1.4, 1.0, 0.7)  # of the functions, in root mean squares of the inputs
+WEIGHTS = tuple(np.geomspace(0.1, 1e4, 6).tolist())  # of squared errors over a ship length
+MOST_FEATURES = 40  # of each equation, so that their covariance stays small
+LEAST_SCALE = 0.02  # of an input that hardly changes
+MOST_SAMPLES = 4000  # among which centres are sought
+MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
+# Of the linear model beneath a black box, prime system: eigenvalues of steering, drift and turn with the
+# rudder hard over, damping of surge
+LEAST_DAMPING, HARDEST_TURN, LEAST_SURGE_DAMPING = -0.2, (0.5, 1.2), -0.05
+EVERY_CENTRE_NEEDS = 3  # rows of the regression
+
+
+@dataclass(frozen=True, eq=False)
+class KernelFit:
+    """A kernel fitted to what a reference ship leaves."""
+
+    model: ShipModel
+    samples: Samples
+    estimators: Estimators = field(default_factory=dict)  # none where it is not fitted yet
+    report: dict[str, Any] = field(default_factory=dict)  # for the provenance
+
+
+def reference_options(options: Options) -> Options:
+    """The options by which the reference ship beneath a kernel is identified; a grey box names hers.
+
+    Raises InputError for a kernel that does not exist, and for a method that has none.
+    """
+    if options.kernel != RBF:
+        raise InputError(f"kernel: {options.kernel!r} found, expected {RBF!r}, or none")
+    if options.method not in METHODS:
+        raise InputError(
+            f"kernel: {RBF!r} found with method {options.method!r}, which has none, expected method "
+            "'rm-svm' or 'ls-svm'; or leave the kernel out"
+        )
+    if options.regression not in (None, "ls-svm") or options.epsilon is not None:
+        raise InputError(f"regression: epsilon-SVR found with kernel {RBF!r}, which is fitted by LS-SVM only")
+    structure, method = options.structure, options.method
+    if structure == Options.structure:  # none was named
+        structure = BLACK_BOX if options.reference_model is None else GREY_BOX
+    if structure != GREY_BOX:
+        method = "ls-svm" if method == "rm-svm" else method
+    cleared: dict[str, Any] = dict.fromkeys(OWN)
+    return replace(options, structure=structure, method=method, **cleared)
+
+
+def stabilised(model: ShipModel) -> ShipModel:
+    """The linear model beneath a black box, damped until a hard turn that is in no trial keeps within bounds.
+
+    Where the kernel fades the ship is linear: she must be stable, and neither drift nor turn beyond any ship.
+    """
+    c = dict(model.coefficients)
+    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]])
+    rudder = model.steering.limit * np.array([c["b_d"], c["c_d"]])
+    shift = 0.0
+    while True:
+        damped = A - shift * np.eye(2)
+        turn = np.abs(np.linalg.solve(damped, rudder))
+        if np.linalg.eigvals(damped).real.max() < LEAST_DAMPING and np.all(turn < HARDEST_TURN):
+            break
+        shift += 0.05
+    c |= {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift}
+    c["a_du"] = min(c["a_du"], LEAST_SURGE_DAMPING - 2.0 * c["a_0"])
+    return replace(model, coefficients=c)
+
+
+def fit_kernel(
+    blank: ShipModel, trials: Sequence[Trial], box: GreyBox, options: Options, sampling: Mapping[str, Any]
+) -> KernelFit:
+    """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
+
+    Where not given these are the smoothest whose simulated headings of the trials held out are within a tenth
+    of the best; a fitted reference ship knows these trials. `blank`: the ship, whose structure is not used;
+    `trials`: to fit; `box`: has the reference ship; `options`: `centres`, `kernel_length`, `C`, `folds`;
+    `sampling`: as of `build_samples`. Raises InputError for too few samples and settings that cannot be.
+    """
+    search = _Search(blank, trials, box, sampling, options.folds or TRIALS)
+    kernels = _kernels(search, options)
+    weights = WEIGHTS if options.C is None else (check_number(options.C, "C", above=0.0),)
+    stages = {length: search.stage(kernel) for length, kernel in kernels.items()}
+    pairs = [(length, weight) for weight in weights for length in stages]  # the smoothest first
+    (length, weight), errors = pairs[0], {}
+    if len(pairs) > 1:
+        tried = {pair: search.error(stages[pair[0]], pair[1]) for pair in pairs}
+        least = ERROR_TOLERANCE * min(tried.values())
+        length, weight = next((pair for pair in pairs if tried[pair] <= least), pairs[0])
+        errors = {"kernel": tried[length, weight]}
+    errors["reference"] = search.error(stages[length], 0.0)
+    remarks = []
+    if not errors.get("kernel", 0.0) < errors["reference"]:
+        remarks.append(
+            "on trials held out the kernel predicts the heading no better than its reference ship alone "
+            f"({np.degrees(errors['kernel']):.2g} and {np.degrees(errors['reference']):.2g} deg rms)"
+        )
+    kernel = kernels[length]
+    report = {
+        "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
+        "length": length, "C": weight, "remarks": remarks,
+        "heading_errors_held_out": {k: e if np.isfinite(e) else None for k, e in errors.items()},
+    }  # fmt: skip
+    return replace(search.fitted(stages[length], weight), report=report)
+
+
+def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
+    """Kernels by their length, on centres among the samples."""
+    number = CENTRES if options.centres is None else options.centres
+    check_whole(number, "centres", at_least=2)
+    check_number(number, "centres", at_most=SIZES[-1])
+    smooth = search.sampling["smooth"]
+    method = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
+    channels = [smoothed_channels(trial, ("u", "v", "r", "delta"), method) for trial in search.trials]
+    x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
+    offset, scale, centres = chosen_centres(x, number)
+    lengths: tuple[float, ...] = LENGTHS
+    if options.kernel_length is not None:
+        lengths = (check_number(options.kernel_length, "kernel_length", above=0.0),)
+    return {
+        length: principal(Kernel(offset, scale * length, centres / length, np.eye(len(centres))), x)
+        for length in lengths
+    }
+
+
+def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
+    """Offset and scale of inputs, and centres in these, mirrored to the other side in pairs.
+
+    x has shape (n_samples, 4). Centres are those of k-means of all samples brought to one side. Raises
+    InputError for fewer samples than it takes.
+    """
+    offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
+    scale = np.maximum(np.sqrt(np.mean((x - offset) ** 2, axis=0)), LEAST_SCALE)
+    z = (x - offset) / scale
+    folded = z * np.where(z[:, 1:2] < 0.0, MIRROR, 1.0)
+    if len(np.unique(folded, axis=0)) < EVERY_CENTRE_NEEDS * number:
+        raise InputError(
+            f"trials: {len(x)} samples found for {number} centres of the kernel, expected at least "
+            f"{EVERY_CENTRE_NEEDS} different ones for each; add trials, or give fewer centres"
+        )
+    means = KMeans(number // 2, n_init=1, random_state=0).fit(_thinned(folded)).cluster_centers_
+    return offset, scale, np.concatenate([means, means * MIRROR])
+
+
+def principal(kernel: Kernel, x: Floats) -> Kernel:
+    """The kernel with the leading principal components of the samples x in feature space as features."""
+    both = _thinned((x - kernel.offset) / kernel.scale)
+    both = np.concatenate([both, both * MIRROR])
+    values = gaussians(both, kernel.centres)
+    own = gaussians(kernel.centres, kernel.centres)
+    moment = values.T @ values / len(values)
+    _, vectors = eigh(moment, own + 1e-9 * np.eye(len(own)))
+    return replace(kernel, basis=np.ascontiguousarray(vectors[:, ::-1][:, :MOST_FEATURES]))
+
+
+def _thinned(x: Floats) -> Floats:
+    return x[:: max(1, -(-len(x) // MOST_SAMPLES))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Fits with different kernels and weights of the errors, and what they predict."""
+
+    blank: ShipModel
+    trials: Sequence[Trial]
+    box: GreyBox
+    sampling: Mapping[str, Any]
+    folds: Any
+
+    def stage(self, kernel: Kernel) -> KernelFit:
+        """The regression, and the model but for its coefficients."""
+        table = kernel_box(self.box, kernel)
+        blank = replace(
+            self.blank, structure=table.name, own_table=table, covariance=None, provenance=None,
+            coefficients=dict.fromkeys(table.coefficient_names, 0.0),
+        )  # fmt: skip
+        samples = structure_samples(
+            self.trials, table, blank.particulars, shaft_speed=blank.service_shaft_speed, **self.sampling
+        )
+        return KernelFit(blank, samples)
+
+    def unit(self, samples: Samples) -> float:
+        """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""
+        ship = self.blank.particulars
+        return float(1.0 / (ship["length"] * np.mean(samples.duration) * ship["speed"] ** 3))
+
+    def error(self, stage: KernelFit, weight: float) -> float:
+        """Mean error of the simulated headings of what is held out; 0: of the reference ship."""
+        samples, C, errors = stage.samples, weight * self.unit(stage.samples), []
+        for rows, held in held_out_rows(self.trials, samples, self.folds):
+            found: dict[str, Floats] = {}
+            for q, X in samples.features.items():
+                moment = X[rows].T @ X[rows] * C + np.eye(X.shape[1])
+                found[q] = np.asarray(
+                    np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
+                )
+            errors.append(heading_error(with_accelerations(stage.model, found), held, "rmse"))
+        return float(np.mean(errors))
+
+    def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
+        """The fit to all rows."""
+        samples, C = stage.samples, weight * self.unit(stage.samples)
+        estimators: Estimators = {
+            q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
+            for q, X in samples.features.items()
+        }
+        model = with_accelerations(stage.model, {q: one.coef_ for q, one in estimators.items()})
+        return KernelFit(model, samples, estimators)
