@@ -43,7 +43,6 @@ RIGHT: dict[str, list[str]] = {
     "trials": ["mariner"],
     "replay": ["episode.json", "--out", "out.html"],
     "doctor": [],
-    "reproduce": ["cao2015"],
 }
 
 NO_NUMBER = ("x", "", "1,5", "0x1", "--", "1e")
@@ -58,12 +57,13 @@ WRITTEN = ("out", "onnx", "markdown")  # parameters that name what is written
 
 
 def commands() -> dict[str, Any]:
-    """The commands with all their parameters, those of `identify` among them."""
+    """The commands with all their parameters; `reproduce` leaves them to a script in another process."""
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="shipgym")
     return {
         name: command.make_context(name, [], resilient_parsing=True, parent=context).command
         for name, command in group.commands.items()  # type: ignore[attr-defined]
+        if name != "reproduce"
     }
 
 

@@ -150,7 +150,10 @@ class Particulars(Mapping[str, Any]):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
-        return {**{name: getattr(self, name) for name in FIELDS}, "estimated": sorted(self.estimated)}
+        known = {name: getattr(self, name) for name in FIELDS}
+        later = {name for name in LATER if known[name] is None}
+        found = {name: value for name, value in known.items() if name not in later}
+        return {**found, "estimated": sorted(self.estimated)}
 
     def require(self, name: str) -> float:
         """Return a value that must be known; InputError where it is None."""
@@ -194,6 +197,9 @@ class Particulars(Mapping[str, Any]):
 
 #: Names of all values, in the order of the ship file.
 FIELDS: tuple[str, ...] = tuple(item.name for item in fields(Particulars) if item.name != "estimated")
+
+#: Left out of files where not known, so that hashes of models from before them stay.
+LATER = ("rudder_aspect_ratio", "propeller_pitch_ratio", "rudders", "propellers")
 
 _BOUNDS: dict[str, _Bounds] = {
     item.name: item.metadata["bounds"] for item in fields(Particulars) if "bounds" in item.metadata

@@ -220,7 +220,7 @@ def test_terms_and_their_factors_are_not_without_number():
     equations = SMALL["structure"]["equations"]
     for listed, said in (
         ([{"name": "v", "powers": {"v": 9, "r": 9, "u": 9}}], "27 factors found, expected at most 20"),
-        ([{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)], "201 terms found, expected 1 to 200"),
+        ([{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)], "expected a list of terms, 1 to 200"),
     ):
         with pytest.raises(InputError, match=said):
             ShipModel.from_dict(put(SMALL, ("structure", "equations"), False, {**equations, "v": listed}))

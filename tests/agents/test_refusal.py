@@ -65,6 +65,7 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     found, why = links._decided(result.verification, result.identification)
     assert set(found.refused) == {"pid", "lq"}
     refused = replace(result, verification=found, refusal=why)
+    (tmp_path / "report").mkdir()
     links._write(refused, tmp_path / "report")
     names = sorted(path.name for path in (tmp_path / "report").iterdir())
     assert names == ["metrics.json", "model.json", "report.html"]

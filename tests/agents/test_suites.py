@@ -43,7 +43,7 @@ def test_a_suite_is_read_task_by_task():
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('name = "mine-v1"', "name = mine", "mine: not TOML"),
+        ('name = "mine-v1"', "name = mine", "mine: not valid TOML"),
         ('name = "mine-v1"', "", "mine: name: None found"),
         ('name = "mine-v1"', 'name = "m"\nnote = 1', "mine: unknown key 'note'"),
         ('why = "the easiest"', 'what = "x"', r"tasks\.calm: unknown key 'what'"),

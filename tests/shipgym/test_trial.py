@@ -195,7 +195,7 @@ def test_writing_replaces_the_file_as_a_whole_or_says_why_not(tmp_path):
     assert (tmp_path / "out.csv").read_text() == "t,u\n0.0,1.0\n1.0,1.0\n2.0,1.0\n"
     with pytest.raises(InputError, match="cannot be written"):
         trial.to_csv(tmp_path / "nowhere" / "out.csv")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="is not a file"):
         trial.to_csv(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
