@@ -38,7 +38,8 @@ def fit(model: ShipModel, heading: float = 0.01, use: str = "validate", **change
     """What the warnings read of a fit."""
     equation = SimpleNamespace(dropped=(), condition_number=10.0, collinear_pairs=())
     given = {
-        "model": model, "stable": True, "predictions": {"runs/a.csv": 1}, "diagnostics": {"r": equation}, "trials": (),
+        "model": model, "stable": True, "predictions": {"runs/a.csv": 1},
+        "diagnostics": {"r": equation}, "trials": (),
         "metrics": {"trials": {"runs/a.csv": {"use": use, "rmse": {"psi": heading}}}},
     }  # fmt: skip
     return SimpleNamespace(**given | changes)
