@@ -74,17 +74,17 @@ def run(
     """Read all chunks, or those that there is time for, and report by kind."""
     reports = {name: Report(name) for name in kinds}
     scratch = Path(tempfile.mkdtemp(prefix="fuzz-", dir=SCRATCH))
-    team: list[Worker] = []
+    running: list[Worker] = []
     try:
         while True:
-            while work and time.monotonic() < until and len(team) < workers:
-                team.append(_start(kinds, scratch, seed))
-            for worker in team:
+            while work and time.monotonic() < until and len(running) < workers:
+                running.append(_start(kinds, scratch, seed))
+            for worker in running:
                 if worker.chunk is None and work and time.monotonic() < until:
                     worker.chunk = work.popleft()
                     worker.seen = (-1, time.monotonic(), worker.spent())
                     worker.pipe.send(worker.chunk)
-            busy = [worker for worker in team if worker.chunk is not None]
+            busy = [worker for worker in running if worker.chunk is not None]
             if not busy:
                 return reports
             ready = wait([worker.pipe for worker in busy], timeout=1.0)
@@ -97,11 +97,11 @@ def run(
                 if not worker.process.is_alive() or worker.chunk is not None:
                     again = worker.chunk
                     _stop(worker)
-                    team.remove(worker)
+                    running.remove(worker)
                     if again is not None:
                         work.appendleft(again)
     finally:
-        for worker in team:
+        for worker in running:
             _stop(worker)
         shutil.rmtree(scratch, ignore_errors=True)
 
