@@ -9,6 +9,7 @@ import tempfile
 import time
 from collections import deque
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -83,7 +84,8 @@ def run(
                 if worker.chunk is None and work and time.monotonic() < until:
                     worker.chunk = work.popleft()
                     worker.seen = (-1, time.monotonic(), worker.spent())
-                    worker.pipe.send(worker.chunk)
+                    with suppress(OSError):  # one that has ended is noticed below
+                        worker.pipe.send(worker.chunk)
             busy = [worker for worker in running if worker.chunk is not None]
             if not busy:
                 return reports
@@ -131,6 +133,8 @@ def _answer(worker: Worker, ready: bool) -> Report | None:
             report: Report = worker.pipe.recv()
         except (EOFError, ConnectionResetError):
             worker.process.join()
+            if worker.process.exitcode == 0:  # it had grown too large, and never saw this chunk
+                return Report(chunk.kind)
             return _lost(worker, f"process died with {worker.process.exitcode}")
         worker.chunk = None
         return report

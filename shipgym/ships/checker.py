@@ -156,7 +156,12 @@ def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats])
     """Accelerations as sums of the table's terms, shape (n, n_rates)."""
     length, speed = model.particulars["length"], model.particulars["speed"]
     shaft = model.service_shaft_speed
-    theta = table.acceleration_matrix(model.particulars, shaft) @ np.array(list(model.coefficients.values()))
+    if table.captive:  # the terms' numbers come last
+        theta = table.numbers(model.coefficients, model.particulars, shaft)
+        theta = theta[-sum(map(len, table.equations.values())) :]
+    else:
+        values = np.array(list(model.coefficients.values()))
+        theta = table.acceleration_matrix(model.particulars, shaft) @ values
     rates = _rates(model)
     accelerations = np.zeros((SAMPLES, len(rates)))
     accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
