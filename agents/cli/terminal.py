@@ -64,8 +64,9 @@ def plain_table(title: str, *headings: str) -> Table:
         title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
         padding=(0, 2, 0, 0),
     )  # fmt: skip
-    for heading in headings:
-        table.add_column(heading.removeprefix(">"), justify="right" if heading.startswith(">") else "left")
+    for k, heading in enumerate(headings):
+        right = heading.startswith(">")
+        table.add_column(heading.removeprefix(">"), justify="right" if right else "left", no_wrap=k == 0)
     return table
 
 
