@@ -27,6 +27,7 @@ COUNTERS = (
     "_last_episode_starts",
     "_last_original_obs",
 )
+LARGEST_WEIGHT, LARGEST_LOG_STD = 1e9, 20.0
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
 
@@ -57,6 +58,7 @@ def put_back(agent: Any, memory: Memory) -> None:
     """
     memory = _with_own_settings(agent, memory)
     check_like(memory, _own(agent, memory), "agent")
+    _check_weights(memory["parameters"])
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
@@ -69,6 +71,18 @@ def put_back(agent: Any, memory: Memory) -> None:
         _put_layer_back(layer, kept)
     _put_replay_back(getattr(agent, "replay_buffer", None), memory["replay"])
     _put_random_back(agent, memory["random"])
+
+
+def _check_weights(parameters: Memory) -> None:
+    """Raise ValueError, naming the place, for weights with which a network's outputs overflow."""
+    for part, weights in parameters.items():
+        for name, one in weights.items():
+            if isinstance(one, torch.Tensor) and one.is_floating_point():
+                most = LARGEST_LOG_STD if "log_std" in name else LARGEST_WEIGHT
+                if not bool((one.abs() <= most).all()):
+                    raise ValueError(
+                        f"parameters.{part}.{name}: expected numbers of magnitude {most:g} at most"
+                    )
 
 
 def check_record(record: Any) -> None:

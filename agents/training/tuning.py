@@ -243,9 +243,11 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
         make_folder(folder)
         write_json(expected, note)
     try:
-        return optuna.create_study(
+        study = optuna.create_study(
             storage=f"sqlite:///{folder / STUDY}", study_name="shipgym", load_if_exists=True
         )
+        study.get_trials(deepcopy=False)  # of a damaged file this may be the first that fails
+        return study
     except Exception as error:  # what SQLAlchemy raises for a broken file is of many kinds
         raise InputError(
             f"{folder / STUDY}: not a study of Optuna ({error}); remove it, it is written again from "

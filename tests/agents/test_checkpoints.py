@@ -138,6 +138,14 @@ def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
     assert said in str(error.value)
 
 
+@pytest.mark.parametrize("wrong", [np.nan, 1e30])
+def test_weights_with_which_outputs_overflow_are_refused(fresh, memory, wrong):
+    changed = copy.deepcopy(memory)
+    changed["parameters"]["policy"]["actor.mu.weight"][0, 0] = wrong
+    with pytest.raises(ValueError, match=r"policy\.actor\.mu\.weight: expected numbers of magnitude 1e\+09"):
+        checkpoints.put_back(fresh, changed)
+
+
 @pytest.mark.parametrize("memory", [None, "/etc/passwd", [], {}, {"parameters": {}}])
 def test_what_is_no_memory_is_refused(fresh, memory):
     with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8"):
