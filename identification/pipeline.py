@@ -90,9 +90,8 @@ def identify(
     fit, refined = _fitted(chosen, asked, problem)
     provenance = _provenance(asked, chosen, fit, refined, problem)
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
-    provenance["steering"] = "estimated" if steering is None else "given"
-    model = replace(fit.model, covariance=covariance, provenance=provenance)
-    return _evaluated(model, fit, problem, whole_call(asked, problem.trials, particulars, steering))
+    call = whole_call(asked, problem.trials, particulars, steering)
+    return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
 
 
 def _identified_with_kernel(
@@ -122,11 +121,10 @@ def _identified_with_kernel(
         **_reference(problem),
         **_origin(fit, found.samples, problem.used),
         "kernel": found.report,
-        "steering": "estimated" if steering is None else "given",
     }
     covariance = _scaled_covariance(options, fit, None, problem, provenance)
-    model = replace(found.model, covariance=covariance, provenance=provenance)
-    return _evaluated(model, fit, problem, whole_call(options, problem.trials, particulars, steering))
+    call = whole_call(options, problem.trials, particulars, steering)
+    return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance, call)
 
 
 def _identified_mmg(
@@ -147,11 +145,10 @@ def _identified_mmg(
         "settings": provenance_settings(options, {}),
         **_origin(fit, samples, problem.used),
         **found.report,
-        "steering": "estimated" if steering is None else "given",
     }
-    model = replace(found.model, provenance=provenance)
     call = whole_call(options, problem.trials, particulars, steering)
-    return _evaluated(model, fit, replace(problem, samples=samples, blank=model), call)
+    problem = replace(problem, samples=samples, blank=found.model)
+    return _evaluated(found.model, fit, problem, provenance, call)
 
 
 def _sampling(options: Options, steering: SteeringGear | None) -> dict[str, Any]:
@@ -291,9 +288,11 @@ def _searched(fit: GuardedFit) -> dict[str, Any]:
 
 
 def _evaluated(
-    model: ShipModel, fit: GuardedFit, problem: Problem, call: dict[str, Any]
+    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
 ) -> IdentificationResult:
-    """The model with its predictions of all trials that are not skipped, and its diagnostics."""
+    """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
+    provenance["steering"] = "estimated" if call["steering"] is None else "given"
+    model = replace(model, provenance=provenance)
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     model = _marked(model, [name for name, predicted in predictions.items() if predicted is None])

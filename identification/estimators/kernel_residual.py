@@ -47,6 +47,7 @@ MIRROR = np.array([-1.0, -1.0, -1.0, 1.0])  # of the inputs, port to starboard
 # Of the linear model beneath a black box, prime system: eigenvalues of steering, drift and turn with the
 # rudder hard over, damping of surge
 LEAST_DAMPING, HARDEST_TURN, LEAST_SURGE_DAMPING = -0.2, (0.5, 1.2), -0.05
+SHIFTS = tuple((0.05 * np.arange(2000)).tolist())  # of the damping, tried in turn
 EVERY_CENTRE_NEEDS = 3  # rows of the regression
 
 
@@ -91,13 +92,16 @@ def stabilised(model: ShipModel) -> ShipModel:
     c = dict(model.coefficients)
     A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]])
     rudder = model.steering.limit * np.array([c["b_d"], c["c_d"]])
-    shift = 0.0
-    while True:
+    for shift in SHIFTS:
         damped = A - shift * np.eye(2)
         turn = np.abs(np.linalg.solve(damped, rudder))
         if np.linalg.eigvals(damped).real.max() < LEAST_DAMPING and np.all(turn < HARDEST_TURN):
             break
-        shift += 0.05
+    else:
+        raise InputError(
+            "kernel: no damping steadies the linear ship beneath it; check rudder and yaw rate, "
+            "or name a reference_model"
+        )
     c |= {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift}
     c["a_du"] = min(c["a_du"], LEAST_SURGE_DAMPING - 2.0 * c["a_0"])
     return replace(model, coefficients=c)
@@ -126,7 +130,7 @@ def fit_kernel(
         errors = {"kernel": tried[length, weight]}
     errors["reference"] = search.error(stages[length], 0.0)
     remarks = []
-    if not errors.get("kernel", 0.0) < errors["reference"]:
+    if "kernel" in errors and not errors["kernel"] < errors["reference"]:
         remarks.append(
             "on trials held out the kernel predicts the heading no better than its reference ship alone "
             f"({np.degrees(errors['kernel']):.2g} and {np.degrees(errors['reference']):.2g} deg rms)"

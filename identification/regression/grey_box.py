@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples, build_samples
-from identification.simulation_error.similarity import AUTO, select_reference
+from identification.simulation_error.similarity import AUTO, check_alike, select_reference
 from identification.validation.prediction import predict, trial_metrics
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel, Structure, grey_box
@@ -20,8 +20,6 @@ from shipgym.ships.particulars import Particulars
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-
-LIKE = 0.5  # similarity (a correlation) from which on a reference ship is taken without being named
 
 
 class _Widened:
@@ -59,13 +57,7 @@ def chosen_box(
     found: dict[str, float] = {}
     if reference == AUTO:
         reference, found = select_reference(_with_block_coefficient(particulars), recorded)
-        if found[reference] < LIKE:
-            raise InputError(
-                f"reference_model: 'auto' found, but none is like this ship; the best is {reference!r} "
-                f"with a similarity of {found[reference]:.2f}, expected at least {LIKE}; "
-                'choose structure "abkowitz" or "cubic", or name the ship all the same: reference_model = '
-                f'"{reference}"'
-            )
+        check_alike(reference, found[reference], 'choose structure "abkowitz" or "cubic"')
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
 

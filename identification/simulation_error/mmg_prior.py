@@ -19,7 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.simulation_error.formulas import FORMULAS
-from identification.simulation_error.similarity import AUTO, correlations, select_reference, similarity_vector
+from identification.simulation_error.similarity import (
+    AUTO,
+    LEAST_SIMILARITY,
+    check_alike,
+    correlations,
+    select_reference,
+    similarity_vector,
+)
 from shipgym.checks import check_choice, quoted
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
@@ -31,7 +38,6 @@ Floats = NDArray[np.float64]
 
 YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)
-LEAST_SIMILARITY = 0.5  # correlation of main dimensions below which a reference ship is unlike a ship
 UNLIKE = "reference ship {!r} is not like this one: similarity {:.2f}; compare with prior = 'yoshimura'"
 #: Main dimensions of the kinds of ships that the formulas were made for; read with caution, the databases
 #: behind them are not published whole.
@@ -157,13 +163,9 @@ def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, d
         found = correlations(similarity_vector(ship), vectors)
     except InputError:  # too little is known to compare
         return model, {}
-    if asked == AUTO and found[model.name] < LEAST_SIMILARITY:
-        raise InputError(
-            f"reference_model: 'auto' found, but none is like this ship; the best is {model.name!r} with a "
-            f"similarity of {found[model.name]:.2f}, expected at least {LEAST_SIMILARITY:g}; give prior = "
-            "'yoshimura' for formulas of the main dimensions, or name the ship all the same: "
-            f"reference_model = {model.name!r}"
-        )
+    if asked == AUTO:
+        otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
+        check_alike(model.name, found[model.name], otherwise)
     return model, found
 
 

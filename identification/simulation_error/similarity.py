@@ -22,6 +22,7 @@ AUTO = "auto"
 RUDDER_SHARE = {"mariner": 1.0 / 83.1, "tanker": 1.0 / 61.0}
 #: Correlations so close are those of one hull: the ship nearest in length is taken.
 CORRELATION_TOLERANCE = 0.01
+LEAST_SIMILARITY = 0.5  # correlation below which a reference ship is unlike a ship, and not taken unnamed
 
 
 def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats:
@@ -104,6 +105,16 @@ def select_reference(
     closest = [name for name, value in found.items() if value > best - CORRELATION_TOLERANCE]
     lengths = {name: usable[name].particulars.length / particulars.length for name in closest}
     return min(closest, key=lambda name: (abs(np.log(lengths[name])), -found[name])), found
+
+
+def check_alike(name: str, similarity: float, otherwise: str) -> None:
+    """Refuse the most similar reference ship where she is unlike the target; `otherwise`: what else to do."""
+    if similarity < LEAST_SIMILARITY:
+        raise InputError(
+            f"reference_model: 'auto' found, but none is like this ship; the best is {name!r} with a "
+            f"similarity of {similarity:.2f}, expected at least {LEAST_SIMILARITY:g}; {otherwise}, or name "
+            f"the ship all the same: reference_model = {name!r}"
+        )
 
 
 def _fits(ship: ShipModel, channels: Collection[str]) -> bool:

@@ -97,6 +97,7 @@ def held_out_error(fit: Fit) -> str:
     if indices:
         error, name, key = max(indices)
         words = key.removesuffix("_deg").removesuffix("_lengths").replace("_", " ")
+        words = {"overshoot 1": "first overshoot", "overshoot 2": "second overshoot"}.get(words, words)
         told.append(f"{words} {100.0 * error:.2g} % ({PurePath(name).name})")
     return (
         f"Worst errors on trials held out: {', '.join(told)}." if told else "No trial held out has a heading."

@@ -23,6 +23,7 @@ from shipgym.ships.equations import ShipEquations
 from shipgym.ships.particulars import Particulars
 
 MMG = "mmg"
+KVLCC2 = kvlcc2.Coefficients()
 SLOWEST = 0.02  # of service speed, below which v' and r' lose their meaning
 LEAST_SPEED, MOST_SPEED = 0.01, 4.0  # over service speed, for which the power law of the damping holds
 
@@ -33,40 +34,40 @@ class Coefficients(NamedTuple):
     The first 41 are identified, the rest, from `t_P` on, known beforehand.
     """
 
-    mx: float = 0.022
-    my: float = 0.223
-    Jz: float = 0.011
-    R_0: float = 0.022
-    X_vv: float = -0.040
-    X_vr: float = 0.002
-    X_rr: float = 0.011
-    X_vvvv: float = 0.771
-    Y_v: float = -0.315
-    Y_r: float = 0.083
-    Y_vvv: float = -1.607
-    Y_vvr: float = 0.379
-    Y_vrr: float = -0.391
-    Y_rrr: float = 0.008
-    N_v: float = -0.137
-    N_r: float = -0.049
-    N_vvv: float = -0.030
-    N_vvr: float = -0.294
-    N_vrr: float = 0.055
-    N_rrr: float = -0.013
+    mx: float = KVLCC2.mx
+    my: float = KVLCC2.my
+    Jz: float = KVLCC2.Jz
+    R_0: float = KVLCC2.R_0
+    X_vv: float = KVLCC2.X_vv
+    X_vr: float = KVLCC2.X_vr
+    X_rr: float = KVLCC2.X_rr
+    X_vvvv: float = KVLCC2.X_vvvv
+    Y_v: float = KVLCC2.Y_v
+    Y_r: float = KVLCC2.Y_r
+    Y_vvv: float = KVLCC2.Y_vvv
+    Y_vvr: float = KVLCC2.Y_vvr
+    Y_vrr: float = KVLCC2.Y_vrr
+    Y_rrr: float = KVLCC2.Y_rrr
+    N_v: float = KVLCC2.N_v
+    N_r: float = KVLCC2.N_r
+    N_vvv: float = KVLCC2.N_vvv
+    N_vvr: float = KVLCC2.N_vvr
+    N_vrr: float = KVLCC2.N_vrr
+    N_rrr: float = KVLCC2.N_rrr
     thrust: float = 1.0  # factor on the open-water thrust coefficient
-    w_P0: float = 0.40
-    C_1: float = 2.0
-    C_2: float = 1.35  # mean of the sides,
-    C_2_side: float = 0.25  # half the difference, starboard less port
-    t_R: float = 0.387
-    a_H: float = 0.312
-    x_H: float = -0.464
-    l_R: float = -0.710
-    gamma_R: float = 0.5175  # mean of the sides,
-    gamma_R_side: float = 0.1225  # half the difference, beta_R > 0 less beta_R < 0
-    epsilon: float = 1.09
-    kappa: float = 0.50
-    f_alpha: float = 2.747
+    w_P0: float = KVLCC2.w_P0
+    C_1: float = KVLCC2.C_1
+    C_2: float = 0.5 * (KVLCC2.C_2_starboard + KVLCC2.C_2_port)  # mean of the sides
+    C_2_side: float = 0.5 * (KVLCC2.C_2_starboard - KVLCC2.C_2_port)  # half of starboard less port
+    t_R: float = KVLCC2.t_R
+    a_H: float = KVLCC2.a_H
+    x_H: float = KVLCC2.x_H
+    l_R: float = KVLCC2.l_R
+    gamma_R: float = 0.5 * (KVLCC2.gamma_plus + KVLCC2.gamma_minus)  # mean for beta_R > 0 and < 0
+    gamma_R_side: float = 0.5 * (KVLCC2.gamma_plus - KVLCC2.gamma_minus)  # half the difference
+    epsilon: float = KVLCC2.epsilon
+    kappa: float = KVLCC2.kappa
+    f_alpha: float = KVLCC2.f_alpha
     delta_0: float = 0.0  # rad, added to the rudder angle
     Y_0: float = 0.0
     N_0: float = 0.0
@@ -75,21 +76,21 @@ class Coefficients(NamedTuple):
     N_absr: float = 0.0  # by |r'|: damping that differs to the two sides
     N_rr: float = 0.0
     # not identified
-    t_P: float = 0.220
-    x_P: float = -0.48
-    x_R: float = -0.5
-    k_0: float = 0.2931
-    k_1: float = -0.2753
-    k_2: float = -0.1385
+    t_P: float = KVLCC2.t_P
+    x_P: float = KVLCC2.x_P
+    x_R: float = KVLCC2.x_R
+    k_0: float = KVLCC2.k_0
+    k_1: float = KVLCC2.k_1
+    k_2: float = KVLCC2.k_2
     nD_U0: float = 2.171283  # n D_P / U0 at service speed
     # dimensions, from the particulars
-    d: float = 0.46  # m
-    volume: float = 3.27  # m^3
-    xG: float = 0.25  # m forward of midship
-    gyradius: float = 1.75  # m
-    D_P: float = 0.216  # m
-    A_R: float = 0.0539  # m^2, all rudders
-    eta: float = 0.216 / 0.345  # diameter of the propeller by span of the rudder in its race
+    d: float = KVLCC2.d  # m
+    volume: float = KVLCC2.volume  # m^3
+    xG: float = KVLCC2.xG  # m forward of midship
+    gyradius: float = 0.25 * KVLCC2.L  # m
+    D_P: float = KVLCC2.D_P  # m
+    A_R: float = KVLCC2.A_R  # m^2, all rudders
+    eta: float = KVLCC2.D_P / KVLCC2.H_R  # diameter of the propeller by span of the rudder in its race
     propellers: float = 1.0
 
 
@@ -216,6 +217,6 @@ SHIP = MMGEquations(
     MMG,
     kvlcc2.SHIP.source + "; general form",
     Coefficients, accelerations,
-    replace(kvlcc2.SHIP.particulars, rudder_aspect_ratio=0.345**2 / 0.0539),
+    replace(kvlcc2.SHIP.particulars, rudder_aspect_ratio=KVLCC2.H_R**2 / KVLCC2.A_R),
     kvlcc2.SHIP.steering, service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
 )  # fmt: skip
