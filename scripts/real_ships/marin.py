@@ -16,7 +16,7 @@ from real_ships.hsva import RUNS as HSVA_RUNS
 from real_ships.hsva import SHIP as HSVA
 from real_ships.measures import MEASURES, error_cells, mean_errors, turn_cells, turns, zigzag_errors
 from real_ships.recipe import REFERENCE, STRENGTHS, STRUCTURE, chosen_strength, known, pulled, refined
-from real_ships.section import Section, number, table
+from real_ships.section import Section, headings, number, table
 from shipgym.ships import ShipModel
 from shipgym.ships.scaling import scale_model
 from shipgym.trials.trial import Trial
@@ -115,13 +115,8 @@ def painter(models_: dict[str, ShipModel], runs: dict[str, Trial]) -> Callable[[
     def paint(figure: Any) -> None:
         axes: Sequence[Any] = figure.subplots(1, 3, width_ratios=(1.2, 1.2, 1.0))
         for axis, name in zip(axes, ("zz_10_m", "zz_20_m"), strict=False):
-            trial = runs[name]
-            axis.plot(trial.t, np.degrees(trial["psi"]), "k", lw=1.2, label="measured")
-            for label, model in models_.items():
-                prediction = predict(model, trial)
-                if prediction is not None:
-                    axis.plot(prediction.t, np.degrees(prediction["psi"]), lw=0.8, label=label)
-            axis.set(title=f"{name}, predicted", xlabel="t, s", ylabel="heading, deg")
+            predictions = {label: predict(model, runs[name]) for label, model in models_.items()}
+            headings(axis, runs[name], predictions, f"{name}, predicted")
             axis.set_ylim(-60.0, 60.0)
         axes[0].legend(fontsize=5.0)
         _circles(axes[2], models_)

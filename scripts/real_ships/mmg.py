@@ -17,7 +17,7 @@ from real_ships.hsva import SHIP as HSVA
 from real_ships.marin import SHIP as MARIN
 from real_ships.marin import full_scale
 from real_ships.measures import DURATION_LENGTHS, MEASURES, Floats, mean_errors, zigzag_errors
-from real_ships.section import Section, number, table
+from real_ships.section import Section, headings, number, table
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_circle, turning_indices, zigzag_indices
 from shipgym.ships import ShipModel
@@ -180,13 +180,8 @@ def painter(
     def paint(figure: Any) -> None:
         axes: Sequence[Any] = figure.subplots(1, 3, width_ratios=(1.2, 1.2, 1.0))
         for axis, name in zip(axes, OTHERS[1:], strict=False):
-            trial = hsva.runs[name]
-            axis.plot(trial.t, np.degrees(trial["psi"]), "k", lw=1.2, label="measured")
-            for label, model in models.items():
-                sailed = closed_loop(model, trial)
-                if sailed is not None:
-                    axis.plot(sailed.t, np.degrees(sailed["psi"]), lw=0.8, label=label)
-            axis.set(title=f"{name}, reversed as measured", xlabel="t, s", ylabel="heading, deg")
+            runs = {label: closed_loop(model, hsva.runs[name]) for label, model in models.items()}
+            headings(axis, hsva.runs[name], runs, f"{name}, reversed as measured")
         axes[0].legend(fontsize=5.0)
         for k, model in enumerate(large.values()):
             ship = replace(model, covariance=None).particulars

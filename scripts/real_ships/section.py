@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+
+from shipgym import Trial
 
 
 @dataclass(frozen=True)
@@ -35,6 +39,15 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def number(value: float | None, digits: int = 3) -> str:
     """A number for a table; a dash where there is none."""
     return "-" if value is None or value != value else f"{value:.{digits}f}"
+
+
+def headings(axis: Any, trial: Trial, predictions: Mapping[str, Trial | None], title: str) -> None:
+    """A trial's heading and what models predict of it, by label, on an axis of matplotlib."""
+    axis.plot(trial.t, np.degrees(trial["psi"]), "k", lw=1.2, label="measured")
+    for label, predicted in predictions.items():
+        if predicted is not None:
+            axis.plot(predicted.t, np.degrees(predicted["psi"]), lw=0.8, label=label)
+    axis.set(title=title, xlabel="t, s", ylabel="heading, deg")
 
 
 def marks(case: str) -> tuple[str, str]:
