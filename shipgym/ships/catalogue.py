@@ -146,7 +146,7 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
     ship = REFERENCE_SHIPS[name]() if name in REFERENCE_SHIPS else None
     if ship is None or ship.particulars.length != known.particulars.length:
         raise InputError(
-            f"model {known.name!r}: provenance.truth {name!r} found, expected the reference ship of this size "
-            "behind its trials, as 'mariner-tls-svm' names it; evaluate on a ship that you name yourself"
+            f"model {known.name!r}: provenance.truth {name!r} found, expected the reference ship of her "
+            "size behind the trials, as 'mariner-tls-svm' names it; evaluate on a ship that you name yourself"
         )
     return ship

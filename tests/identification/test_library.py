@@ -63,8 +63,7 @@ def test_it_is_the_default_of_the_environment():
 @pytest.mark.parametrize("name", ["kvlcc2-rm-svm", "kvlcc2-nomoto"])
 def test_kvlcc2_is_what_her_virtual_sea_trials_give(script, name):
     """A search for insensitive bands may end a mesh size off where rounding differs."""
-    make = next(make for make in script.MODELS if make.__name__ == name.replace("-", "_"))
-    result, shipped = make(), shipgym.load_model(name)
+    result, shipped = script.MODELS[name].identify(name), shipgym.load_model(name)
     assert result.model.name == name
     assert result.stable
     assert off_in_standard_errors(result.model, shipped) < 0.1
@@ -131,7 +130,7 @@ def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
 @pytest.mark.parametrize("name", ["mariner-nomoto", "container-abc-lssvr", "container-nomoto"])
 def test_the_container_ship_and_nomotos_forms_are_what_their_trials_give(script, name):
     """A search for C may end a step off where rounding differs."""
-    result = next(make for make in script.MODELS if make.__name__ == name.replace("-", "_"))()
+    result = script.MODELS[name].identify(name)
     shipped = shipgym.load_model(name)
     assert result.model.name == name
     assert result.stable
