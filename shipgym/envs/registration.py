@@ -18,15 +18,15 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
 }
 TASKS = ("CourseKeeping", "PathFollowing")
-#: Identified models that are the defaults of ids of version 1, by other methods or of other ships than the
-#: others. Ids of version 0 keep the ships that they have; that of course keeping is identified anyway.
+#: Identified models that are the defaults of ids of version 1, most by a method or of a ship of their own.
+#: Ids of version 0 keep the ships that they have; that of course keeping is identified anyway.
 IDENTIFIED = {
     "shipgym/CourseKeepingShaft-v1": "kvlcc2-mmg",
     "shipgym/CourseKeepingRoll-v1": "container-4dof-output-error",
     "shipgym/PathFollowing-v1": "container-abc-lssvr",
     "shipgym/PathFollowingDiscrete-v1": "kvlcc2-tanker-rm-svm",
     "shipgym/PathFollowingShaft-v1": "tanker-tls-svm",
-    "shipgym/PathFollowingRoll-v1": "container-4dof-cv-lssvr",
+    "shipgym/PathFollowingRoll-v1": "container-4dof-output-error",
 }
 
 
