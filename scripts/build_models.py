@@ -207,8 +207,8 @@ def _overshoots(model: ShipModel, angle_deg: float, port: bool) -> np.ndarray:
     return np.array([found.overshoot_1_deg, found.overshoot_2_deg], dtype=float)
 
 
-def coverage(model: ShipModel) -> tuple[str, str]:
-    """How many true derivatives and indices lie inside a model's 95 % intervals."""
+def coverage(model: ShipModel) -> tuple[str, str, str]:
+    """How many true derivatives and indices lie inside a model's 95 % intervals, and draws that run away."""
     ship = shipgym.truth_of(model)
     deviations = np.sqrt(np.diag(model.covariance))
     alike = model.structure == ship.structure or (model.structure, ship.structure) == ("mmg", "kvlcc2")
@@ -217,15 +217,16 @@ def coverage(model: ShipModel) -> tuple[str, str]:
         for (name, value), deviation in zip(model.coefficients.items(), deviations, strict=True)
         if alike and name in ship.coefficients and deviation > 0.0
     ]
-    held = holds(index_intervals(model, DRAWS), true_indices(ship))
+    intervals = index_intervals(model, DRAWS)
+    held, lost = holds(intervals, true_indices(ship)), np.mean([one.ran_away for one in intervals.values()])
     known = f"{sum(inside)} of {len(inside)}" if inside else "-"
-    return known, f"{sum(held.values())} of {len(held)}"
+    return known, f"{sum(held.values())} of {len(held)}", f"{100.0 * lost:.0f}"
 
 
 def tables(names: Sequence[str]) -> None:
     """Print the rows of docs/identified_models.md: errors held out, and coverage."""
     print("| name | turns, % | overshoots held out, deg | 10/10 and 20/20, deg | factor | derivatives | "
-          "indices |\n| --- | --- | --- | --- | --- | --- | --- |")  # fmt: skip
+          "indices | draws run away, % |\n| --- | --- | --- | --- | --- | --- | --- | --- |")  # fmt: skip
     for name in names:
         model = shipgym.load_model(name)
         turn, *overshoots = held_out_errors(model, shipgym.truth_of(model))
