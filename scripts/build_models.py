@@ -3,6 +3,7 @@
     python scripts/build_models.py [name ...]      by default all, into shipgym/ships/library
     python scripts/build_models.py --check         compare with what is there; writes nothing
     python scripts/build_models.py --tables        only print the tables of docs/identified_models.md
+    python scripts/build_models.py --candidates    what was looked at to choose, of models rejected too
 
 What the models are compared with in these tables, turning circles at 35 degrees and zigzags 15/15 and 25/25,
 is in no model's trials. Trials, structures and methods of the models from `kvlcc2-mmg` on were chosen by
@@ -46,7 +47,9 @@ CONTAINER_ZIGZAGS = ((10, 10, False), (20, 20, False), (20, 10, True), (35, 30, 
 HARD = {"container": ((35, 30, True),), "tanker": ((35, 30, True),)}
 TURNS_DEG = (20, -20)
 SHAFT_STEPS_DEG = (5, -15)  # rudder held while the shaft speed changes, half to 1.1 of that of service
-HELD_OUT_TURNS_DEG, HELD_OUT_ZIGZAGS_DEG, IMO_ZIGZAGS_DEG = (35, -35), (15, 25), (10, 20)
+#: What the models are compared with, and what was looked at to choose between candidates.
+COMPARED_DEG: tuple[Sequence[float], ...] = ((35,), (15, 25), (10, 20))
+CHOSEN_BY_DEG: tuple[Sequence[float], ...] = ((28,), (5,), (12, 17, 22))
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,9 @@ def two_zigzags() -> tuple[Trial, ...]:
 
 
 @cache
-def sea_trials(name: str, shaft_steps: bool = True) -> tuple[Trial, ...]:
+def sea_trials(
+    name: str, shaft_steps: bool = True, turns: bool = True, hard: bool = True
+) -> tuple[Trial, ...]:
     """Zigzags 10/10 and 20/20 and turns at 20 degrees to both sides, and steps of the shaft speed.
 
     A zigzag 35/30 besides for the ships of `HARD`.
@@ -105,11 +110,11 @@ def sea_trials(name: str, shaft_steps: bool = True) -> tuple[Trial, ...]:
     ship = shipgym.load_model(name)
     travel = ship.particulars["length"] / ship.particulars["speed"]
     duration = ZIGZAG_LENGTHS * travel
-    runs = _zigzags(name, (*IMO_ZIGZAGS, *HARD.get(name, ())))
+    runs = _zigzags(name, (*IMO_ZIGZAGS, *(HARD.get(name, ()) if hard else ())))
     for k, rudder in enumerate(SHAFT_STEPS_DEG if shaft_steps else ()):
         steps = shaft_speed_steps(ship, seed=7 + k, rudder_deg=rudder, duration=duration, dt=STEP)
         runs.append(steps.with_(name=f"shaft speed steps at {rudder} deg"))
-    for rudder in TURNS_DEG:
+    for rudder in TURNS_DEG if turns else ():
         turn = turning_circle(ship, rudder, TURN_LENGTHS * travel, STEP)
         runs.append(turn.with_(name=f"turn at {rudder} deg"))
     return _logged(runs, 100)
@@ -166,6 +171,35 @@ MODELS: dict[str, Recipe] = {
     "container-two-zigzags": Recipe("container", two_zigzags),
 }  # fmt: skip
 
+ON_TANKER = {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"}
+ON_KVLCC2 = {**ON_TANKER, "reference_model": "kvlcc2"}
+#: What did not become a model, for the page.
+REJECTED: dict[str, Recipe] = {
+    "tanker, zigzags": Recipe(
+        "tanker", lambda: sea_trials("tanker", turns=False, hard=False), {"structure": "cubic"}, shaft=True
+    ),
+    "tanker, zigzags and turns": Recipe(
+        "tanker", lambda: sea_trials("tanker", hard=False), {"structure": "cubic"}, shaft=True
+    ),
+    "mariner on tanker": Recipe("mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_TANKER),
+    "mariner on tanker, kernel": Recipe(
+        "mariner", lambda: sea_trials("mariner", shaft_steps=False), {**ON_TANKER, "kernel": "rbf"}
+    ),
+    "mariner on kvlcc2": Recipe(
+        "mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_KVLCC2
+    ),
+    "mariner on kvlcc2, kernel": Recipe(
+        "mariner", lambda: sea_trials("mariner", shaft_steps=False),
+        {**ON_KVLCC2, "kernel": "rbf"},
+    ),
+    "kvlcc2 on tanker, linear": Recipe(
+        "kvlcc2", lambda: sea_trials("kvlcc2", shaft_steps=False), ON_TANKER, shaft=True
+    ),
+    "container, mmg4dof, regression alone": Recipe(
+        "container", lambda: sea_trials("container"), {"structure": "mmg4dof"}, shaft=True
+    ),
+}  # fmt: skip
+
 
 def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
     """Largest difference of a coefficient from the shipped one, in its standard errors."""
@@ -174,14 +208,17 @@ def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
     return float(np.max(np.abs(differences) / np.where(errors > 0.0, errors, 1.0)))
 
 
-def held_out_errors(model: ShipModel, ship: ShipModel) -> tuple[float, float, float]:
-    """Largest errors in turning circles at 35 degrees, in per cent, and of overshoots, in degrees.
+def errors(model: ShipModel, turns_deg: Sequence[float], *zigzags_deg: Sequence[float]) -> tuple[float, ...]:
+    """Largest errors of a model beside the ship behind it, in turning circles to both sides and in zigzags.
 
-    The overshoots are those of zigzags 15/15 and 25/25, in no model's trials, and of 10/10 and 20/20.
+    Of advance and tactical diameter in per cent; then, for each set of angles, of the first two overshoots in
+    degrees.
     """
+    ship = shipgym.truth_of(model)
     turns = [
-        100.0 * np.abs(_turn(model, rudder) / _turn(ship, rudder) - 1.0).max()
-        for rudder in HELD_OUT_TURNS_DEG
+        100.0 * np.abs(_turn(model, side * rudder) / _turn(ship, side * rudder) - 1.0).max()
+        for rudder in turns_deg
+        for side in (1.0, -1.0)
     ]
     overshoots = [
         max(
@@ -189,7 +226,7 @@ def held_out_errors(model: ShipModel, ship: ShipModel) -> tuple[float, float, fl
             for angle in angles
             for port in (False, True)
         )
-        for angles in (HELD_OUT_ZIGZAGS_DEG, IMO_ZIGZAGS_DEG)
+        for angles in zigzags_deg
     ]
     return max(turns), *overshoots
 
@@ -229,10 +266,25 @@ def tables(names: Sequence[str]) -> None:
           "indices | draws run away, % |\n| --- | --- | --- | --- | --- | --- | --- | --- |")  # fmt: skip
     for name in names:
         model = shipgym.load_model(name)
-        turn, *overshoots = held_out_errors(model, shipgym.truth_of(model))
+        turn, *overshoots = errors(model, *COMPARED_DEG)
         factor = (model.provenance or {})["model_error"]["factor"]
         numbers = " | ".join(f"{value:.2f}" for value in (*overshoots, factor))
         print(f"| `{name}` | {turn:.1f} | {numbers} | " + " | ".join(coverage(model)) + " |", flush=True)
+
+
+def candidates() -> None:
+    """Print by what was chosen, and what the candidates that were not chosen are like."""
+    print("| candidate | turns at 28, at 35, % | 5/5, deg | 12/12 to 22/22, deg | holds her course |\n"
+          "| --- | --- | --- | --- | --- |")  # fmt: skip
+    models = {name: shipgym.load_model(name) for name in list(MODELS)[list(MODELS).index("kvlcc2-mmg") :]}
+    for name, recipe in REJECTED.items():
+        models[f"{name} (rejected)"] = recipe.identify(name).model
+    for name, model in models.items():
+        turn, *overshoots = errors(model, *CHOSEN_BY_DEG)
+        hard = errors(model, COMPARED_DEG[0])[0]
+        stable = shipgym.straight_line_stability(model).stable
+        print(f"| {name} | {turn:.1f}, {hard:.1f} | {overshoots[0]:.2f} | {overshoots[1]:.2f} | "
+              f"{'yes' if stable else 'no'} |", flush=True)  # fmt: skip
 
 
 def main() -> int:
@@ -241,7 +293,11 @@ def main() -> int:
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(MODELS))
     parser.add_argument("--check", action="store_true", help="compare with the library, write nothing")
     parser.add_argument("--tables", action="store_true", help="print the tables only")
+    parser.add_argument("--candidates", action="store_true", help="print what was chosen by")
     given = parser.parse_args()
+    if given.candidates:
+        candidates()
+        return 0
     names, differ = given.names or list(MODELS), []
     for name in names if not given.tables else ():
         result, path = MODELS[name].identify(name), LIBRARY / f"{name}.json"
