@@ -98,6 +98,10 @@ def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _make(env_id: str, options: dict[str, Any]) -> None:
+    import warnings
+
     import gymnasium
 
-    gymnasium.make(env_id, **options).close()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of ids that have a newer version
+        gymnasium.make(env_id, **options).close()
