@@ -31,10 +31,12 @@ C = {"u": 4e6, "v": 6e8, "r": 6e8}
 SEED = 2015
 WITHIN = 1.0  # aim: error of a coefficient, %
 OF_SPAN = 0.1  # aim: rms error of a predicted trajectory, % of its span
+ACCEPTABLE, CLOSE = 15.0, 5.0  # %: error of a derivative; rms error of a predicted channel, of its span
 LINEAR = ("X_u", "Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d")
+LARGEST = f"largest error of {', '.join(LINEAR)}, %"
+COUNT = f"of the {40 - len(LINEAR)} other derivatives those within {ACCEPTABLE:g} %"
 RANKS = "rank correlation of a derivative's error with its effect on the 15/15"
 STRUCTURES = {"integral": "integral", "euler": "Euler"}
-ACCEPTABLE, CLOSE = 15.0, 5.0  # %: error of a derivative; rms error of a predicted channel, of its span
 
 #: Errors of Tables 2 to 7, %, in the order of the structure's terms (the printed column heads of the second
 #: rows of Tables 3, 4, 6 and 7 repeat others by mistake; the values show which terms they are).
@@ -200,16 +202,16 @@ def summary_rows() -> Iterator[Row]:
     for samples, structure in STRUCTURES.items():
         printed = {name: value for q in FORCES for name, value in printed_errors(samples, q).items()}
         found, best = errors(as_printed(samples)), errors(at_best())
-        others = [name for name in printed if name not in LINEAR]
-        large = [max(values[name] for name in LINEAR) for values in (printed, found, best)]
-        yield Row("Section 4", f"{structure}: largest error of {', '.join(LINEAR)}, %", *large)
-        good = [sum(values[name] <= ACCEPTABLE for name in others) for values in (printed, found, best)]
-        yield Row(
-            "Section 4", f"{structure}: of the {len(others)} other derivatives those within {ACCEPTABLE:g} %",
-            *map(float, good),
-        )  # fmt: skip
-        worst = [max(values.values()) for values in (printed, found, best)]
-        yield Row("Section 4", f"{structure}: largest error of all, %", *worst)
+        measures: dict[str, Callable[[Mapping[str, float]], float]] = {
+            LARGEST: lambda values: max(values[name] for name in LINEAR),
+            COUNT: lambda values: sum(
+                error <= ACCEPTABLE for name, error in values.items() if name not in LINEAR
+            ),
+            "largest error of all, %": lambda values: max(values.values()),
+        }
+        for what, measure in measures.items():
+            values = [float(measure(one)) for one in (printed, found, best)]
+            yield Row("Section 4", f"{structure}: {what}", values[0], values[1], values[2])
     effects = sensitivity(load_model("mariner"), lambda ship: zigzag(ship, 15, 15, duration=500, dt=0.1))
     for samples, structure in STRUCTURES.items():
         found = errors(as_printed(samples))
@@ -232,19 +234,17 @@ def _summary(structure: str, what: str) -> str:
     return f"Section 4: {structure}: {what}"
 
 
-_LARGEST = f"largest error of {', '.join(LINEAR)}, %"
-_COUNT = f"of the {40 - len(LINEAR)} other derivatives those within {ACCEPTABLE:g} %"
 _ZIGZAG, _TURN = "25/25 zigzag, psi: rms error, % of span", "30 deg turning circle, y: rms error, % of span"
 CONCLUSIONS = (
     Conclusion(
         "The linear derivatives are found accurately by either sample structure",
-        tuple(_summary(structure, _LARGEST) for structure in STRUCTURES.values()),
+        tuple(_summary(structure, LARGEST) for structure in STRUCTURES.values()),
         lambda *found: all(row.as_paper <= ACCEPTABLE for row in found),
         f"accurate: within {ACCEPTABLE:g} %, as the printed ones are",
     ),
     Conclusion(
         "Most of the others are acceptable by the integral structure, and badly off by Euler's",
-        tuple(_summary(structure, _COUNT) for structure in STRUCTURES.values()),
+        tuple(_summary(structure, COUNT) for structure in STRUCTURES.values()),
         lambda integral, euler: integral.as_paper > 16 > euler.as_paper,
         f"most: more than 16 of 33; acceptable: within {ACCEPTABLE:g} %",
     ),

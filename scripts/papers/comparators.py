@@ -196,10 +196,10 @@ def tanker_networks() -> tuple[Network, ...]:
 def turned(network: Network, turn: Trial) -> Trial:
     """A turn with positions, as a network steps it under the same rudder."""
     found = network.run(turn, ("u", "v", "r"))
-    psi = cumulative_trapezoid(found["r"], turn.t, initial=0.0) + turn["psi"][0]
+    psi = cumulative_trapezoid(found["r"], turn.t, initial=0) + turn["psi"][0]
     u, v = found["u"], found["v"]
     north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
-    x, y = (cumulative_trapezoid(speed, turn.t, initial=0.0) for speed in (north, east))
+    x, y = (cumulative_trapezoid(speed, turn.t, initial=0) for speed in (north, east))
     channels = dict(turn.channels) | found | {"psi": psi, "x": x + turn["x"][0], "y": y + turn["y"][0]}
     return Trial(turn.t, channels, name=turn.name, kind=turn.kind, length=turn.length)
 

@@ -25,7 +25,7 @@ DASHED = {"ls": "--"}
 
 def cao(axes: Any) -> None:
     """Heading of the zigzag and track of the turn."""
-    models = {
+    models: dict[str, tuple[Any, Any]] = {
         "Mariner": (load_model("mariner"), TRUTH),
         "Euler": (cao2015.as_printed("euler"), OTHER),
         "integral, trapezoid": (cao2015.as_printed("integral"), THEIRS),
@@ -79,7 +79,7 @@ def container(axes: Any) -> None:
     seven, four = container_ship.as_printed("ABC"), steering_forms.as_printed(steering_forms.CHOSEN)
     best = predict(container_ship.best_steering(), trial)
     assert best is not None
-    runs = {
+    runs: dict[str, tuple[Any, Any]] = {
         "container ship": (trial, TRUTH),
         "seven terms, ABC": (fits.steer(seven["v"], seven["r"], trial), OTHER),
         "chosen four, ABC": (fits.steer(four["v"], four["r"], trial), THEIRS),
@@ -131,7 +131,7 @@ def nomoto(axes: Any) -> None:
 def turns(axes: Any) -> None:
     """Tracks of the turns to both sides."""
     target = mei2019_targets.virtual()
-    models = {
+    models: dict[str, tuple[Any, Any]] = {
         "bare tanker": (target.bare(mei2019_targets.TANKER), OTHER),
         "RM-SVM as the paper": (mei2019_targets.papers_way(target).model, THEIRS),
         "RM-SVM at best": (mei2019_targets.our_way(target, mei2019_targets.same_hull()).model, OURS | DASHED),

@@ -110,7 +110,7 @@ def _section(name: str, rows: Sequence[Row]) -> str:
         *(
             line
             for file, caption in paper.figures
-            for line in (f"![{caption}](images/{file})", "", f"*{caption}*", "")
+            for line in (f"![{name}](images/{file})", "", f"*{caption}*", "")
         ),
         *_table(paper, rows),
     ]
