@@ -23,7 +23,7 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_mar
 @answered
 def main(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="A paper's short name, or requirements.")
+        str, typer.Argument(metavar="PAPER", help="A paper's short name, comparators or requirements.")
     ] = ALL,
     markdown: Annotated[
         Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")

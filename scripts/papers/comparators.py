@@ -325,7 +325,7 @@ PAPER = Paper(
     "comparators",
     "Two comparators on the papers' cases",
     "An extended Kalman filter that carries the coefficients as states, and a neural network of two hidden "
-    f"layers of {HIDDEN[0]}; *at best* is ours. Lower is better in every row, theirs where it is.",
+    f"layers of {HIDDEN[0]}; *at best* is ours. Every row is an error: the smaller is the better.",
     rows,
     conclusions=CONCLUSIONS,
     ours="the comparator",

@@ -89,22 +89,44 @@ def terminal_table(name: str, rows: Sequence[Row]) -> Table:
 
 def page(results: Mapping[str, Sequence[Row]]) -> str:
     """The page of the documentation, Markdown."""
-    return "\n".join([INTRODUCTION, *(_section(name, rows) for name, rows in results.items())])
+    sections = (_section(name, rows) for name, rows in results.items())
+    return "\n".join([INTRODUCTION, *_overview(results), *sections])
+
+
+def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
+    """Verdicts, agreement and aims of each paper, a line each."""
+    words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
+    lines = ["| | " + " | ".join((*words, "agree with print", "aims met")) + " |"]
+    lines.append("| --- " + "| ---: " * (len(words) + 2) + "|")
+    for name, rows in results.items():
+        verdicts = [one.verdict(rows) for one in get_paper(name).conclusions]
+        counts = [str(verdicts.count(word)) if verdicts else "" for word in words]
+        cells = (*counts, _share(*_agreement(rows)), _share(*aims(rows)))
+        lines.append(f"| [{name}](#{name}) | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def _agreement(rows: Sequence[Row]) -> tuple[int, int]:
+    """How many rows agree with print, and how many can."""
+    agree = [row.agrees for row in rows if row.agrees is not None]
+    return sum(agree), len(agree)
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part} of {whole}" if whole else ""
 
 
 def _section(name: str, rows: Sequence[Row]) -> str:
     paper = get_paper(name)
-    met, kept = aims(rows)
-    agree = [row.agrees for row in rows if row.agrees is not None]
-    counts = f"Aims met: {met} of {kept}. " * bool(kept)
-    counts += f"Agree with print: {sum(agree)} of {len(agree)} rows. " * bool(agree)
+    counts = (("Aims met", aims(rows)), ("Agree with print", _agreement(rows)))
+    told = "".join(f"{word}: {_share(*count)}. " for word, count in counts if count[1])
     lines = [
         f"## {name}",
         "",
         f"{paper.citation}. {paper.what}",
         "",
         *_requirements(paper.requirements),
-        f"{counts}`python scripts/reproduce.py {name}`",
+        f"{told}`python scripts/reproduce.py {name}`",
         "",
         *_conclusions(paper.conclusions, rows),
         *(

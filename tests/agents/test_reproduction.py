@@ -4,6 +4,7 @@ from pathlib import Path
 import pytest
 import reproduce
 from papers import CASES, PAPERS, Conclusion, Row, get_paper
+from papers.figures import FIGURES
 from papers.page import missed, page, papers_of
 from papers.requirements import REQUIREMENTS
 from papers.row import aims
@@ -118,3 +119,17 @@ def test_a_note_stands_once_below_the_table_and_is_pointed_at():
     cells = [line.split("|")[-2].strip() for line in lines if line.startswith("| Table 1")]
     assert cells == ["1", "", "1"]
     assert lines.count("1. x|y") == 1
+
+
+def test_every_figure_is_drawn_and_lies_beside_the_page():
+    named = [file for name in CASES for file, _ in get_paper(name).figures]
+    assert sorted(named) == sorted(FIGURES)
+    images = Path(__file__).parents[2] / "docs" / "images"
+    assert all(0 < (images / file).stat().st_size < 150_000 for file in named)
+
+
+def test_the_page_begins_with_what_became_of_each_paper():
+    shown = [Row("Table 1", "K", 1.0, 1.05, 0.3, "", True), Row("Table 2", "K", 1.0, 2.0, 0.3, "", True)]
+    lines = page({PAPERS[0]: shown}).splitlines()
+    untestable = len(get_paper(PAPERS[0]).conclusions)
+    assert f"| [cao2015](#cao2015) | 0 | 0 | {untestable} | 1 of 2 | 1 of 1 |" in lines
