@@ -22,30 +22,12 @@ from shipgym.engine.mathematics import arctan2, clip, pick, sin_cos, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import InputError
 from shipgym.tasks.contract import (
-    NO_NUMBERS,
-    Flag,
-    Interval,
-    Numbers,
-    Random,
-    Readings,
-    Seen,
-    Setting,
-    at_service_speed,
-    drawn,
-)
+    NO_NUMBERS, Flag, Interval, Numbers, Random, Readings, Seen, Setting, at_service_speed, drawn,
+)  # fmt: skip
 from shipgym.tasks.guidance import NO_TURN, Path
 from shipgym.tasks.steering import (
-    Extras,
-    Helm,
-    RudderWork,
-    SteeringReward,
-    Weights,
-    extras,
-    helm,
-    integrated,
-    steering_reward,
-    worked,
-)
+    Extras, Helm, RudderWork, SteeringReward, Weights, extras, helm, integrated, steering_reward, worked,
+)  # fmt: skip
 
 NAME = "PathFollowing-v1"
 REPORTED = (
@@ -105,15 +87,15 @@ class Settings(NamedTuple):
     waypoints: Waypoints = NO_NUMBERS
 
 
-class State(NamedTuple):
-    """The leg in force and the two turns ahead, and how far the ship has come; ways along the path, m."""
+class Leg(NamedTuple):
+    """The leg that the ship is on, and the two turns ahead; ways are those along the path, m."""
 
-    leg: float  # number of its first waypoint
+    number: float  # of its first waypoint
     north: float  # m, that waypoint
     east: float
-    cosine: float  # direction of the leg
+    cosine: float  # its direction
     sine: float
-    leg_course: float  # rad
+    course: float  # rad
     before: float  # way at the first waypoint, as the leg continued would have it
     turn_at: float  # way at which the next turn begins; the end of the path if there is none
     turn: float  # rad, positive to starboard; 0 if there is none
@@ -121,11 +103,17 @@ class State(NamedTuple):
     half_sine: float
     second_at: float  # way at which the turn after that begins
     second_turn: float  # rad
+
+
+class State(NamedTuple):
+    """Where the ship is on her path, and what her rudder has done."""
+
+    leg: Leg
     course: float  # rad, to steer
     integral: float  # of the heading error, rad s
     heading_error: float  # rad
     cross_track: float  # m, positive to starboard of the path
-    distance_made_good: float  # m
+    distance_made_good: float  # m, along the path
     success: Flag  # whether the end of the path is reached
     in_corridor: Flag
     grounded: Flag
@@ -241,13 +229,12 @@ def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers) -> int:
     return draws
 
 
-def start(leg: Any, ship: Ship, settings: Any, random: Random, draw: int) -> Motion:
+def start(leg: Any, course: float, ship: Ship, settings: Any, random: Random, draw: int) -> Motion:
     """Near the first waypoint and about along a leg, by two random numbers from a given one on."""
     aside = settings.corridor * ship.length * drawn(random, draw, -START_OFFSET, START_OFFSET)
     askew = drawn(random, draw + 1, -START_HEADING, START_HEADING)
-    return at_service_speed(
-        leg.north - aside * leg.sine, leg.east + aside * leg.cosine, leg.leg_course + askew, ship
-    )
+    x, y = leg.north - aside * leg.sine, leg.east + aside * leg.cosine
+    return at_service_speed(x, y, course + askew, ship)
 
 
 def between(number: int, other: int, plan: Numbers) -> tuple[float, float]:
@@ -272,51 +259,46 @@ def next_turn(number: int, plan: Numbers) -> int:
     return number
 
 
-def leg_from(number: int, way: float, radius: float, plan: Numbers) -> State:
-    """The leg behind the turn at a waypoint, which is over after so much way, with nothing sailed on it."""
+def leg_from(number: int, way: float, radius: float, plan: Numbers) -> Leg:
+    """The leg behind the turn at a waypoint, which is over after so much way."""
     first = next_turn(number, plan)
     second = next_turn(first, plan)
     turn, second_turn = change_of_course(first, plan), change_of_course(second, plan)
+    cut, second_cut = radius * tan(0.5 * fabs(turn)), radius * tan(0.5 * fabs(second_turn))
     length, course = between(number, first, plan)
-    first_cut, second_cut = radius * tan(0.5 * fabs(turn)), radius * tan(0.5 * fabs(second_turn))
     before = way - radius * tan(0.5 * fabs(change_of_course(number, plan)))
-    at = before + length - first_cut
-    second_at = at + radius * fabs(turn) + between(first, second, plan)[0] - first_cut - second_cut
+    at = before + length - cut
+    second_at = at + radius * fabs(turn) + between(first, second, plan)[0] - cut - second_cut
     sine, cosine = sin_cos(course)
-    return State(
+    return Leg(
         float(number), plan[2 * number], plan[2 * number + 1], cosine, sine, course, before, at, turn,
-        cos(0.5 * turn), sin(0.5 * fabs(turn)), second_at, second_turn, course, 0.0, 0.0, 0.0, way,
-        0.0, 1.0, 0.0, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0,
+        cos(0.5 * turn), sin(0.5 * fabs(turn)), second_at, second_turn,
     )  # fmt: skip
 
 
-def fix(x: float, y: float, state: State, ship: Ship, settings: Settings) -> Fix:
+def fix(x: float, y: float, leg: Leg, ship: Ship, settings: Settings) -> Fix:
     """Where a position lies on the leg or the turn behind it, and the course to steer.
 
     That is the course to the point of the path a lookahead distance ahead: of the path half as far ahead,
     which is the direction of a chord of the arc, less the angle by which the ship is to come back.
     """
     radius, lookahead = settings.turn_radius * ship.length, settings.lookahead * ship.length
-    north, east = x - state.north, y - state.east
-    along, aside = north * state.cosine + east * state.sine, east * state.cosine - north * state.sine
+    north, east = x - leg.north, y - leg.east
+    along, aside = north * leg.cosine + east * leg.sine, east * leg.cosine - north * leg.sine
     # the ship from the centre of the turn: ahead of where it begins, and towards the leg
-    ahead, side = along - (state.turn_at - state.before), copysign(1.0, state.turn)
+    ahead, side = along - (leg.turn_at - leg.before), copysign(1.0, leg.turn)
     outward = radius - side * aside
-    across = ahead * state.half_cosine - outward * state.half_sine  # of the direction to the arc's middle
-    middle = ahead * state.half_sine + outward * state.half_cosine
+    across = ahead * leg.half_cosine - outward * leg.half_sine  # of the direction to the arc's middle
+    middle = ahead * leg.half_sine + outward * leg.half_cosine
     reach = max(middle, INNERMOST * radius)
-    turned = 0.5 * fabs(state.turn) + arctan2(across, reach)
+    turned = 0.5 * fabs(leg.turn) + arctan2(across, reach)
     inside = radius - sqrt(across * across + reach * reach) + (reach - middle)
-    on_arc = (ahead > 0.0) & (state.turn != 0.0)
-    way = pick(on_arc, state.turn_at + radius * turned, state.before + along)
+    on_arc = (ahead > 0.0) & (leg.turn != 0.0)
+    way = pick(on_arc, leg.turn_at + radius * turned, leg.before + along)
     cross = pick(on_arc, side * inside, aside)
     half = way + 0.5 * lookahead
-    course = (
-        state.leg_course
-        + part_of(state.turn, half - state.turn_at, radius)
-        + part_of(state.second_turn, half - state.second_at, radius)
-        - arctan2(cross, lookahead)
-    )
+    course = leg.course + part_of(leg.turn, half - leg.turn_at, radius)
+    course += part_of(leg.second_turn, half - leg.second_at, radius) - arctan2(cross, lookahead)
     return Fix(way, cross, course, pick(on_arc, turned, 0.0))
 
 
@@ -329,25 +311,20 @@ def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tupl
     """Near the first waypoint and about along the first leg."""
     lay_path(ship, settings, random, plan)
     leg = leg_from(0, 0.0, settings.turn_radius * ship.length, plan)
-    motion = start(leg, ship, settings, random, START_DRAW)
-    return motion, on_leg(motion, leg, leg, ship, settings)
+    motion = start(leg, leg.course, ship, settings, random, START_DRAW)
+    at, work = fix(motion.x, motion.y, leg, ship, settings), RudderWork(0.0, 0.0, 0.0)
+    error = wrap(at.course - motion.psi)
+    return motion, State(leg, at.course, 0.0, error, at.cross, at.way, 0.0, 1.0, 0.0, work, 0.0, 0.0)
 
 
-def on_leg(motion: Motion, leg: State, so_far: State, ship: Ship, settings: Settings) -> State:
-    """A leg with the ship on it, and what is reported as it was so far."""
-    at = fix(motion.x, motion.y, leg, ship, settings)
-    return State(
-        leg.leg, leg.north, leg.east, leg.cosine, leg.sine, leg.leg_course, leg.before, leg.turn_at, leg.turn,
-        leg.half_cosine, leg.half_sine, leg.second_at, leg.second_turn, at.course, so_far.integral,
-        wrap(at.course - motion.psi), at.cross, at.way, so_far.success, so_far.in_corridor, so_far.grounded,
-        so_far.work, so_far.rudder_travel, so_far.reversals_per_minute,
-    )  # fmt: skip
+def turned_off(leg: Leg, way: float, ship: Ship, settings: Settings) -> bool:
+    """Whether the turn behind a leg is over."""
+    return (leg.turn != 0.0) & (way >= leg.turn_at + settings.turn_radius * ship.length * fabs(leg.turn))
 
 
 def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:
     """Whether the next turn is over."""
-    end = state.turn_at + settings.turn_radius * ship.length * fabs(state.turn)
-    return (state.turn != 0.0) & (state.distance_made_good >= end)
+    return turned_off(state.leg, state.distance_made_good, ship, settings)
 
 
 def on_event(
@@ -355,29 +332,34 @@ def on_event(
     plan: Numbers,
 ) -> State:  # fmt: skip
     """Go on to the leg on which the ship is now."""
-    radius = settings.turn_radius * ship.length
+    leg, way, radius = state.leg, state.distance_made_good, settings.turn_radius * ship.length
     for _ in range(len(plan) // 2):
-        if due(motion, state, interval, ship, settings):
-            number = min(max(0, int(state.leg)), len(plan) // 2 - 2)  # whatever a checkpoint holds
-            end = state.turn_at + radius * fabs(state.turn)
+        if turned_off(leg, way, ship, settings):
+            number = min(max(0, int(leg.number)), len(plan) // 2 - 2)  # whatever a checkpoint holds
+            end = leg.turn_at + radius * fabs(leg.turn)
             leg = leg_from(next_turn(number, plan), end, radius, plan)
-            state = on_leg(motion, leg, state, ship, settings)
-    return state
+            way = fix(motion.x, motion.y, leg, ship, settings).way
+    at = fix(motion.x, motion.y, leg, ship, settings)
+    return State(
+        leg, at.course, state.integral, wrap(at.course - motion.psi), at.cross, way, state.success,
+        state.in_corridor, state.grounded, state.work, state.rudder_travel, state.reversals_per_minute,
+    )  # fmt: skip
 
 
 def step(
     motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> tuple[State, Reward, bool, bool]:
     """Costs of being off the path and of making less way along it than at service speed, and the end."""
-    at = fix(motion.x, motion.y, state, ship, settings)
+    leg = state.leg
+    at = fix(motion.x, motion.y, leg, ship, settings)
     error = wrap(at.course - motion.psi)
     integral = integrated(state.integral, error, interval, ship, settings.weights)
-    last = state.turn == 0.0
-    sailed = pick(last, min(at.way, state.turn_at), at.way)
+    last = leg.turn == 0.0
+    sailed = pick(last, min(at.way, leg.turn_at), at.way)
     way = (sailed - state.distance_made_good) * (1.0 / interval.dt) / ship.scale_speed
     off = fabs(at.cross) / ship.length
     within, aground = off <= settings.corridor, off > settings.ground
-    arrived = last & (at.way >= state.turn_at) & within
+    arrived = last & (at.way >= leg.turn_at) & within
     travel = fabs(motion.delta - interval.rudder_before)
     work, reversed_now = worked(state.work, motion.delta, (pi / 180.0) * settings.reversal_deg)
 
@@ -391,9 +373,7 @@ def step(
         steering=steering_reward(motion, interval, ship, settings.weights),
     )
     after = State(
-        state.leg, state.north, state.east, state.cosine, state.sine, state.leg_course, state.before,
-        state.turn_at, state.turn, state.half_cosine, state.half_sine, state.second_at, state.second_turn,
-        at.course, integral, error, at.cross, sailed, pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0),
+        leg, at.course, integral, error, at.cross, sailed, pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0),
         pick(aground, 1.0, 0.0), work, state.rudder_travel + travel,
         60.0 * work.reversals / (interval.steps * interval.dt),
     )  # fmt: skip
@@ -418,17 +398,17 @@ def observe(
     readings: Readings, state: State, interval: Interval, ship: Ship, settings: Settings
 ) -> Observation:
     """The path from where the instruments show the ship, her course over ground, and two turns ahead."""
-    at = fix(readings.x, readings.y, state, ship, settings)
+    at = fix(readings.x, readings.y, state.leg, ship, settings)
     course_error_sin, course_error_cos = over_ground(at.course, readings, ship)
-    left = max(fabs(state.turn) - at.turned, 0.0)
+    left = max(fabs(state.leg.turn) - at.turned, 0.0)
     return Observation(
         helm=helm(at.course, state.integral, readings, interval, ship),
         cross_track=at.cross,
         course_error_sin=course_error_sin,
         course_error_cos=course_error_cos,
-        next_turn_distance=state.turn_at - at.way,
-        next_turn_angle=copysign(left, state.turn),
-        second_turn_distance=state.second_at - at.way,
-        second_turn_angle=state.second_turn,
+        next_turn_distance=state.leg.turn_at - at.way,
+        next_turn_angle=copysign(left, state.leg.turn),
+        second_turn_distance=state.leg.second_at - at.way,
+        second_turn_angle=state.leg.second_turn,
         extras=extras(readings, interval, ship),
     )

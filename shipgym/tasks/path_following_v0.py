@@ -20,34 +20,13 @@ from shipgym.engine.mathematics import arctan2, clip, pick, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import NO_NUMBERS, Flag, Interval, Numbers, Random, Readings, Seen, Setting
 from shipgym.tasks.path_following import (  # noqa: F401 - some are names of the contract
-    EPISODE_STEPS,
-    WORST_PROGRESS,
-    Corridor,
-    Ground,
-    LegLengths,
-    Legs,
-    Lookahead,
-    MaxTurn,
-    Range,
-    Waypoints,
-    lay_path,
-    listed,
-    over_ground,
-    plan_length,
-    start,
-    worst_cost,
+    EPISODE_STEPS, WORST_PROGRESS, Corridor, Ground, LegLengths, Legs, Lookahead, MaxTurn, Range,
+    Waypoints, lay_path, listed, over_ground, plan_length, start, worst_cost,
 )  # fmt: skip
 from shipgym.tasks.path_following import check_path as check  # noqa: F401
 from shipgym.tasks.steering import (
-    Extras,
-    Helm,
-    SteeringReward,
-    Weights,
-    extras,
-    helm,
-    integrated,
-    steering_reward,
-)
+    Extras, Helm, SteeringReward, Weights, extras, helm, integrated, steering_reward,
+)  # fmt: skip
 
 NAME = "PathFollowing"
 REPORTED = ("heading_error", "cross_track", "distance_made_good", "success", "in_corridor", "grounded")
@@ -152,7 +131,7 @@ def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tupl
     """Near the first waypoint and about along the first leg."""
     draws = lay_path(ship, settings, random, plan)
     leg = leg_from(0, 0.0, plan)
-    motion = start(leg, ship, settings, random, draws)
+    motion = start(leg, leg.leg_course, ship, settings, random, draws)
     return motion, on_leg(motion, leg, leg, 0.0, ship, settings)
 
 

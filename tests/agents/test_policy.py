@@ -159,9 +159,7 @@ def test_another_environment_is_refused_with_the_difference():
     ):
         path_policy().predict(SEEN)
     second = Task.of("PathFollowing-v1", corridor=0.5).observed(MARINER)
-    with pytest.raises(
-        InputError, match=r"with in shipgym/PathFollowing-v0: observation 11 is 'next_"
-    ):
+    with pytest.raises(InputError, match=r"with in shipgym/PathFollowing-v0: observation 11 is 'next_"):
         path_policy().check_fits([one.name for one in second], [one.scale for one in second])
     wider = path_following_task().observed(MARINER)
     with pytest.raises(InputError, match=r"scale of 'cross_track' is 160.9.*learned with 80.4"):

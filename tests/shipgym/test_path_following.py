@@ -15,9 +15,8 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.tasks import path_following
-from shipgym.tasks.contract import Interval
 from shipgym.tasks.guidance import Path, wrapped
-from shipgym.tasks.path_following import Settings, fix, leg_from
+from shipgym.tasks.path_following import Settings, State, fix, leg_from
 from shipgym.tasks.steering import RudderWork, worked
 from shipgym.tasks.task import Task
 
@@ -67,15 +66,21 @@ def test_dividing_a_leg_changes_nothing(path, cost):
     np.testing.assert_allclose(costs, costs[0], rtol=1e-6)
 
 
+def on_path(radius, plan):
+    """The state at the first waypoint."""
+    return State(leg_from(0, 0.0, radius, plan), *[0.0] * 8, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0)
+
+
 def followed(path, radius, places):
     """States of a ship that goes along a path, at some ways along it, and these ways."""
     line, plan = path.rounded(radius), path.waypoints.ravel()
     way = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     ways, asked = places * way[-1], Settings(turn_radius=radius / LENGTH)
-    states, state = [], leg_from(0, 0.0, radius, plan)
+    states, state = [], on_path(radius, plan)
     for one in ways:
-        motion = Motion(*(np.interp(one, way, column) for column in line.T), *[0.0] * 9)
-        state = path_following.on_leg(motion, state, state, SHIP, asked)
+        x, y = (np.interp(one, way, column) for column in line.T)
+        motion, at = Motion(x, y, *[0.0] * 9), fix(x, y, state.leg, SHIP, asked)
+        state = state._replace(distance_made_good=at.way)
         state = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
         states.append((state, motion))
     return states, ways, asked
@@ -95,7 +100,7 @@ def test_a_position_lies_where_the_rounded_path_is_nearest(turns, course, off):
     tangents = np.gradient([(motion.x, motion.y) for _, motion in states], axis=0)
     for (state, motion), way, (north, east) in zip(states, ways, tangents, strict=True):
         aside = off * radius * np.array([-east, north]) / np.hypot(north, east)
-        found = fix(motion.x + aside[0], motion.y + aside[1], state, SHIP, asked)
+        found = fix(motion.x + aside[0], motion.y + aside[1], state.leg, SHIP, asked)
         assert found.cross == pytest.approx(off * radius, abs=0.02 * radius)
         assert found.way == pytest.approx(way, rel=1e-3, abs=0.12 * radius)
         assert state.cross_track == pytest.approx(0.0, abs=0.001 * radius)
@@ -108,7 +113,7 @@ def test_way_and_course_go_on_evenly_through_turns():
     np.testing.assert_allclose(np.diff(made), ways[1], rtol=0.01)
     assert np.abs(np.diff(course)).max() < 1.3 * ways[1] / RADIUS
     assert course[[0, -1]] == pytest.approx([0.0, np.pi / 2.0], abs=1e-3)
-    assert states[-1][0].leg == 2.0
+    assert states[-1][0].leg.number == 2.0
 
 
 def test_two_turns_are_seen_ahead():
@@ -147,8 +152,8 @@ def test_the_mirrored_voyage_earns_the_same():
     engine = Engine(symmetric, 1, task)
     mirror = Engine(symmetric, 1, task.changed(waypoints=HOOK * [1.0, -1.0]))
     mirrored = {
-        "y", "psi", "v", "r", "delta", "course", "integral", "heading_error", "cross_track", "east", "sine",
-        "leg_course", "turn", "second_turn", "work.direction", "work.furthest",
+        "y", "psi", "v", "r", "delta", "course", "integral", "heading_error", "cross_track", "leg.east",
+        "leg.sine", "leg.course", "leg.turn", "leg.second_turn", "work.direction", "work.furthest",
     }  # fmt: skip
     for one in (engine, mirror):
         one.reset([4])
@@ -166,7 +171,7 @@ def test_the_mirrored_voyage_earns_the_same():
         reflected, earned, *_ = mirror.step([[-order]])
         assert rewards[0] == pytest.approx(earned[0], rel=1e-6, abs=1e-9)
         np.testing.assert_allclose(seen[0], signs * reflected[0], atol=1e-5)
-    assert engine.read("leg")[0] == 2.0
+    assert engine.read("leg.number")[0] == 2.0
 
 
 def cutter(seen, step, env):
@@ -269,8 +274,10 @@ def test_a_path_that_cannot_be_planned_is_refused(options, message):
 
 @pytest.mark.parametrize("leg", [-1e9, 0.0, 1e9])
 def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
-    state = leg_from(0, 0.0, RADIUS, HOOK.ravel())._replace(leg=leg, distance_made_good=5000.0)
-    motion, interval = Motion(1500.0, 100.0, *[0.0] * 9), Interval(1.0, 3.0, *[0.0] * 5)
-    found = path_following.on_event(motion, state, interval, SHIP, Settings(), None, HOOK.ravel())
-    assert found.leg in (1.0, 3.0)
-    assert np.isfinite([getattr(found, name) for name in ("course", "turn_at", "second_at")]).all()
+    asked, plan = Settings(), HOOK.ravel()
+    state = on_path(RADIUS, plan)
+    state = state._replace(leg=state.leg._replace(number=leg), distance_made_good=5000.0)
+    motion = Motion(1500.0, 100.0, *[0.0] * 9)
+    found = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
+    assert found.leg.number in (1.0, 3.0)
+    assert np.isfinite(found.leg).all()
