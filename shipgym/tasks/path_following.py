@@ -60,9 +60,12 @@ MaxTurn = Annotated[
 Lookahead = Annotated[float, Setting("Lookahead distance of the line-of-sight course.", above=0.0)]
 Corridor = Annotated[float, Setting("Half the width of the corridor along the path.", above=0.0)]
 Ground = Annotated[float, Setting("Distance from the path at which the ship runs aground.", above=0.0)]
-Waypoints = Annotated[
+Paths = Annotated[
     Numbers,
-    Setting("North and east, m, of a path that is always the same, shape (n, 2); by default one is drawn."),
+    Setting(
+        "North and east, m, of a path, shape (n, 2), or a list of paths of which each episode has one; by "
+        "default a path is drawn."
+    ),
 ]
 
 
@@ -84,7 +87,7 @@ class Settings(NamedTuple):
         float, Setting("Way back of the rudder that counts as a reversal, degrees.", above=0.0)
     ] = 1.0
     weights: Weights = Weights()
-    waypoints: Waypoints = NO_NUMBERS
+    waypoints: Paths = NO_NUMBERS
 
 
 class Leg(NamedTuple):
@@ -174,8 +177,8 @@ def check(settings: Settings, model: Any) -> None:
             hint="ship lengths, which turns of max_turn_deg with turn_radius take of a leg",
         )  # fmt: skip
     elif model is not None:
-        path = Path(np.reshape(settings.waypoints, (-1, 2)))
-        path.check_turns(settings.turn_radius * model.particulars["length"])
+        for path in np.reshape(settings.waypoints[1:], (-1, int(settings.waypoints[0]), 2)):
+            Path(path).check_turns(settings.turn_radius * model.particulars["length"])
 
 
 def check_path(settings: Any, model: Any) -> None:
@@ -198,28 +201,30 @@ def check_path(settings: Any, model: Any) -> None:
 
 
 def listed(waypoints: Any) -> Numbers:
-    """North and east of waypoints by turns, m."""
-    return Path(waypoints).waypoints.ravel()
+    """How many waypoints a path has, then north and east of those of one path after another, m.
+
+    A path with fewer than the others has its last leg divided, which changes nothing.
+    """
+    several = isinstance(waypoints, list | tuple) and len(waypoints) and np.ndim(waypoints[0]) == 2
+    paths = [Path(path).waypoints for path in (waypoints if several else [waypoints])]
+    most = max(map(len, paths))
+    filled = [[*path[:-1], *np.linspace(*path[-2:], most - len(path) + 2)[1:]] for path in paths]
+    return np.append(float(most), np.ravel(filled))
 
 
-def legs(settings: Any) -> int:
-    """Number of legs of every path."""
-    given = len(settings.waypoints) // 2
-    return given - 1 if given > 0 else int(settings.n_legs)
-
-
-def plan_length(settings: Any) -> int:
+def plan_length(settings: Settings) -> int:
     """The plan holds the waypoints, north and east by turns."""
-    return 2 * (legs(settings) + 1)
+    return 2 * (int(settings.waypoints[0]) if len(settings.waypoints) else int(settings.n_legs) + 1)
 
 
-def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers) -> int:
-    """Write the waypoints of an episode, listed or drawn; returns how many random numbers that took."""
+def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers, first: int) -> int:
+    """Write the waypoints of an episode, listed from a number on, or drawn; returns how many draws that is."""
     north, east, course, draws = 0.0, 0.0, drawn(random, 0, -pi, pi), 1
     largest = np.radians(settings.max_turn_deg)
     for number in range(len(plan) // 2):
         if len(settings.waypoints) > 0:
-            north, east = settings.waypoints[2 * number], settings.waypoints[2 * number + 1]
+            at = first + 2 * number
+            north, east = settings.waypoints[at], settings.waypoints[at + 1]
         plan[2 * number], plan[2 * number + 1] = north, east
         length = ship.length * drawn(random, draws, settings.leg_lengths.least, settings.leg_lengths.largest)
         sine, cosine = sin_cos(course)
@@ -309,7 +314,9 @@ def part_of(turn: float, way: float, radius: float) -> float:
 
 def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tuple[Motion, State]:
     """Near the first waypoint and about along the first leg."""
-    lay_path(ship, settings, random, plan)
+    n_paths = (len(settings.waypoints) - 1) // len(plan)
+    chosen = int(drawn(random, START_DRAW + 2, 0.0, max(1.0, float(n_paths))))
+    lay_path(ship, settings, random, plan, 1 + chosen * len(plan))
     leg = leg_from(0, 0.0, settings.turn_radius * ship.length, plan)
     motion = start(leg, leg.course, ship, settings, random, START_DRAW)
     at, work = fix(motion.x, motion.y, leg, ship, settings), RudderWork(0.0, 0.0, 0.0)

@@ -25,6 +25,7 @@ LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
 RADIUS = 4.0 * LENGTH
 SHIP = Ship(LENGTH, SPEED, 0.6, 0.05, 0.0, 1.5, np.inf, SPEED)
 HOOK = np.array([[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0], [2900.0, 3400.0]])  # turns of 45 degrees
+LINE = np.array([[0.0, 0.0], [40.0 * LENGTH, 0.0]])
 WIDE = {"ground": 40.0}  # a sea in which nobody runs aground
 
 
@@ -54,11 +55,7 @@ def divided(path, parts):
     return np.concatenate([*legs, path[-1:]])
 
 
-@pytest.mark.parametrize(
-    ("path", "cost"),
-    [(np.array([[0.0, 0.0], [40.0 * LENGTH, 0.0]]), 16.11), (HOOK, 50.99)],
-    ids=["line", "hook"],
-)
+@pytest.mark.parametrize(("path", "cost"), [(LINE, 16.11), (HOOK, 50.99)], ids=["line", "hook"])
 def test_dividing_a_leg_changes_nothing(path, cost):
     """The first version's cost of the straight path rises from 13.2 to 105.2 with four legs."""
     costs = [-sail(waypoints=divided(path, parts))[0].sum() for parts in (1, 2, 4, 8)]
@@ -141,6 +138,14 @@ def test_two_turns_are_seen_ahead():
             assert at[name] == pytest.approx(min(value, most), abs=1e-4 * most), name
         checked.add(sum(way >= mark for mark in marks))
     assert checked == {0, 1, 2, 3, 4}
+
+
+def test_each_episode_has_one_of_a_list_of_paths():
+    engine = Engine(shipgym.load_model("mariner"), 40, Task.of("PathFollowing-v1", waypoints=[LINE, HOOK]))
+    engine.reset(np.arange(40))
+    ends = [engine.waypoints(lane)[-1].tolist() for lane in range(40)]
+    assert [ends.count(path[-1].tolist()) for path in (LINE, HOOK)] == pytest.approx([20, 20], abs=8)
+    assert sum(ends.count(path[-1].tolist()) for path in (LINE, HOOK)) == 40
 
 
 def test_the_mirrored_voyage_earns_the_same():
