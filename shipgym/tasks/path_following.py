@@ -208,7 +208,7 @@ def listed(waypoints: Any) -> Numbers:
     several = isinstance(waypoints, list | tuple) and len(waypoints) and np.ndim(waypoints[0]) == 2
     paths = [Path(path).waypoints for path in (waypoints if several else [waypoints])]
     most = max(map(len, paths))
-    filled = [[*path[:-1], *np.linspace(*path[-2:], most - len(path) + 2)[1:]] for path in paths]
+    filled = [[*path[:-1], *np.linspace(path[-2], path[-1], most - len(path) + 2)[1:]] for path in paths]
     return np.append(float(most), np.ravel(filled))
 
 
@@ -218,7 +218,7 @@ def plan_length(settings: Settings) -> int:
 
 
 def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers, first: int) -> int:
-    """Write the waypoints of an episode, listed from a number on, or drawn; returns how many draws that is."""
+    """Write the waypoints of an episode, listed from a number on, or drawn; returns the number of draws."""
     north, east, course, draws = 0.0, 0.0, drawn(random, 0, -pi, pi), 1
     largest = np.radians(settings.max_turn_deg)
     for number in range(len(plan) // 2):
@@ -382,7 +382,7 @@ def step(
     after = State(
         leg, at.course, integral, error, at.cross, sailed, pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0),
         pick(aground, 1.0, 0.0), work, state.rudder_travel + travel,
-        60.0 * work.reversals / (interval.steps * interval.dt),
+        60.0 * work.reversals / (max(interval.steps, 1.0) * interval.dt),
     )  # fmt: skip
     return after, reward, aground, arrived
 
