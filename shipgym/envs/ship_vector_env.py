@@ -92,7 +92,7 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._names, self._flags = self.task.info_names, self._engine.flag_names
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
-        self._mode = mode
+        self._mode = self.autoreset_mode = mode  # the latter is read by TorchRL
         self._own_reward = not self.task.definition.shipped
         self._discrete = self.task.action == "rudder-discrete"
         self._begun = False  # and not closed since
