@@ -104,8 +104,8 @@ def pufferlib_single() -> None:
     import pufferlib.emulation
     import pufferlib.vector
 
-    def make(*args: Any, buf: Any = None, **kwargs: Any) -> Any:
-        return pufferlib.emulation.GymnasiumPufferEnv(env_creator=single, buf=buf)
+    def make(**options: Any) -> Any:
+        return pufferlib.emulation.GymnasiumPufferEnv(env_creator=single, **options)
 
     envs = pufferlib.vector.make(make, num_envs=3, backend=pufferlib.vector.Serial)
     envs.reset(seed=0)

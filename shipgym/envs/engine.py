@@ -69,13 +69,9 @@ class Engine:
         model_index: int | None = None,
     ) -> None:
         self.remade: Callable[..., Engine] = partial(
-            Engine,
-            models,
-            num_envs,
-            randomisation=randomisation,
-            allow_unstable=allow_unstable,
+            Engine, models, num_envs, randomisation=randomisation, allow_unstable=allow_unstable,
             threads=threads,
-        )
+        )  # fmt: skip
         _check_count(num_envs, "num_envs")
         _check_count(threads, "threads")
         fleet = [models] if isinstance(models, ShipModel) else list(models)
@@ -92,15 +88,12 @@ class Engine:
         self.dt = task.interval(self.model)
         self.pool = (randomisation or Randomisation()).ships(self.model, task.seas)
         drawn = len(self.pool) > 1
-        if model_index is not None:
-            most = len(self.pool) - 1
-            check_whole(
-                model_index, "model_index", at_least=0, at_most=most, hint="one of the ships drawn from"
-            )
-            self.pool = [self.pool[model_index]] * len(self.pool)
         if drawn and len(fleet) > 1:
             raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
         self.windy = any(not sea.calm for _, sea in self.pool)
+        if model_index is not None:
+            check_whole(model_index, "model_index", at_least=0, at_most=len(self.pool) - 1)
+            self.pool = [self.pool[model_index]] * len(self.pool)
         sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
         if task.sensors is not None:
             sensors = Sensors(task.sensors)
@@ -134,17 +127,9 @@ class Engine:
             self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names)
         )
         words = addresses(
-            [
-                self._states,
-                self._keys,
-                self._settings,
-                self._pool,
-                self._ships,
-                self._rows,
-                self._which,
-                self._actions,
-            ]
-        )
+            [self._states, self._keys, self._settings, self._pool, self._ships, self._rows, self._which,
+             self._actions]
+        )  # fmt: skip
         self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in self._threads.shares]
         self._worlds = [
             np.array([*words, *[0] * 9, *share, *addresses([result])], dtype=np.int64)
@@ -435,9 +420,8 @@ class Engine:
                 )
         for name, expected in own.items():
             if name != "made_for" and np.shape(state[name]) != np.shape(expected):
-                raise InputError(
-                    f"state: {name} of shape {np.shape(state[name])} found, expected {np.shape(expected)}"
-                )
+                found = f"of shape {np.shape(state[name])}"
+                raise InputError(f"state: {name} {found} found, expected {np.shape(expected)}")
         if self._voyages.shared and not np.array_equal(state["ships"], self._ships, equal_nan=True):
             raise InputError(f"state: of another ship than this {self.model.name!r}, expected the same")
         lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(-1, len(self._states[0]) // LANES)

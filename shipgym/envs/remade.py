@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NoReturn
 
@@ -26,6 +26,10 @@ class Remade:
     _engine: Engine
     _arguments: dict[str, Any]  # by which it was made
     _spec: EnvSpec | None = None
+    _going: Callable[[], bool]  # whether an episode has begun
+    _counters: Callable[[], dict[str, Any]]  # seeds and numbers of the episodes
+    _recall: Callable[[Engine, Mapping[str, Any]], None]  # take an engine and the counters of a state
+    _use: Callable[[Engine], None]  # take an engine
 
     def _made(self, arguments: dict[str, Any]) -> None:
         """Called last when an environment is made."""
@@ -103,22 +107,6 @@ class Remade:
             self._use(self._engine_for(asked))
             self._asked = asked
         return given.get("state")
-
-    def _going(self) -> bool:
-        """Whether an episode has begun."""
-        raise NotImplementedError
-
-    def _counters(self) -> dict[str, Any]:
-        """Seeds and numbers of the episodes."""
-        raise NotImplementedError
-
-    def _recall(self, engine: Engine, state: Mapping[str, Any]) -> None:
-        """Take an engine and the counters of a state."""
-        raise NotImplementedError
-
-    def _use(self, engine: Engine) -> None:
-        """Take an engine."""
-        raise NotImplementedError
 
 
 def remade(kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]) -> Any:
