@@ -17,7 +17,8 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
 }
-TASKS = ("CourseKeeping", "PathFollowing")
+#: Tasks by their names, a version in them where it is not the first.
+TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
 #: Identified models that are the defaults of ids of version 1, most by a method or of a ship of their own.
 #: Ids of version 0 keep the ships that they have; that of course keeping is identified anyway.
 IDENTIFIED = {
