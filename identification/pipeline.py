@@ -16,7 +16,7 @@ from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
 from identification.options import Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics, explained_samples
-from identification.regression.problem import Problem, pose
+from identification.regression.problem import Problem, held_out, pose
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import MAP, checked_mmg, fit_mmg
@@ -29,11 +29,13 @@ from identification.validation.diagnostics import diagnose
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
+from identification.validation.selection import SELECTION, rank_structures, with_structure
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from shipgym.trials.identify_table import AUTO
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -81,6 +83,8 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    if structure == AUTO and asked.kernel is None:
+        return _identified_best(trials, asked, particulars, steering)
     if asked.kernel is not None:
         return _identified_with_kernel(trials, asked, particulars, steering)
     if structure == MMG:
@@ -92,6 +96,30 @@ def identify(
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
     call = whole_call(asked, problem.trials, particulars, steering)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
+
+
+def _identified_best(
+    trials: Sequence[Trial],
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
+    steering: SteeringGear | None,
+) -> IdentificationResult:
+    """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
+
+    def fitted(some: Sequence[Trial], own: Options) -> IdentificationResult:
+        return identify(some, particulars=particulars, steering=steering, **own.own(), **own.settings())
+
+    marked = held_out(trials, options.hold_out)
+    ranking = rank_structures(fitted, [trial for trial in marked if trial.use == "fit"], options)
+    first = ranking.standings[0]
+    best = fitted(trials, with_structure(options, first.structure, first.method))
+    found = {name: value for name, value in ranking.to_dict().items() if name in SELECTION}
+    return replace(
+        best,
+        model=replace(best.model, provenance={**(best.model.provenance or {}), "selection": found}),
+        metrics=best.metrics | {"selection": found},
+        settings=whole_call(options, marked, particulars, steering),
+    )
 
 
 def _identified_with_kernel(

@@ -56,7 +56,7 @@ def pose(
     Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
     particulars that do not suffice.
     """
-    everything = _held_out(trials, options.hold_out)
+    everything = held_out(trials, options.hold_out)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
@@ -104,7 +104,7 @@ def _check_list(trials: Any) -> None:
         )
 
 
-def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
+def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
     """The trials, those named marked to validate only."""
     _check_list(trials)
     known = [trial.name for trial in trials]

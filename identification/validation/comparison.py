@@ -7,16 +7,13 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from identification.estimators.methods import METHODS, Method, get_method
 from identification.pipeline import identify
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.cross_validation import cross_validate
-from identification.validation.prediction import COMPARED
-from identification.validation.ranking import Ranking, Standing
+from identification.validation.ranking import Ranking, standing
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
 from shipgym.ships.grey_boxes import GREY_BOX
@@ -98,8 +95,7 @@ def compare_methods(
             refused[name] = str(error)
     if not results:
         raise InputError(next(iter(refused.values())))
-    standings = [_standing(name, results[name], seen[name], trials) for name in results]
-    standings.sort(key=lambda s: (s.ran_away, not s.stable, s.error is None, s.error or 0.0))
+    standings = sorted((standing(results[n], seen[n], trials) for n in results), key=lambda one: one.rank)
     return Comparison(tuple(standings), results, refused, left_out, not held)
 
 
@@ -139,36 +135,3 @@ def _in_turn(trials: Sequence[Trial], method: Any, arguments: Mapping[str, Any])
     """Metrics of each trial, predicted by a model identified from the others."""
     own = {key: value for key, value in arguments.items() if key not in ("hold_out", "uncertainty")}
     return cross_validate(trials, method=method, **own)
-
-
-def _standing(
-    name: str, result: IdentificationResult, seen: Mapping[str, Any], trials: Sequence[Trial]
-) -> Standing:
-    measured = {trial.name: trial for trial in trials}
-    errors = {trial: _error(metrics, measured[trial]) for trial, metrics in seen.items()}
-    known = [error for error in errors.values() if error is not None]
-    whole = len(known) == len(errors)
-    return Standing(
-        method=name,
-        stable=result.stable,
-        ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=float(np.mean(known)) if whole else None,
-        heading_deg=_mean_degrees(seen, "psi"),
-        yaw_rate_deg_s=_mean_degrees(seen, "r"),
-        errors=errors,
-    )
-
-
-def _error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
-    """Errors of the channels by their standard deviation; None where the simulation ran away."""
-    ratios = [
-        metrics["rmse"][channel] / float(np.std(trial[channel]))
-        for channel in COMPARED
-        if metrics["rmse"][channel] is not None and np.std(trial[channel]) > 0.0
-    ]
-    return float(np.mean(ratios)) if ratios else None
-
-
-def _mean_degrees(seen: Mapping[str, Any], channel: str) -> float | None:
-    found = [m["rmse"][channel] for m in seen.values() if m["rmse"][channel] is not None]
-    return float(np.degrees(np.mean(found))) if found else None
