@@ -29,7 +29,7 @@ from identification.validation.diagnostics import diagnose
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
-from identification.validation.selection import SELECTION, rank_structures, with_structure
+from identification.validation.selection import select
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
@@ -110,10 +110,8 @@ def _identified_best(
         return identify(some, particulars=particulars, steering=steering, **own.own(), **own.settings())
 
     marked = held_out(trials, options.hold_out)
-    ranking = rank_structures(fitted, [trial for trial in marked if trial.use == "fit"], options)
-    first = ranking.standings[0]
-    best = fitted(trials, with_structure(options, first.structure, first.method))
-    found = {name: value for name, value in ranking.to_dict().items() if name in SELECTION}
+    chosen, found = select(fitted, [trial for trial in marked if trial.use == "fit"], options)
+    best = fitted(trials, chosen)
     return replace(
         best,
         model=replace(best.model, provenance={**(best.model.provenance or {}), "selection": found}),

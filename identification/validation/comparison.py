@@ -95,7 +95,7 @@ def compare_methods(
             refused[name] = str(error)
     if not results:
         raise InputError(next(iter(refused.values())))
-    standings = sorted((standing(results[n], seen[n], trials) for n in results), key=lambda one: one.rank)
+    standings = sorted((standing([results[n]], seen[n], trials) for n in results), key=lambda one: one.rank)
     return Comparison(tuple(standings), results, refused, left_out, not held)
 
 

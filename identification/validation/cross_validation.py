@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from identification.pipeline import identify
-from identification.validation.ranking import predicted_in_turn
+from identification.validation.ranking import in_turn
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
@@ -41,4 +41,4 @@ def cross_validate(trials: Sequence[Trial], folds: int | None = None, **argument
     if folds is not None:
         n = int(check_number(folds, "folds", at_least=2, at_most=len(used), hint="at most one per trial"))
     own = {"model_error": False, **arguments}
-    return predicted_in_turn(lambda held: identify(used, hold_out=held, **own), used, n)
+    return in_turn(lambda held: identify(used, hold_out=held, **own), used, n)[0]

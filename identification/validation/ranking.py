@@ -30,9 +30,6 @@ class Standing:
     heading_deg: float | None
     yaw_rate_deg_s: float | None
     errors: dict[str, float | None]  # `error` of each trial
-    #: whether the trials were predicted by models identified without them; if not, by that of all trials,
-    #: whose normal equations the trial was taken off
-    refitted: bool = True
 
     @property
     def rank(self) -> tuple[Any, ...]:
@@ -70,20 +67,21 @@ class Ranking:
         }
 
 
-def predicted_in_turn(
+def in_turn(
     identify: Callable[[list[str]], IdentificationResult], trials: Sequence[Trial], groups: int
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], list[IdentificationResult]]:
     """Metrics of each trial by its name, predicted by what was identified with its group held out.
 
     `identify`: from the names held out; `groups`: at most one per trial, in their order.
     """
-    groups = min(groups, len(trials))
     metrics: dict[str, Any] = {}
+    results = []
+    groups = max(1, min(groups, len(trials)))
     for k in range(groups):
         held = [trial.name for i, trial in enumerate(trials) if i * groups // len(trials) == k]
-        found = identify(held).metrics["trials"]
-        metrics |= {name: found[name] for name in held}
-    return metrics
+        results.append(identify(held))
+        metrics |= {name: results[-1].metrics["trials"][name] for name in held}
+    return metrics, results
 
 
 def named(structure: str, method: str) -> str:
@@ -92,28 +90,27 @@ def named(structure: str, method: str) -> str:
 
 
 def standing(
-    result: IdentificationResult, seen: Mapping[str, Any], trials: Sequence[Trial], refitted: bool = True
+    results: Sequence[IdentificationResult], seen: Mapping[str, Any], trials: Sequence[Trial]
 ) -> Standing:
     """How well a method predicts trials.
 
-    `result`: identified by it; `seen`: metrics of the trials held out, by name; `trials`: those and others.
+    `results`: identified by it; `seen`: metrics of the trials held out, by name; `trials`: those and others.
     """
     measured = {trial.name: trial for trial in trials}
     errors = {trial: _error(metrics, measured[trial]) for trial, metrics in seen.items()}
     known = [error for error in errors.values() if error is not None]
     whole = len(known) == len(errors)
-    provenance = result.model.provenance or {}
+    provenance = results[0].model.provenance or {}
     return Standing(
         structure=provenance["structure"],
         method=provenance["method"],
-        coefficients=len(result.coefficients),
-        stable=result.stable,
+        coefficients=len(results[0].coefficients),
+        stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
         error=float(np.mean(known)) if whole else None,
         heading_deg=_mean_degrees(seen, "psi"),
         yaw_rate_deg_s=_mean_degrees(seen, "r"),
         errors=errors,
-        refitted=refitted,
     )
 
 
