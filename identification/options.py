@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from shipgym.ships import ShipModel
+from shipgym.ships import ShipModel, Structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options
@@ -45,14 +45,14 @@ def name_of(value: Any) -> str:
     """The name of a model or of a method, of an estimator that of its class."""
     if isinstance(value, str):
         return value
-    return value.name if isinstance(value, ShipModel) else type(value).__name__
+    return value.name if isinstance(value, ShipModel | Structure) else type(value).__name__
 
 
 def _plain(value: Any) -> Any:
     """A setting as JSON knows it: infinity as null, models and trials by their names."""
     if isinstance(value, ShipModel | Trial):
         return value.name
-    if isinstance(value, Particulars | SteeringGear):
+    if isinstance(value, Particulars | SteeringGear | Structure):
         return value.to_dict()
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}

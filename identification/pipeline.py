@@ -30,7 +30,7 @@ from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
-from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships import GreyBox, ShipModel, Structure
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
@@ -46,7 +46,7 @@ MEMORY = 1.0  # of residuals, in the time to sail one ship length
 @on_one_thread
 def identify(
     trials: Sequence[Trial],
-    structure: str = "abkowitz",
+    structure: str | Structure = "abkowitz",
     method: str = "tls-svm",
     samples: str = "spline",
     particulars: Particulars | Mapping[str, Any] | None = None,
@@ -62,8 +62,9 @@ def identify(
     trials : sequence of Trial
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and n for structures
         that know the shaft speed.
-    structure : str
-        Terms of the model: a name of `shipgym.list_structures`.
+    structure : str or Structure
+        Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the structure and method
+        that predict the trials to fit best, each held out in turn; a method other than the default is kept.
     method : str or estimator
         A name of `identification.estimators.methods.METHODS`, or an object with scikit-learn's interface,
         `fit(X, y)` that sets `coef_`, of which each equation gets a copy.
@@ -140,7 +141,7 @@ def _identified_with_kernel(
     fit = _simulated(found.model, found.estimators, problem.used)
     problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
     provenance: dict[str, Any] = {
-        "structure": beneath.structure,
+        "structure": name_of(beneath.structure),
         "method": name_of(options.method),
         "samples": options.samples,
         "settings": provenance_settings(options, options.settings()),
@@ -209,7 +210,7 @@ def _provenance(
     """How a model came about, for its file."""
     _, of_method = split_settings(options.settings(), method.refined)
     found: dict[str, Any] = {
-        "structure": options.structure,
+        "structure": name_of(options.structure),
         "method": method.name,
         "samples": options.samples,
         "settings": provenance_settings(options, of_method),

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.options import name_of
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
@@ -15,12 +16,12 @@ from identification.regression.samples import Samples
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, Term, get_structure
+from shipgym.ships import Envelope, ShipModel, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import get_dynamics
+from shipgym.ships.structures import STRUCTURES, get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
@@ -82,7 +83,7 @@ def _blank(
     name: str, table: Structure, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
-    names = (table if isinstance(table, GreyBox) else get_dynamics(table.name)).coefficient_names
+    names = (get_dynamics(MMG) if table is MMG_CHANNELS else table).coefficient_names
     return ShipModel(
         name=name,
         structure=table.name,
@@ -90,7 +91,7 @@ def _blank(
         steering=gear,
         coefficients=dict.fromkeys(names, 0.0),
         service_shaft_speed=shaft,
-        own_table=table if isinstance(table, GreyBox) else None,
+        own_table=None if table.name in STRUCTURES or table is MMG_CHANNELS else table,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
     )
 
@@ -115,7 +116,7 @@ def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
 
 
 def _table(
-    structure: str,
+    structure: str | Structure,
     reference: str | ShipModel | None,
     particulars: Particulars | Mapping[str, Any] | None,
     used: Sequence[Trial],
@@ -126,10 +127,11 @@ def _table(
     if structure != GREY_BOX:
         if reference is not None:
             raise InputError(
-                f"reference_model: {reference!r} found with structure {structure!r}, expected structure "
-                "'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give prior)"
+                f"reference_model: {reference!r} found with structure {name_of(structure)!r}, expected "
+                "structure 'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give "
+                "prior)"
             )
-        return get_structure(structure), {}
+        return structure if isinstance(structure, Structure) else get_structure(structure), {}
     check_trials(used, get_structure("linear-steering"))
     return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
 

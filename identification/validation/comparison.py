@@ -1,4 +1,4 @@
-"""Several methods on the same trials, ranked by how well they predict trials that they have not seen."""
+"""Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
 from __future__ import annotations
 
@@ -8,29 +8,38 @@ from pathlib import Path
 from typing import Any
 
 from identification.estimators.methods import METHODS, Method, get_method
+from identification.options import name_of
 from identification.pipeline import identify
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.cross_validation import cross_validate
-from identification.validation.ranking import Ranking, standing
+from identification.validation.ranking import Ranking, Standing, named, standing
+from identification.validation.selection import STRUCTURES, methods_of, reference_of
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
+from shipgym.ships import Structure, list_structures
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.trials.identify_table import OPTIONS
+from shipgym.ships.mmg import MMG
+from shipgym.trials.identify_table import AUTO, OPTIONS, Options
 from shipgym.trials.trial import Trial
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "output-error")
-#: Files of a saved comparison: of the models only those of the methods compared.
-COMPARISON_FILES = ("comparison.json", "comparison.html", *(f"model-{name}.json" for name in METHODS))
+#: Files of a saved comparison: of the models only those of the methods, or of the structures, compared.
+COMPARISON_FILES = (
+    "comparison.json", "comparison.html", *(f"model-{name}.json" for name in (*METHODS, *list_structures()))
+)  # fmt: skip
 
 
 class Comparison(Ranking):
-    """Methods on the same trials, ranked; `Ranking` lists its attributes."""
+    """Structures and methods on the same trials, ranked; `Ranking` lists its attributes."""
 
     def save(self, folder: str | Path) -> None:
-        """Write `comparison.json`, `comparison.html` and each method's `model-METHOD.json`.
+        """Write `comparison.json`, `comparison.html` and models.
+
+        These are each method's `model-METHOD.json`, of several structures the best one's of each,
+        `model-STRUCTURE.json`.
 
         Raises
         ------
@@ -40,16 +49,23 @@ class Comparison(Ranking):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         written = comparison_page(self)
-        for name, result in self.results.items():
-            result.model.save(folder / f"model-{name}.json")
+        names = {name: name for name in self.results}
+        if self.names[0] != self.standings[0].method:
+            pairs = zip(self.standings, self.names, strict=True)
+            names = {one.structure: name for one, name in reversed(list(pairs))}
+        for name, result in names.items():
+            self.results[result].model.save(folder / f"model-{name}.json")
         write_json(self.to_dict(), folder / "comparison.json")
         write_text(written, folder / "comparison.html")
 
 
 def compare_methods(
-    trials: Sequence[Trial], methods: Sequence[Any] | None = None, **arguments: Any
+    trials: Sequence[Trial],
+    methods: Sequence[Any] | None = None,
+    structures: Sequence[str | Structure] | None = None,
+    **arguments: Any,
 ) -> Comparison:
-    """Identify by several methods and rank them on trials held out.
+    """Identify by several methods, or structures and methods, and rank them on trials held out.
 
     Held out are the trials marked `validate` or named by `hold_out`; where there are none, each trial to fit
     in turn.
@@ -59,7 +75,10 @@ def compare_methods(
     trials : sequence of Trial
         As for `identify`.
     methods : sequence of str or estimator, optional
-        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box.
+        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box; of several structures those of
+        `structure="auto"`.
+    structures : sequence of str or Structure, optional
+        As for `identify`; `auto` for all that it tries. A `reference_model` goes to those that know one.
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not have.
 
@@ -69,6 +88,8 @@ def compare_methods(
         For an unknown method, a setting that none of the methods knows, no two trials to hold one out of, and
         where no method can be fitted.
     """
+    if structures is not None:
+        return _compare_structures(trials, methods, structures, arguments)
     names = list(methods) if methods is not None else _usual(arguments.get("structure"))
     given = {get_method(method).name: method for method in names}
     chosen = {name: get_method(method) for name, method in given.items()}
@@ -83,20 +104,55 @@ def compare_methods(
         )
     left_out = _left_out(chosen, arguments)
     results: dict[str, IdentificationResult] = {}
-    seen: dict[str, dict[str, Any]] = {}
+    standings: list[Standing] = []
     refused: dict[str, str] = {}
     for name in chosen:
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
         try:
             result = identify(trials, method=given[name], **own)
-            seen[name] = _in_turn(fitted, given[name], own) if not held else _seen(result)
-            results[name] = result
+            seen = _in_turn(fitted, given[name], own) if not held else _seen(result)
         except InputError as error:
             refused[name] = str(error)
+            continue
+        standings.append(standing([result], seen, trials))
+        results[standings[-1].method] = result
     if not results:
         raise InputError(next(iter(refused.values())))
-    standings = sorted((standing([results[n]], seen[n], trials) for n in results), key=lambda one: one.rank)
+    standings.sort(key=lambda one: one.rank)
     return Comparison(tuple(standings), results, refused, left_out, not held)
+
+
+def _compare_structures(
+    trials: Sequence[Trial],
+    methods: Sequence[Any] | None,
+    structures: Sequence[Any],
+    given: Mapping[str, Any],
+) -> Comparison:
+    """The methods on each structure, in one ranking."""
+    found: dict[str, Comparison] = {}
+    refused: dict[str, str] = {}
+    for structure in STRUCTURES if AUTO in structures else structures:
+        own = dict(
+            given, structure=structure, reference_model=reference_of(structure, given.get("reference_model"))
+        )
+        wanted = methods_of(structure, Options.method) if methods is None else methods
+        try:
+            found[name_of(structure)] = compare_methods(
+                trials, wanted[:1] if structure == MMG else wanted, **own
+            )
+        except InputError as error:
+            refused[name_of(structure)] = str(error)
+    if not found:
+        raise InputError(next(iter(refused.values()), "structures: none found, expected at least one"))
+    for structure, one in found.items():
+        refused |= {named(structure, method): why for method, why in one.refused.items()}
+    return Comparison(
+        tuple(sorted((s for one in found.values() for s in one.standings), key=lambda one: one.rank)),
+        {named(s, m): result for s, one in found.items() for m, result in one.results.items()},
+        refused,
+        {named(s, m): left for s, one in found.items() for m, left in one.left_out.items()},
+        next(iter(found.values())).in_turn,
+    )
 
 
 def _named(arguments: Mapping[str, Any]) -> set[str]:

@@ -50,11 +50,17 @@ class Ranking:
     in_turn: bool  # whether no trial was marked `validate`, so that each trial to fit was held out in turn
 
     @property
+    def names(self) -> list[str]:
+        """By what `results` has each of the standings."""
+        return [
+            one.method if one.method in self.results else named(one.structure, one.method)
+            for one in self.standings
+        ]
+
+    @property
     def best(self) -> IdentificationResult:
         """What the first of the ranking identified."""
-        first = self.standings[0]
-        found = self.results.get(first.method)
-        return self.results[named(first.structure, first.method)] if found is None else found
+        return self.results[self.names[0]]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""

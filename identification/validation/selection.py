@@ -44,6 +44,11 @@ def select(
     `options`: a method other than the default is the only one, and what does not know a setting is refused.
     Raises InputError where nothing can be fitted, with the first reason.
     """
+
+    def with_pair(given: Options, structure: str, method: str) -> Options:
+        reference = reference_of(structure, options.reference_model)
+        return replace(given, structure=structure, method=method, reference_model=reference)
+
     free = options.method == Options.method and not options.settings()
     parts = [trial.with_(kind=None) for trial in (pieces(trials[0]) if len(trials) == 1 else trials)]
     cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
@@ -52,7 +57,7 @@ def select(
     refused: dict[str, str] = {}
 
     def attempt(structure: str, method: str) -> None:
-        own = with_structure(cheap, structure, method)
+        own = with_pair(cheap, structure, method)
         try:
             if method == SLOW and samples > MOST_SAMPLES:
                 raise InputError(
@@ -66,7 +71,7 @@ def select(
             refused[named(structure, method)] = str(error)
 
     for structure in STRUCTURES:
-        attempt(structure, RM_SVM if free and structure == GREY_BOX else options.method)
+        attempt(structure, methods_of(structure, options.method)[0] if free else options.method)
     if not found:
         raise InputError(next(iter(refused.values())))
     tables = sorted((one for one in found if one.structure in TABLES), key=lambda one: one.rank)
@@ -78,15 +83,19 @@ def select(
     method = options.method if best.structure == MMG else best.method
     held_out = "each trial in turn" if len(trials) > 1 else "each third of the only trial"
     return (
-        with_structure(options, best.structure, method),
+        with_pair(options, best.structure, method),
         {"held_out": held_out, "ranking": ranking, "refused": refused},
     )
 
 
-def with_structure(options: Options, structure: str, method: str) -> Options:
-    """The options for one structure: only some know a reference ship."""
-    reference = {GREY_BOX: options.reference_model or AUTO, MMG: options.reference_model}
-    return replace(options, structure=structure, method=method, reference_model=reference.get(structure))
+def methods_of(structure: str, usual: str) -> tuple[str, ...]:
+    """Methods that a structure is fitted by where none are named, the first before others are tried."""
+    return (RM_SVM,) if structure == GREY_BOX else (usual,) if structure == MMG else (usual, *OTHERS)
+
+
+def reference_of(structure: str, named: Any) -> Any:
+    """The reference ship of a structure that knows one, as it was named."""
+    return (named or AUTO) if structure == GREY_BOX else named if structure == MMG else None
 
 
 def _simplest(ranked: Sequence[Standing]) -> Standing:

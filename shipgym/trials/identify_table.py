@@ -79,7 +79,7 @@ class Options:
     InputError for an unknown uncertainty, and for settings of a prior without one.
     """
 
-    structure: str = _model(
+    structure: Any = _model(
         TEXT, "terms of the model; auto: whichever predicts trials held out best", "abkowitz", common=True
     )  # fmt: skip
     name: str | None = _model(TEXT, "name of the model; by default that of the ship")
