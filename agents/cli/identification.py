@@ -60,7 +60,7 @@ def _chosen(ship: Path, options: dict[str, Any], unnamed: str = AUTO) -> tuple[S
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
-    from agents.cli.terminal import err, prediction_table, print_json
+    from agents.cli.terminal import err, prediction_table, print_json, selection_table
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
     from agents.output import whole_folder
@@ -75,7 +75,9 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
         print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
     else:
         if "selection" in result.metrics:
-            _show_ranking(result.metrics["selection"])
+            console.print(selection_table(result.metrics["selection"]))
+            for name, reason in result.metrics["selection"]["refused"].items():
+                console.print(f"{name} was not fitted: {reason}", soft_wrap=True)
         if instability is None:
             console.print(result.summary(), soft_wrap=True)
             console.print(prediction_table(result))
@@ -96,19 +98,10 @@ def _check_stable(result: IdentificationResult) -> None:
         warn(warning)
 
 
-def _show_ranking(ranking: dict[str, Any]) -> None:
-    """The ranking, and what could not be fitted."""
-    from agents.cli.terminal import out, selection_table, warn
-
-    out.print(selection_table(ranking))
-    for name, reason in ranking["refused"].items():
-        warn(f"{name} was not fitted: {reason}")
-
-
 def _compare(
     read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None], as_json: bool
 ) -> None:
-    from agents.cli.terminal import err, print_json, warn
+    from agents.cli.terminal import err, print_json, selection_table, warn
     from agents.cli.terminal import out as console
     from agents.identifying import compare_ship
     from agents.output import whole_folder
@@ -121,8 +114,10 @@ def _compare(
     if as_json:
         print_json(found.to_dict())
     else:
-        _show_ranking(found.to_dict())
+        console.print(selection_table(found.to_dict()))
         console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
+    for name, reason in found.refused.items():
+        warn(f"{name} was not fitted: {reason}")
     for name, left in found.left_out.items():
         warn(f"{name} has no setting of these names and was fitted without them: {', '.join(left)}")
     first = found.standings[0]

@@ -164,7 +164,7 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
 def selection_table(ranking: Mapping[str, Any]) -> Table:
     """Structures and methods by how well they predict the trials held out, the best first."""
     headings = (
-        "structure", "method", ">coeffi-\ncients", "model", ">error by\nstd. dev.", ">heading\ndeg",
+        "method", "structure", ">coeffi-\ncients", "model", ">error by\nstd. dev.", ">heading\ndeg",
         ">yaw rate\ndeg/s", ">ran away\ntrials",
     )  # fmt: skip
     table = plain_table(f"Structures and methods by how they predict {ranking['held_out']}", *headings)
@@ -172,7 +172,7 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
         state = "stable" if one["stable"] else Text("unstable", "bold red")
         figures = (("error", 4), ("heading_deg", 2), ("yaw_rate_deg_s", 4), ("ran_away", 0))
         numbers = (_number(one[name], digits) for name, digits in figures)
-        table.add_row(one["structure"], one["method"], str(one["coefficients"]), state, *numbers)
+        table.add_row(one["method"], one["structure"], str(one["coefficients"]), state, *numbers)
     return table
 
 

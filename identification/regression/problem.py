@@ -128,8 +128,7 @@ def _table(
         if reference is not None:
             raise InputError(
                 f"reference_model: {reference!r} found with structure {name_of(structure)!r}, expected "
-                "structure 'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give "
-                "prior)"
+                "structure 'grey-box'; or leave it out (to pull coefficients to a ship's, give prior)"
             )
         return structure if isinstance(structure, Structure) else get_structure(structure), {}
     check_trials(used, get_structure("linear-steering"))

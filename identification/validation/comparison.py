@@ -10,12 +10,13 @@ from typing import Any
 from identification.estimators.methods import METHODS, Method, get_method
 from identification.options import name_of
 from identification.pipeline import identify
+from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.cross_validation import cross_validate
 from identification.validation.ranking import Ranking, Standing, named, standing
-from identification.validation.selection import STRUCTURES, methods_of, reference_of
+from identification.validation.selection import RM_SVM, STRUCTURES, methods_of, reference_of
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure, list_structures
@@ -67,16 +68,14 @@ def compare_methods(
 ) -> Comparison:
     """Identify by several methods, or structures and methods, and rank them on trials held out.
 
-    Held out are the trials marked `validate` or named by `hold_out`; where there are none, each trial to fit
-    in turn.
+    These are marked `validate` or named by `hold_out`; where there are none, each trial to fit in turn.
 
     Parameters
     ----------
     trials : sequence of Trial
         As for `identify`.
     methods : sequence of str or estimator, optional
-        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box; of several structures those of
-        `structure="auto"`.
+        By default `USUAL`, and `rm-svm` for a grey box; of several structures those of "auto".
     structures : sequence of str or Structure, optional
         As for `identify`; `auto` for all that it tries. A `reference_model` goes to those that know one.
     **arguments
@@ -85,32 +84,34 @@ def compare_methods(
     Raises
     ------
     InputError
-        For an unknown method, a setting that none of the methods knows, no two trials to hold one out of, and
-        where no method can be fitted.
+        For an unknown method or setting, no two trials to hold one out of, and where nothing can be fitted.
     """
     if structures is not None:
         return _compare_structures(trials, methods, structures, arguments)
-    names = list(methods) if methods is not None else _usual(arguments.get("structure"))
-    given = {get_method(method).name: method for method in names}
-    chosen = {name: get_method(method) for name, method in given.items()}
-    if not chosen:
+    if methods is None:
+        methods = USUAL if arguments.get("structure") != GREY_BOX else (*USUAL, RM_SVM)
+    given = {get_method(method).name: method for method in methods}
+    if not given:
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
-    held = {trial.name for trial in trials if trial.use == "validate"} | _named(arguments)
-    fitted = [trial for trial in trials if trial.use == "fit" and trial.name not in held]
+    marked = held_out(trials, arguments.get("hold_out", ()))
+    fitted, held = ([trial for trial in marked if trial.use == use] for use in ("fit", "validate"))
     if not held and len(fitted) < 2:
         raise InputError(
             f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank "
             'the methods on; mark one use = "validate", or give two to fit'
         )
-    left_out = _left_out(chosen, arguments)
+    left_out = _left_out(list(map(get_method, methods)), arguments)
     results: dict[str, IdentificationResult] = {}
     standings: list[Standing] = []
     refused: dict[str, str] = {}
-    for name in chosen:
+    for name, method in given.items():
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
         try:
-            result = identify(trials, method=given[name], **own)
-            seen = _in_turn(fitted, given[name], own) if not held else _seen(result)
+            result = identify(trials, method=method, **own)
+            seen = {t.name: result.metrics["trials"][t.name] for t in held}
+            if not held:
+                own.pop("hold_out", None)
+                seen = cross_validate(fitted, method=method, **{**own, "uncertainty": "analytic"})
         except InputError as error:
             refused[name] = str(error)
             continue
@@ -118,8 +119,8 @@ def compare_methods(
         results[standings[-1].method] = result
     if not results:
         raise InputError(next(iter(refused.values())))
-    standings.sort(key=lambda one: one.rank)
-    return Comparison(tuple(standings), results, refused, left_out, not held)
+    ranked = tuple(sorted(standings, key=lambda one: one.rank))
+    return Comparison(ranked, results, refused, left_out, not held)
 
 
 def _compare_structures(
@@ -132,20 +133,16 @@ def _compare_structures(
     found: dict[str, Comparison] = {}
     refused: dict[str, str] = {}
     for structure in STRUCTURES if AUTO in structures else structures:
-        own = dict(
-            given, structure=structure, reference_model=reference_of(structure, given.get("reference_model"))
-        )
+        name, reference = name_of(structure), reference_of(structure, given.get("reference_model"))
         wanted = methods_of(structure, Options.method) if methods is None else methods
+        own = dict(given, structure=structure, reference_model=reference)
         try:
-            found[name_of(structure)] = compare_methods(
-                trials, wanted[:1] if structure == MMG else wanted, **own
-            )
+            found[name] = compare_methods(trials, wanted[:1] if structure == MMG else wanted, **own)
+            refused |= {named(name, method): why for method, why in found[name].refused.items()}
         except InputError as error:
-            refused[name_of(structure)] = str(error)
+            refused[name] = str(error)
     if not found:
         raise InputError(next(iter(refused.values()), "structures: none found, expected at least one"))
-    for structure, one in found.items():
-        refused |= {named(structure, method): why for method, why in one.refused.items()}
     return Comparison(
         tuple(sorted((s for one in found.values() for s in one.standings), key=lambda one: one.rank)),
         {named(s, m): result for s, one in found.items() for m, result in one.results.items()},
@@ -155,17 +152,7 @@ def _compare_structures(
     )
 
 
-def _named(arguments: Mapping[str, Any]) -> set[str]:
-    """Trials that `hold_out` names."""
-    names = arguments.get("hold_out", ())
-    return {names} if isinstance(names, str) else set(names)
-
-
-def _usual(structure: str | None) -> list[str]:
-    return [*USUAL, "rm-svm"] if structure == GREY_BOX else list(USUAL)
-
-
-def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Settings that each method does not have but another one does."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
@@ -174,20 +161,8 @@ def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dic
         return method.knows(setting) or (method.refined and setting in of_refinement)
 
     for setting in settings:
-        if not any(known(method, setting) for method in chosen.values()):
-            raise InputError(
-                f"settings: {setting} found, which none of the methods {', '.join(chosen)} knows"
-            )
-    left = {name: tuple(s for s in settings if not known(method, s)) for name, method in chosen.items()}
+        if not any(known(method, setting) for method in chosen):
+            names = ", ".join(method.name for method in chosen)
+            raise InputError(f"settings: {setting} found, which none of the methods {names} knows")
+    left = {method.name: tuple(s for s in settings if not known(method, s)) for method in chosen}
     return {name: unknown for name, unknown in left.items() if unknown}
-
-
-def _seen(result: IdentificationResult) -> dict[str, Any]:
-    """Metrics of the trials that were held out."""
-    return {name: m for name, m in result.metrics["trials"].items() if m["use"] == "validate"}
-
-
-def _in_turn(trials: Sequence[Trial], method: Any, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Metrics of each trial, predicted by a model identified from the others."""
-    own = {key: value for key, value in arguments.items() if key not in ("hold_out", "uncertainty")}
-    return cross_validate(trials, method=method, **own)
