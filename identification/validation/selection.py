@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.options import Options
 from identification.result import IdentificationResult
+from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
 from identification.validation.ranking import Standing, in_turn, named, standing
@@ -68,7 +69,7 @@ def select(
             )
             found.append(standing(results, seen, parts))
         except InputError as error:
-            refused[named(structure, method)] = str(error)
+            refused[named(structure, MAP if structure == MMG else method)] = str(error)
 
     for structure in STRUCTURES:
         attempt(structure, methods_of(structure, options.method)[0] if free else options.method)
