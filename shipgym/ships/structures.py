@@ -245,6 +245,8 @@ def own_structure(table: Any, where: str) -> Structure:
 def _terms(given: Any, where: str) -> tuple[Term, ...]:
     """Terms from formulas, or terms as they are."""
     if isinstance(given, str):
+        if not given.strip():
+            raise InputError(f"{where}: no terms found, expected formulas such as 'v, |v| r, delta'")
         with placed(where):
             return read_terms(given)
     if not isinstance(given, Sequence):
