@@ -80,23 +80,16 @@ def compare_ship(
     """
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
-    if structures is None and arguments.get("structure") == AUTO:
-        structures = AUTO
+    structures = AUTO if structures is None and arguments.get("structure") == AUTO else structures
     wanted: list[Any] | None = structures and [name.strip() for name in structures.split(",")]
     if wanted:
         arguments.pop("structure", None)
-        own = {} if ship.structure is None else {ship.structure.name: ship.structure}
-        wanted = [own.get(name, name) for name in wanted]
+        known = {} if ship.structure is None else {ship.structure.name: ship.structure}
+        wanted = [known.get(name, name) for name in wanted]
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
+    own = {"particulars": ship.particulars, "steering": ship.steering, **arguments}
     with placed(str(ship.path)):
-        return compare_methods(
-            trials,
-            names or None,
-            wanted or None,
-            particulars=ship.particulars,
-            steering=ship.steering,
-            **arguments,
-        )
+        return compare_methods(trials, names or None, wanted or None, **own)
 
 
 def reduce_ship(

@@ -15,7 +15,9 @@ from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options
 from shipgym.trials.trial import Trial
 
-__all__ = ["Options", "name_of", "provenance_settings", "whole_call"]
+Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
+
+__all__ = ["Given", "Options", "name_of", "provenance_settings", "whole_call"]
 
 
 def provenance_settings(options: Options, of_method: Mapping[str, Any]) -> dict[str, Any]:
@@ -27,10 +29,7 @@ def provenance_settings(options: Options, of_method: Mapping[str, Any]) -> dict[
 
 
 def whole_call(
-    options: Options,
-    trials: Sequence[Trial],
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    options: Options, trials: Sequence[Trial], particulars: Given, steering: SteeringGear | None
 ) -> dict[str, Any]:
     """The whole call for settings.json, trials by name, use and hash."""
     given = {**options.own(), **options.settings(), "particulars": particulars, "steering": steering}

@@ -14,7 +14,7 @@ from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
-from identification.options import Options, name_of, provenance_settings, whole_call
+from identification.options import Given, Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics, explained_samples
 from identification.regression.problem import Problem, held_out, pose
 from identification.regression.samples import Samples
@@ -49,7 +49,7 @@ def identify(
     structure: str | Structure = "abkowitz",
     method: str = "tls-svm",
     samples: str = "spline",
-    particulars: Particulars | Mapping[str, Any] | None = None,
+    particulars: Given = None,
     steering: SteeringGear | None = None,
     **options: Any,
 ) -> IdentificationResult:
@@ -93,17 +93,14 @@ def identify(
     chosen = get_method(method)
     problem = pose(trials, asked, particulars, steering)
     fit, refined = _fitted(chosen, asked, problem)
-    provenance = _provenance(asked, chosen, fit, refined, problem)
+    provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
     call = whole_call(asked, problem.trials, particulars, steering)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
 
 
 def _identified_best(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
 
@@ -122,10 +119,7 @@ def _identified_best(
 
 
 def _identified_with_kernel(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
     beneath = reference_options(options)
@@ -140,41 +134,25 @@ def _identified_with_kernel(
     found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
     fit = _simulated(found.model, found.estimators, problem.used)
     problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
-    provenance: dict[str, Any] = {
-        "structure": name_of(beneath.structure),
-        "method": name_of(options.method),
-        "samples": options.samples,
-        "settings": provenance_settings(options, options.settings()),
-        **_reference(problem),
-        **_origin(fit, found.samples, problem.used),
-        "kernel": found.report,
-    }
+    named = replace(options, structure=beneath.structure)
+    provenance = _provenance(named, name_of(options.method), options.settings(), fit, problem)
+    provenance["kernel"] = found.report
     covariance = _scaled_covariance(options, fit, None, problem, provenance)
     call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance, call)
 
 
 def _identified_mmg(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
     samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
     fit = _simulated(found.model, estimators, problem.used)
-    provenance = {
-        "structure": MMG,
-        "method": MAP,
-        "samples": options.samples,
-        "settings": provenance_settings(options, {}),
-        **_origin(fit, samples, problem.used),
-        **found.report,
-    }
-    call = whole_call(options, problem.trials, particulars, steering)
     problem = replace(problem, samples=samples, blank=found.model)
+    provenance = _provenance(options, MAP, {}, fit, problem) | found.report
+    call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(found.model, fit, problem, provenance, call)
 
 
@@ -205,18 +183,42 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
 
 
 def _provenance(
+    options: Options, method: str, settings: Mapping[str, Any], fit: GuardedFit, problem: Problem
+) -> dict[str, Any]:
+    """How a model came about, for its file; `settings`: of the method."""
+    box, samples = problem.table, problem.samples
+    reference = (
+        {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
+        if isinstance(box, GreyBox)
+        else None
+    )
+    searched = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
+    return {
+        "structure": name_of(options.structure),
+        "method": method,
+        "samples": options.samples,
+        "settings": provenance_settings(options, settings),
+        **({"reference": reference} if reference else {}),
+        "software": f"shipgym {shipgym.__version__}",
+        "steps_per_window": samples.window,
+        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
+        **({"search": searched} if searched else {}),
+        "guard": fit.report,
+        "stable": fit.stable,
+        "trials": [
+            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
+            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
+            for trial in problem.used
+        ],
+    }
+
+
+def _fitted_provenance(
     options: Options, method: Method, fit: GuardedFit, refined: Refined | None, problem: Problem
 ) -> dict[str, Any]:
-    """How a model came about, for its file."""
+    """How a model that was fitted by regression came about."""
     _, of_method = split_settings(options.settings(), method.refined)
-    found: dict[str, Any] = {
-        "structure": name_of(options.structure),
-        "method": method.name,
-        "samples": options.samples,
-        "settings": provenance_settings(options, of_method),
-        **_reference(problem),
-        **_origin(fit, problem.samples, problem.used),
-    }
+    found = _provenance(options, method.name, of_method, fit, problem)
     if options.prior is not None:
         prior = next(iter(getattr(estimator, "prior_", {}) for estimator in fit.estimators.values()), {})
         found |= {"prior": name_of(options.prior), **prior}
@@ -291,29 +293,6 @@ def _left_out(
     ]
 
 
-def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
-    """The origin of a fit and its outcome, for the model's provenance."""
-    return {
-        "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": regression.window,
-        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
-        **_searched(fit),
-        "guard": fit.report,
-        "stable": fit.stable,
-        "trials": [
-            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
-            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
-            for trial in used
-        ],
-    }
-
-
-def _searched(fit: GuardedFit) -> dict[str, Any]:
-    """What a search chose for each equation; nothing for methods that do not search."""
-    chosen = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
-    return {"search": chosen} if chosen else {}
-
-
 def _evaluated(
     model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
 ) -> IdentificationResult:
@@ -357,11 +336,3 @@ def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:
     return replace(
         model, provenance={**(model.provenance or {}), "stable": False, "runs_away_on": list(lost)}
     )
-
-
-def _reference(problem: Problem) -> dict[str, Any]:
-    """What a grey box stands on, for the provenance; nothing for other structures."""
-    box = problem.table
-    if not isinstance(box, GreyBox):
-        return {}
-    return {"reference": {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}}

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from identification.options import name_of
+from identification.options import Given, name_of
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
@@ -47,10 +47,7 @@ class Problem:
 
 
 def pose(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
@@ -116,10 +113,7 @@ def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
 
 
 def _table(
-    structure: str | Structure,
-    reference: str | ShipModel | None,
-    particulars: Particulars | Mapping[str, Any] | None,
-    used: Sequence[Trial],
+    structure: str | Structure, reference: str | ShipModel | None, particulars: Given, used: Sequence[Trial]
 ) -> tuple[Structure, dict[str, float]]:
     """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
     if structure == MMG:
@@ -147,9 +141,7 @@ def _used(trials: Sequence[Trial]) -> list[Trial]:
     return [trial for trial in trials if trial.use == "fit"]
 
 
-def _ship(
-    particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial], table: Structure
-) -> Particulars:
+def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:
     """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
     if particulars is None:
         raise InputError(
