@@ -81,7 +81,7 @@ def compare_ship(
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
     structures = AUTO if structures is None and arguments.get("structure") == AUTO else structures
-    wanted: list[Any] | None = structures and [name.strip() for name in structures.split(",")]
+    wanted: list[Any] = [] if structures is None else [name.strip() for name in structures.split(",")]
     if wanted:
         arguments.pop("structure", None)
         known = {} if ship.structure is None else {ship.structure.name: ship.structure}

@@ -187,18 +187,16 @@ def _provenance(
 ) -> dict[str, Any]:
     """How a model came about, for its file; `settings`: of the method."""
     box, samples = problem.table, problem.samples
-    reference = (
-        {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
-        if isinstance(box, GreyBox)
-        else None
-    )
+    reference = {}
+    if isinstance(box, GreyBox):
+        reference["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
     searched = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
     return {
         "structure": name_of(options.structure),
         "method": method,
         "samples": options.samples,
         "settings": provenance_settings(options, settings),
-        **({"reference": reference} if reference else {}),
+        **reference,
         "software": f"shipgym {shipgym.__version__}",
         "steps_per_window": samples.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},

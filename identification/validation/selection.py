@@ -111,4 +111,4 @@ def _simplest(ranked: Sequence[Standing]) -> Standing:
 def _alike(one: Standing, first: Standing) -> bool:
     excess = np.array([(one.errors[name] or 0.0) - (error or 0.0) for name, error in first.errors.items()])
     chance = float(np.std(excess, ddof=1)) / np.sqrt(len(excess))
-    return float(excess.mean()) <= max(chance, LEAST_DIFFERENCE * (first.error or 0.0))
+    return bool(excess.mean() <= max(chance, LEAST_DIFFERENCE * (first.error or 0.0)))
