@@ -80,12 +80,10 @@ def compare_ship(
     """
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
-    structures = AUTO if structures is None and arguments.get("structure") == AUTO else structures
-    wanted: list[Any] = [] if structures is None else [name.strip() for name in structures.split(",")]
+    known: dict[str, Any] = {} if ship.structure is None else {ship.structure.name: ship.structure}
+    wanted = structures and [known.get(name.strip(), name.strip()) for name in structures.split(",")]
     if wanted:
         arguments.pop("structure", None)
-        known = {} if ship.structure is None else {ship.structure.name: ship.structure}
-        wanted = [known.get(name, name) for name in wanted]
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
     own = {"particulars": ship.particulars, "steering": ship.steering, **arguments}
     with placed(str(ship.path)):

@@ -50,12 +50,9 @@ class Comparison(Ranking):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         written = comparison_page(self)
-        names = {name: name for name in self.results}
-        if self.names[0] != self.standings[0].method:
-            pairs = zip(self.standings, self.names, strict=True)
-            names = {one.structure: name for one, name in reversed(list(pairs))}
-        for name, result in names.items():
-            self.results[result].model.save(folder / f"model-{name}.json")
+        several = self.standings[0].method not in self.results
+        for one, name in reversed(list(zip(self.standings, self.results, strict=True))):
+            self.results[name].model.save(folder / f"model-{one.structure if several else name}.json")
         write_json(self.to_dict(), folder / "comparison.json")
         write_text(written, folder / "comparison.html")
 
@@ -86,70 +83,54 @@ def compare_methods(
     InputError
         For an unknown method or setting, no two trials to hold one out of, and where nothing can be fitted.
     """
-    if structures is not None:
-        return _compare_structures(trials, methods, structures, arguments)
-    if methods is None:
-        methods = USUAL if arguments.get("structure") != GREY_BOX else (*USUAL, RM_SVM)
-    given = {get_method(method).name: method for method in methods}
-    if not given:
+    wanted = [arguments.pop("structure", Options.structure)] if structures is None else [*structures]
+    several = structures is not None or AUTO in wanted
+    pairs = _pairs(STRUCTURES if AUTO in wanted else wanted, methods, several)
+    if not pairs:
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
     marked = held_out(trials, arguments.get("hold_out", ()))
     fitted, held = ([trial for trial in marked if trial.use == use] for use in ("fit", "validate"))
     if not held and len(fitted) < 2:
-        raise InputError(
-            f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank "
-            'the methods on; mark one use = "validate", or give two to fit'
-        )
-    left_out = _left_out(list(map(get_method, methods)), arguments)
-    results: dict[str, IdentificationResult] = {}
-    standings: list[Standing] = []
+        told = f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank the"
+        raise InputError(f'{told} methods on; mark one use = "validate", or give two to fit')
+    left_out = _left_out([get_method(method) for _, method in pairs], arguments)
+    found: list[tuple[Standing, IdentificationResult]] = []
     refused: dict[str, str] = {}
-    for name, method in given.items():
+    for structure, method in pairs:
+        name = get_method(method).name
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
+        if several:
+            own["reference_model"] = reference_of(structure, own.get("reference_model"))
         try:
-            result = identify(trials, method=method, **own)
+            result = identify(trials, structure, method, **own)
             seen = {t.name: result.metrics["trials"][t.name] for t in held}
             if not held:
-                own.pop("hold_out", None)
-                seen = cross_validate(fitted, method=method, **{**own, "uncertainty": "analytic"})
+                own |= {"structure": structure, "method": method, "uncertainty": "analytic"}
+                seen = cross_validate(fitted, **{k: v for k, v in own.items() if k != "hold_out"})
         except InputError as error:
-            refused[name] = str(error)
+            refused[named(name_of(structure), name) if several else name] = str(error)
             continue
-        standings.append(standing([result], seen, trials))
-        results[standings[-1].method] = result
-    if not results:
-        raise InputError(next(iter(refused.values())))
-    ranked = tuple(sorted(standings, key=lambda one: one.rank))
-    return Comparison(ranked, results, refused, left_out, not held)
-
-
-def _compare_structures(
-    trials: Sequence[Trial],
-    methods: Sequence[Any] | None,
-    structures: Sequence[Any],
-    given: Mapping[str, Any],
-) -> Comparison:
-    """The methods on each structure, in one ranking."""
-    found: dict[str, Comparison] = {}
-    refused: dict[str, str] = {}
-    for structure in STRUCTURES if AUTO in structures else structures:
-        name, reference = name_of(structure), reference_of(structure, given.get("reference_model"))
-        wanted = methods_of(structure, Options.method) if methods is None else methods
-        own = dict(given, structure=structure, reference_model=reference)
-        try:
-            found[name] = compare_methods(trials, wanted[:1] if structure == MMG else wanted, **own)
-            refused |= {named(name, method): why for method, why in found[name].refused.items()}
-        except InputError as error:
-            refused[name] = str(error)
+        found.append((standing([result], seen, trials), result))
     if not found:
-        raise InputError(next(iter(refused.values()), "structures: none found, expected at least one"))
-    return Comparison(
-        tuple(sorted((s for one in found.values() for s in one.standings), key=lambda one: one.rank)),
-        {named(s, m): result for s, one in found.items() for m, result in one.results.items()},
-        refused,
-        {named(s, m): left for s, one in found.items() for m, left in one.left_out.items()},
-        next(iter(found.values())).in_turn,
-    )
+        raise InputError(next(iter(refused.values())))
+    found.sort(key=lambda pair: pair[0].rank)
+    results = {named(one.structure, one.method) if several else one.method: result for one, result in found}
+    return Comparison(tuple(one for one, _ in found), results, refused, left_out, not held)
+
+
+def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bool) -> list[tuple[Any, Any]]:
+    """Structures, each with the methods that it is fitted by: those given, of the MMG form the first."""
+    pairs: list[tuple[Any, Any]] = []
+    for structure in {name_of(one): one for one in structures}.values():
+        own = methods
+        if methods is None and several:
+            own = methods_of(structure, Options.method)
+        elif methods is None:
+            own = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
+        elif several and structure == MMG:
+            own = methods[:1]
+        pairs += [(structure, one) for one in {get_method(one).name: one for one in own or ()}.values()]
+    return pairs
 
 
 def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
@@ -162,7 +143,7 @@ def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[st
 
     for setting in settings:
         if not any(known(method, setting) for method in chosen):
-            names = ", ".join(method.name for method in chosen)
+            names = ", ".join(dict.fromkeys(method.name for method in chosen))
             raise InputError(f"settings: {setting} found, which none of the methods {names} knows")
     left = {method.name: tuple(s for s in settings if not known(method, s)) for method in chosen}
     return {name: unknown for name, unknown in left.items() if unknown}

@@ -43,24 +43,16 @@ class Ranking:
 
     #: the best first: those that run away on fewest trials, and among them the smallest error
     standings: tuple[Standing, ...]
-    #: identified from all trials to fit, by method, of several structures by `named`
+    #: identified from all trials to fit, in the same order, by method, of several structures by `named`
     results: dict[str, IdentificationResult]
     refused: dict[str, str]  # why a method could not be fitted
     left_out: dict[str, tuple[str, ...]]  # settings that a method does not have and was not given
     in_turn: bool  # whether no trial was marked `validate`, so that each trial to fit was held out in turn
 
     @property
-    def names(self) -> list[str]:
-        """By what `results` has each of the standings."""
-        return [
-            one.method if one.method in self.results else named(one.structure, one.method)
-            for one in self.standings
-        ]
-
-    @property
     def best(self) -> IdentificationResult:
         """What the first of the ranking identified."""
-        return self.results[self.names[0]]
+        return next(iter(self.results.values()))
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
