@@ -296,18 +296,20 @@ def _evaluated(
 ) -> IdentificationResult:
     """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
     provenance["steering"] = "estimated" if call["steering"] is None else "given"
-    model = replace(model, provenance=provenance)
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
-    model = _marked(model, [name for name, predicted in predictions.items() if predicted is None])
-    stable = bool((model.provenance or {})["stable"])
+    lost = [name for name, predicted in predictions.items() if predicted is None]
+    if lost:
+        provenance |= {"stable": False, "runs_away_on": lost}
+    model, stable = replace(model, provenance=provenance), bool(provenance["stable"])
+    reasons = [f"trial {name!r}, open loop" for name in lost] or provenance["guard"].get("rejected", [])
     bare = {"reference": bare_metrics(model, trials)} if isinstance(problem.table, GreyBox) else {}
     return IdentificationResult(
         model=model,
         stable=stable,
         metrics={
             "stable": stable,
-            "instability": None if stable else _why_unstable(model.provenance or {}),
+            "instability": None if stable else f"runs away: {'; '.join(reasons)}",
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
@@ -318,19 +320,4 @@ def _evaluated(
         estimators=fit.estimators,
         settings=call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
-    )
-
-
-def _why_unstable(provenance: Mapping[str, Any]) -> str:
-    """The trials that the model runs away on, or the simulations of the guard."""
-    lost = [f"trial {name!r}, open loop" for name in provenance.get("runs_away_on", [])]
-    return "runs away: " + "; ".join(lost or provenance["guard"].get("rejected", []))
-
-
-def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:
-    """The model, marked where it runs away on a recorded trial, one held out too."""
-    if not lost:
-        return model
-    return replace(
-        model, provenance={**(model.provenance or {}), "stable": False, "runs_away_on": list(lost)}
     )

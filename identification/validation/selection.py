@@ -45,11 +45,6 @@ def select(
     `options`: a method other than the default is the only one, and what does not know a setting is refused.
     Raises InputError where nothing can be fitted, with the first reason.
     """
-
-    def with_pair(given: Options, structure: str, method: str) -> Options:
-        reference = reference_of(structure, options.reference_model)
-        return replace(given, structure=structure, method=method, reference_model=reference)
-
     free = options.method == Options.method and not options.settings()
     parts = [trial.with_(kind=None) for trial in (pieces(trials[0]) if len(trials) == 1 else trials)]
     cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
@@ -58,12 +53,11 @@ def select(
     refused: dict[str, str] = {}
 
     def attempt(structure: str, method: str) -> None:
-        own = with_pair(cheap, structure, method)
+        reference = reference_of(structure, options.reference_model)
+        own = replace(cheap, structure=structure, method=method, reference_model=reference)
         try:
             if method == SLOW and samples > MOST_SAMPLES:
-                raise InputError(
-                    f"slow on more than {MOST_SAMPLES} samples, {samples} found; name it to have it"
-                )
+                raise InputError(f"{samples} samples found, {MOST_SAMPLES} at most; name it to have it")
             seen, results = in_turn(
                 lambda held: identify(parts, replace(own, hold_out=held)), parts, MOST_GROUPS
             )
@@ -80,13 +74,14 @@ def select(
         attempt(tables[0].structure, method)
     found.sort(key=lambda one: one.rank)
     best = _simplest(found)
-    ranking = [asdict(one) for one in (best, *(one for one in found if one is not best))]
     method = options.method if best.structure == MMG else best.method
-    held_out = "each trial in turn" if len(trials) > 1 else "each third of the only trial"
-    return (
-        with_pair(options, best.structure, method),
-        {"held_out": held_out, "ranking": ranking, "refused": refused},
-    )
+    reference = reference_of(best.structure, options.reference_model)
+    chosen = replace(options, structure=best.structure, method=method, reference_model=reference)
+    return chosen, {
+        "held_out": "each trial in turn" if len(trials) > 1 else "each third of the only trial",
+        "ranking": [asdict(one) for one in (best, *(one for one in found if one is not best))],
+        "refused": refused,
+    }
 
 
 def methods_of(structure: str, usual: str) -> tuple[str, ...]:

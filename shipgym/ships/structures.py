@@ -217,8 +217,8 @@ def register_structure(
     InputError
         For a formula that cannot be read, a table that cannot be computed, or a name that another table has.
     """
-    table = {"name": name, "equations": equations, "source": source}
-    table |= {"normalisation": normalisation, "quantity": quantity}
+    units = {"normalisation": normalisation, "quantity": quantity}
+    table = {"name": name, "equations": equations, "source": source, **units}
     STRUCTURES[name] = own_structure(table, "register_structure")
     return STRUCTURES[name]
 

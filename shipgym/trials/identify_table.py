@@ -79,9 +79,7 @@ class Options:
     InputError for an unknown uncertainty, and for settings of a prior without one.
     """
 
-    structure: Any = _model(
-        TEXT, "terms of the model; auto: whichever predicts trials held out best", "abkowitz", common=True
-    )  # fmt: skip
+    structure: Any = _model(TEXT, "terms of the model; auto: by trials held out", "abkowitz", common=True)
     name: str | None = _model(TEXT, "name of the model; by default that of the ship")
     service_shaft_speed: float | None = _model(
         NUMBER, "shaft speed at service speed, 1/s; by default that at the start of the trials", above=0.0
