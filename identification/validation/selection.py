@@ -24,9 +24,8 @@ TABLES = (
     "mmg4dof",
 )  # fmt: skip
 STRUCTURES = (*TABLES, GREY_BOX, MMG)
-RM_SVM, SLOW = "rm-svm", "output-error"
-OTHERS = ("cv-lssvr", SLOW)  # methods that the best table is also fitted by
-MOST_SAMPLES = 6000  # of all trials, for the slow one
+RM_SVM = "rm-svm"
+OTHERS = ("cv-lssvr", "output-error")  # methods that a table that predicts best is also fitted by
 MOST_GROUPS = 5  # of trials that are held out together
 LEAST_DIFFERENCE = 0.02  # of errors, relative; a smaller one decides nothing
 
@@ -38,9 +37,10 @@ def select(
 ) -> tuple[Options, dict[str, Any]]:
     """The options with the structure and method that predict best, and the ranking, for the provenance.
 
-    Every structure that trials and particulars allow is fitted by its usual method, the best table by others
-    too, and each trial predicted by fits without it. The choice is the one with the fewest coefficients whose
-    error exceeds the least by no more than one standard error of their difference over the trials, or by 2 %.
+    Every structure that trials and particulars allow is fitted by its usual method, a table that comes first
+    by others too, and each trial predicted by fits without it. The choice is the one with the fewest
+    coefficients whose error exceeds the least by no more than one standard error of their difference over the
+    trials, or by 2 %.
     `identify`: from trials and options of one structure; `trials`: to fit, a single one is cut into three;
     `options`: a method other than the default is the only one, and what does not know a setting is refused.
     Raises InputError where nothing can be fitted, with the first reason.
@@ -48,7 +48,6 @@ def select(
     free = options.method == Options.method and not options.settings()
     parts = [trial.with_(kind=None) for trial in (pieces(trials[0]) if len(trials) == 1 else trials)]
     cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
-    samples = sum(map(len, parts))
     found: list[Standing] = []
     refused: dict[str, str] = {}
 
@@ -56,11 +55,11 @@ def select(
         reference = reference_of(structure, options.reference_model)
         own = replace(cheap, structure=structure, method=method, reference_model=reference)
         try:
-            if method == SLOW and samples > MOST_SAMPLES:
-                raise InputError(f"{samples} samples found, {MOST_SAMPLES} at most; name it to have it")
             seen, results = in_turn(
                 lambda held: identify(parts, replace(own, hold_out=held)), parts, MOST_GROUPS
             )
+            if not all(one.stable for one in results):  # what counts is the fit of all trials
+                results = [identify(parts, own)]
             found.append(standing(results, seen, parts))
         except InputError as error:
             refused[named(structure, MAP if structure == MMG else method)] = str(error)
@@ -69,9 +68,9 @@ def select(
         attempt(structure, methods_of(structure, options.method)[0] if free else options.method)
     if not found:
         raise InputError(next(iter(refused.values())))
-    tables = sorted((one for one in found if one.structure in TABLES), key=lambda one: one.rank)
-    for method in OTHERS if free and tables else ():
-        attempt(tables[0].structure, method)
+    first = min(found, key=lambda one: one.rank)
+    for method in OTHERS if free and first.structure in TABLES else ():
+        attempt(first.structure, method)
     found.sort(key=lambda one: one.rank)
     best = _simplest(found)
     method = options.method if best.structure == MMG else best.method

@@ -137,7 +137,7 @@ def test_a_black_box_predicts_a_zigzag_that_was_held_out(black_box: Identificati
 
 def test_the_report_tells_the_kernel_and_not_its_weights(black_box: IdentificationResult) -> None:
     page = report_page(black_box)
-    assert "64 radial basis functions of length" in page
+    assert " radial basis functions of length " in page
     assert "a_k1" in black_box.coefficients
     assert "a_k1" not in page
 
