@@ -71,7 +71,7 @@ def pose(
         smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
     check_samples(regression, used, table)
-    gear = _gear(used, table) if steering is None else steering
+    gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity)
 
@@ -175,8 +175,3 @@ def _shaft_speed(given: float | None, trials: Sequence[Trial], table: Structure)
             "speed; give service_shaft_speed"
         )
     return shaft
-
-
-def _gear(trials: Sequence[Trial], table: Structure) -> SteeringGear:
-    """The gear as the rudders of the trials show it; a usual one where no rudder has to move."""
-    return estimated_gear(trials) if table.has_rudder else SteeringGear()
