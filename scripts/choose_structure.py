@@ -24,7 +24,7 @@ from certainty import TRIALS, sea_trials, ship_of
 
 from identification import IdentificationResult, identify
 from identification.validation.prediction import predict
-from shipgym import ShipModel
+from shipgym import ShipFile, ShipModel
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 
 TURNS = ("advance_lengths", "tactical_diameter_lengths")
@@ -55,8 +55,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ships", default="kcs,seiun-maru")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--demo", action="store_true", help="only the time that five zigzags take")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
+    if given.demo:
+        ship = ShipFile.load(Path(__file__).parents[1] / "examples" / "mariner" / "ship.toml")
+        trials = [trial.with_(use="fit") for trial in ship.trials() if trial.kind == "zigzag"]
+        start = time.process_time()
+        identify(trials, "auto", particulars=ship.particulars, steering=ship.steering)
+        print(f"{len(trials)} zigzags of the demo: {time.process_time() - start:.0f} s of processor time")
+        return
     print("| ship, seed | structure | error held out | heading 30/30, deg | advance, % | diameter, % | s |")
     print("| --- | --- | ---: | ---: | ---: | ---: | ---: |")
     for name in given.ships.split(","):
