@@ -25,7 +25,7 @@ TABLES = (
 )  # fmt: skip
 STRUCTURES = (*TABLES, GREY_BOX, MMG)
 RM_SVM = "rm-svm"
-OTHERS = ("cv-lssvr", "output-error")  # methods that a table that predicts best is also fitted by
+OTHERS = ("ls", "cv-lssvr")  # methods that a table that predicts best is also fitted by; quick ones
 MOST_GROUPS = 5  # of trials that are held out together
 LEAST_DIFFERENCE = 0.02  # of errors, relative; a smaller one decides nothing
 
