@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from shipgym.errors import InputError
 from shipgym.files import toml_value
-from shipgym.trials.identify_table import FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
+from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
 TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
 #: Options with a name of their own on the command line.
@@ -70,7 +69,7 @@ def _help(name: str) -> str:
     if option.choices:
         *others, last = option.choices
         text += f": {', '.join(others)} or {last}"
-    default = next(item.default for item in fields(Options) if item.name == name)
+    default = AUTO if name == "structure" else getattr(Options, name)
     if isinstance(default, str):
         text += f"; default: the ship file's, else {default}"
     return f"{text}; may be repeated." if option.kind == TEXTS else f"{text}."

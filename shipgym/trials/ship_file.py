@@ -13,13 +13,15 @@ from shipgym.errors import InputError
 from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import own_structure
+from shipgym.ships.term_table import Structure
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.identify_table import check_options
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
 from shipgym.trials.trial_import import Conventions
 
-_SECTIONS = ("ship", "steering", "columns", "conventions", "identify", "trials")
+_SECTIONS = ("ship", "steering", "columns", "conventions", "structure", "identify", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
 _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
 
@@ -47,6 +49,7 @@ class ShipFile:
     # defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`
     identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]  # the trials, not read yet
+    structure: Structure | None = None  # the table of terms in ``[structure]``
 
     @classmethod
     def load(cls, path: str | Path) -> ShipFile:
@@ -72,7 +75,8 @@ class ShipFile:
         )
         identify = check_options(data.get("identify", {}), f"{path}: [identify]")
         data_only(identify, f"{path}: [identify]")
-        return cls(path, particulars, steering, identify, _entries(path, data, particulars))
+        structure = own_structure(data["structure"], f"{path}: [structure]") if "structure" in data else None
+        return cls(path, particulars, steering, identify, _entries(path, data, particulars), structure)
 
     def completed_particulars(self) -> Particulars:
         """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""
