@@ -60,8 +60,8 @@ class Trial:
     raw : Trial, optional
         The trial before it was smoothed or repaired.
     over_ground : bool, optional
-        Whether `u` and `v` are velocities over ground, with the current in them, and not through the water. By
-        default where one of them was derived, as it is from positions.
+        Whether `u` and `v` are velocities over ground, with the current in them, and not through the water.
+        By default where one of them was derived, as it is from positions.
 
     Raises
     ------
