@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
+from identification.regression.still_water import in_still_water
+from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -43,6 +46,7 @@ class Problem:
     samples: Samples  # the regression
     #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
+    sea: dict[str, Any]  # what is known of current and wind, for the provenance
 
 
 def pose(
@@ -56,7 +60,7 @@ def pose(
     Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
     particulars that do not suffice.
     """
-    everything = _held_out(trials, options.hold_out)
+    everything, sea = in_still_water(_held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
@@ -68,14 +72,22 @@ def pose(
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    regression = structure_samples(
-        used, table, ship, samples=options.samples, window=options.window, gear=steering,
-        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
+    regress = partial(
+        structure_samples, structure=table, particulars=ship, samples=options.samples, window=options.window,
+        gear=steering, smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
+    regression = regress(used)
+    if options.wind == "constant":
+        sea["wind"] = {"option": "constant", "accelerations": constant_wind(used, regression)}
+        used, everything = (
+            [with_constant_wind(trial, sea["wind"]["accelerations"]) for trial in group]
+            for group in (used, everything)
+        )
+        regression = regress(used)
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity)
+    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
 
 
 def _blank(
