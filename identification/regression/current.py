@@ -1,10 +1,10 @@
 """A steady current, estimated from trials whose velocities are over ground.
 
 Ground velocity is R(psi) (u, v) + (V_N, V_E). How surge and sway follow from measured yaw rate, rudder and
-shaft speed is simulated by quadratic equations of any ship, whose coefficients have a wide prior and are fitted
-with the current, in which ground velocity is linear (Maine & Iliff 1985, NASA RP-1138, output error with prior).
-So the current does not depend on the structure to be identified. Its covariance is that of estimates with each
-trial, or each third of one, left out (jackknife): it holds what the equations miss.
+shaft speed is simulated by quadratic equations of any ship, whose coefficients have a wide prior and are
+fitted with the current, in which ground velocity is linear (Maine & Iliff 1985, NASA RP-1138, output error
+with prior). So the current does not depend on the structure to be identified. Its covariance is that of
+estimates with each trial, or each third of one, left out (jackknife): it holds what the equations miss.
 """
 
 from __future__ import annotations

@@ -78,12 +78,11 @@ def pose(
     )  # fmt: skip
     regression = regress(used)
     if options.wind == "constant":
-        sea["wind"] = {"option": "constant", "accelerations": constant_wind(used, regression)}
+        constants = constant_wind(used, regression, options.structure)
         used, everything = (
-            [with_constant_wind(trial, sea["wind"]["accelerations"]) for trial in group]
-            for group in (used, everything)
+            [with_constant_wind(trial, constants) for trial in group] for group in (used, everything)
         )
-        regression = regress(used)
+        regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)

@@ -70,6 +70,11 @@ def _with_wind(
             raise
         return found, {"sea_remarks": [f"the wind that was logged is not taken out: {error}"]}
     windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if ACCELERATIONS[0] in t}
+    if not windy and option != "auto":
+        raise InputError(
+            f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u and "
+            'v; name them in [columns], or take wind = "constant"'
+        )
     return found, {"wind": {"option": option, "mean_speeds": windy}} if windy else {}
 
 
@@ -113,17 +118,17 @@ def _known(trial: Trial, option: Any) -> Floats | None:
     given = None
     if isinstance(option, Mapping):
         check_keys(option, ("north", "east"), "current", ("north", "east"))
-        given = np.array([check_number(option[name], f"current {name}", hint="in m/s") for name in option])
-        given = given if list(option)[0] == "north" else given[::-1]
+        parts = (check_number(option[name], f"current {name}", hint="in m/s") for name in ("north", "east"))
+        given = np.array([*parts])
     if not trial.channels.keys() >= set(COLUMNS):
         return given if trial.over_ground else None
     columns = np.array([trial[name] for name in COLUMNS])
     if given is not None and np.hypot(*(columns.mean(axis=1) - given)) > CONTRADICTION:
         north, east = columns.mean(axis=1)
         raise InputError(
-            f"trial {trial.name!r}: columns current_north, current_east have means of {north:.2f} and "
-            f"{east:.2f} m/s, current = {{ north = {given[0]:g}, east = {given[1]:g} }} found, expected them to "
-            "agree; leave one of them out"
+            f"trial {trial.name!r}: columns current_north and current_east have means of {north:.2f} and "
+            f"{east:.2f} m/s, current = {{ north = {given[0]:g}, east = {given[1]:g} }} was given, expected "
+            "them to agree; leave one of them out"
         )
     return columns
 

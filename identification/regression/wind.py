@@ -15,6 +15,7 @@ from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.sea.wind_tables import WindTable
 from shipgym.ships import ShipModel, get_structure
+from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
@@ -30,12 +31,13 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
     Parameters
     ----------
     trial : Trial
-        With wind_speed and wind_from, psi, and u and v, which are taken for those over ground.
+        With wind_speed and wind_from, psi, u and v; those through the water with a current in columns, if
+        known.
     particulars : Particulars
         From which areas and inertia are estimated where they do not tell them.
     option : str or mapping
-        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or as a `WindTable`, and
-        ``relative``: whether speed and direction are those felt on board, the latter from the bow.
+        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or as a table of them,
+        and ``relative``: whether speed and direction are those felt on board, the latter from the bow.
 
     Raises
     ------
@@ -55,6 +57,9 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
     if not check_flag(table.get("relative", False), "wind relative"):
         ahead, aside = rotate_to_body(ahead, aside, trial["psi"])
         ahead, aside = ahead + trial["u"], aside + trial["v"]
+        if not trial.over_ground and {"current_north", "current_east"} <= trial.channels.keys():
+            drift = rotate_to_body(trial["current_north"], trial["current_east"], trial["psi"])
+            ahead, aside = ahead + drift[0], aside + drift[1]
     pressure, angle = 0.5 * AIR_DENSITY * (ahead**2 + aside**2), np.arctan2(aside, ahead)
     forces = [
         pressure * np.interp(angle, curves.angle, row, period=2.0 * np.pi)
@@ -82,11 +87,17 @@ def _mobility(particulars: Particulars) -> Floats:
     return mobility_matrix(ship)[:3, :3]
 
 
-def constant_wind(trials: Sequence[Trial], samples: Samples) -> dict[str, dict[str, float]]:
+def constant_wind(trials: Sequence[Trial], samples: Samples, structure: str) -> dict[str, dict[str, float]]:
     """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
 
-    `samples` are those of the trials; a constant of the structure's own takes their mean.
+    `samples` are those of the trials; a constant of the structure's own takes their mean. Raises InputError
+    for the MMG form, which has no regression.
     """
+    if structure == MMG:
+        raise InputError(
+            "wind: 'constant' found with structure 'mmg', expected a structure that is linear in its "
+            "coefficients, or columns wind_speed and wind_from"
+        )
     own = (samples.trial[:, None] == np.arange(len(trials))) * samples.duration[:, None]
     found: dict[str, dict[str, float]] = {trial.name: {} for trial in trials}
     for q in [q for q in "vr" if q in samples.targets]:

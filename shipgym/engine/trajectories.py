@@ -48,7 +48,8 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: flo
     """From the state in row 0 with the rudder measured at times t, straight between the samples.
 
     A measured rudder is a steering gear without limit or lag that moves at the measured rate. The water is
-    calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a loop for calm water knows nothing.
+    calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a
+    loop for calm water knows nothing.
     """
     own, coefficients = ship_of(numbers)
     motion = load_motion(out[0], 0)

@@ -102,7 +102,7 @@ class Options:
 
     current: Any = _trials(
         TEXT_OR_TABLE, "steady current in velocities over ground, or a known one as a table of m/s, such as "
-        "`{ north = 0.2, east = -0.1 }`; columns current_north and current_east are used in any case but none",
+        "`{ north = 0.2, east = -0.1 }`; columns current_north and current_east come first",
         "auto", common=True, choices={
             "auto": "estimated, one of all trials unless these contradict it, and taken out where it differs "
             "from zero",
@@ -112,8 +112,8 @@ class Options:
     )  # fmt: skip
     wind: Any = _trials(
         TEXT_OR_TABLE, "force of the wind in columns wind_speed and wind_from, by `shipgym.sea`'s names of "
-        "coefficients, or a table such as `{ coefficients = \"isherwood\", relative = true }`, relative for a "
-        "wind felt on board, from the bow", "auto", common=True, choices={
+        "coefficients, or a table such as `{ coefficients = \"isherwood\", relative = true }`, relative for "
+        "a wind felt on board, from the bow", "auto", common=True, choices={
             "auto": "by Blendermann's coefficients, where wind was logged", "none": "not taken out",
             "constant": "a constant sway and yaw acceleration of each trial fitted",
         },
