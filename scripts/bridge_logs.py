@@ -41,10 +41,11 @@ def turned(run: Trial, angle: float) -> Trial:
     c, s = np.cos(angle), np.sin(angle)
     channels = dict(run.channels)
     channels["x"], channels["y"] = c * run["x"] - s * run["y"], s * run["x"] + c * run["y"]
-    channels["current_north"], channels["current_east"] = (
-        c * run["current_north"] - s * run["current_east"], s * run["current_north"] + c * run["current_east"]
-    )  # fmt: skip
-    channels["psi"], channels["wind_from"] = run["psi"] + angle, run["wind_from"] + angle
+    for name in {"psi", "wind_from"} & channels.keys():
+        channels[name] = run[name] + angle
+    if "current_north" in run:
+        north, east = run["current_north"], run["current_east"]
+        channels |= {"current_north": c * north - s * east, "current_east": s * north + c * east}
     return Trial(run.t, channels, name=run.name, kind=run.kind, use=run.use, length=run.length)
 
 
@@ -81,7 +82,7 @@ def logged(run: Trial, seed: int) -> Trial:
     read = LOG.measure(antenna, seed)
     rng = np.random.default_rng([seed, 7])
     channels = {name: read[name] for name in ("x", "y", "psi", "delta", "n") if name in read}
-    if np.ptp(run["wind_speed"]) > 0.0:
+    if "wind_speed" in run and np.ptp(run["wind_speed"]) > 0.0:
         channels["wind_speed"] = np.maximum(run["wind_speed"] + rng.normal(0.0, 0.5, len(run)), 0.0)
         channels["wind_from"] = run["wind_from"] + rng.normal(0.0, 5.0 * DEGREE, len(run))
     for name in ("x", "y"):  # at 1 Hz, between which the reader interpolates

@@ -25,7 +25,8 @@ COLUMNS = ("current_north", "current_east")
 CONTRADICTION = 0.1  # m/s between a current in columns and one that is given
 SIGNIFICANT = 0.01  # probability below which a current differs from zero
 APART = 1e-6  # the same of the currents of trials from each other, whose covariance is of few blocks
-UNCERTAIN = 0.1  # standard error by service speed beyond which a current is not known
+UNCERTAIN = 0.05  # standard error by service speed beyond which a current is not known
+ONE_HEADING = 0.85  # length of the mean unit vector of the headings, beyond which speed hides the current
 SHORTEST = 5.0  # ship lengths at service speed that a trial lasts from which a current is estimated
 REMEDY = (
     "add a turn of a whole circle, or runs on other headings at the same shaft speed, give the current "
@@ -48,69 +49,89 @@ def in_still_water(
     used = [trial for trial in trials if trial.use != "skip" and trial.kind != "captive"]
     if ship is None:
         return list(trials), {}
-    found, report = _with_wind(used, ship, options.wind)
+    remarks: list[str] = []
+    found = _with_wind(used, ship, options.wind, remarks)
+    windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if ACCELERATIONS[0] in t}
+    report: dict[str, Any] = {"wind": {"option": options.wind, "mean_speeds": windy}} if windy else {}
     starts = [np.hypot(*over_ground(t))[0] for t in found.values() if {"u", "v"} <= t.channels.keys()]
     speed = ship.speed or float(np.median(starts or [0.0]))
     if options.current != "none" and speed > 0.0:
-        report |= _without_current(found, ship.length, speed, options.current)
+        currents = _take_out_known(found, speed, options.current)
+        currents |= _take_out_estimated(found, ship.length, speed, options.current, remarks)
+        report |= {"currents": currents} if currents else {}
+    report |= {"sea_remarks": remarks} if remarks else {}
     return [found.get(trial.name, trial) for trial in trials], report
 
 
 def _with_wind(
-    trials: Sequence[Trial], ship: Particulars, option: Any
-) -> tuple[dict[str, Trial], dict[str, Any]]:
-    """The trials by name, with the accelerations by their wind, and the report of it."""
+    trials: Sequence[Trial], ship: Particulars, option: Any, remarks: list[str]
+) -> dict[str, Trial]:
+    """The trials by name, with the accelerations by their wind."""
     found = {trial.name: trial for trial in trials}
     if option in ("none", "constant"):
-        return found, {}
+        return found
     try:
         found = {trial.name: measured_wind(trial, ship, option) for trial in trials}
     except InputError as error:
         if option != "auto":
             raise
-        return found, {"sea_remarks": [f"the wind that was logged is not taken out: {error}"]}
-    windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if ACCELERATIONS[0] in t}
-    if not windy and option != "auto":
+        remarks.append(f"the wind that was logged is not taken out: {error}")
+    if option != "auto" and not any(ACCELERATIONS[0] in trial for trial in found.values()):
         raise InputError(
             f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u and "
             'v; name them in [columns], or take wind = "constant"'
         )
-    return found, {"wind": {"option": option, "mean_speeds": windy}} if windy else {}
+    return found
 
 
-def _without_current(found: dict[str, Trial], length: float, speed: float, option: Any) -> dict[str, Any]:
-    """Take the current out of trials, by name; the report of it."""
-    unknown, currents, remarks = [], {}, []
+def _take_out_known(found: dict[str, Trial], speed: float, option: Any) -> dict[str, Any]:
+    """Take currents in columns, and one that is given, out of trials by name; each in words and numbers."""
+    currents = {}
     for trial in found.values():
         known = _known(trial, option)
-        if known is not None:
-            north, east = (float(np.mean(part)) for part in known)
-            if np.hypot(north, east) > speed:
-                raise InputError(
-                    f"trial {trial.name!r}: a current of {np.hypot(north, east):.2g} m/s found, expected less "
-                    f"than the ship's speed of {speed:.3g} m/s; give it in m/s, towards north and east"
-                )
-            found[trial.name] = through_water(trial, *known)
-            source = "columns" if COLUMNS[0] in trial else "given"
-            currents[trial.name] = _row(np.array([north, east]), None) | {"source": source}
-        elif (
-            trial.over_ground
-            and trial.channels.keys() >= NEEDED
-            and trial.duration > SHORTEST * length / speed
-        ):
-            unknown.append(trial)
+        if known is None:
+            continue
+        mean = np.array([np.mean(part) for part in known])
+        if np.hypot(*mean) > speed:
+            raise InputError(
+                f"trial {trial.name!r}: a current of {np.hypot(*mean):.2g} m/s found, expected less than the "
+                f"ship's speed of {speed:.3g} m/s; give it in m/s, towards north and east"
+            )
+        found[trial.name] = through_water(trial, *known)
+        source = "columns" if COLUMNS[0] in trial else "given"
+        currents[trial.name] = _row(mean, None) | {"source": source}
+    return currents
+
+
+def _take_out_estimated(
+    found: dict[str, Trial], length: float, speed: float, option: Any, remarks: list[str]
+) -> dict[str, Any]:
+    """Take estimated currents out of the trials whose velocities are still over ground."""
+    shortest = SHORTEST * length / speed
+    unknown = [
+        trial
+        for trial in found.values()
+        if trial.over_ground and trial.channels.keys() >= NEEDED and trial.duration > shortest
+    ]
+    headings = [trial["psi"] for trial in unknown if trial.use == "fit"]
+    one_heading = bool(headings) and abs(np.exp(1j * np.concatenate(headings)).mean()) > ONE_HEADING
+    currents, doubts = {}, {}
     for trial, mean, covariance, source in _estimates(unknown, length, speed, option):
         row = _row(mean, covariance) | {"source": source}
-        doubt = _doubt(mean, covariance, speed)
+        doubt = "the trials keep to one heading" if one_heading else _doubt(mean, covariance, speed)
         if doubt and option != "auto":
-            raise InputError(f"trial {trial.name!r}: {doubt}; {REMEDY}")
+            raise InputError(f"trial {trial.name!r}: its current cannot be told: {doubt}; {REMEDY}")
         row["taken_out"] = not doubt and (option != "auto" or row["probability"] < SIGNIFICANT)
         if doubt:
-            remarks.append(f"{PurePath(trial.name).name}: {doubt}, and was not taken out; {REMEDY}")
+            doubts.setdefault(doubt, []).append(PurePath(trial.name).name)
         if row["taken_out"]:
             found[trial.name] = through_water(trial, *mean)
         currents[trial.name] = row
-    return ({"currents": currents} if currents else {}) | ({"sea_remarks": remarks} if remarks else {})
+    remarks += [
+        f"{', '.join(names)}: the current cannot be told and is not taken out: {doubt}; {REMEDY}"
+        for doubt, names in doubts.items()
+    ]
+    return currents
 
 
 def _known(trial: Trial, option: Any) -> Floats | None:
@@ -191,14 +212,9 @@ def _doubt(mean: Floats, covariance: Floats, speed: float) -> str:
     variances, axes = np.linalg.eigh(covariance)
     if np.sqrt(variances[-1]) > UNCERTAIN * speed:
         axis = float(np.degrees(np.arctan2(axes[1, -1], axes[0, -1])) % 180.0)
-        return (
-            f"its current cannot be told (standard error {np.sqrt(variances[-1]):.2g} m/s along "
-            f"{axis:03.0f} deg): too few headings"
-        )
+        return f"its standard error along {axis:03.0f} deg is {np.sqrt(variances[-1]):.2g} m/s"
     if np.hypot(*mean) > speed:
-        return (
-            f"a current of {np.hypot(*mean):.2g} m/s was found, more than the ship's speed of {speed:.3g} m/s"
-        )
+        return f"{np.hypot(*mean):.2g} m/s is found, more than the ship's speed of {speed:.3g} m/s"
     return ""
 
 
