@@ -76,7 +76,8 @@ def over_ground(trial: Trial) -> tuple[Floats, Floats]:
     """Velocity of midship over ground, ahead and to starboard, m/s, of a trial that knows it."""
     if len({"u", "v"} & trial.derived) != 1:
         return trial["u"], trial["v"]
-    return rotate_to_body(*(time_derivative(trial.t, trial[name]) for name in "xy"), trial["psi"])
+    north, east = (time_derivative(trial.t, trial[name]) for name in "xy")
+    return rotate_to_body(north, east, trial["psi"])
 
 
 def _accelerations(u: Floats, v: Floats, measured: Floats, c: Floats) -> tuple[Floats, Floats]:
@@ -135,8 +136,7 @@ class _Runs:
 
     def current_column(self, trial: int, component: int) -> int:
         """Place of a component of a trial's current among the unknowns."""
-        first = COEFFICIENTS + 2 * self.count
-        return first + component + (0 if self.shared else 2 * trial)
+        return int(COEFFICIENTS + 2 * self.count + component + (0 if self.shared else 2 * trial))
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
         """What is measured less what is simulated, and the slopes of the latter by the unknowns.

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import median_filter
 
 from identification.regression import preprocess
@@ -27,6 +26,7 @@ from identification.regression.integrals import (
     twice_integrated,
 )
 from identification.regression.rudder import rebuild, straight
+from shipgym.arrays import integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
@@ -184,7 +184,7 @@ class _Sampling:
             features[q] = steps if window == 1 else summed[last] - summed[first]
             targets[q] = channels[q][last] - channels[q][first]
             if f"wind_{q}dot" in trial:
-                by_wind = cumulative_trapezoid(trial[f"wind_{q}dot"], t, initial=0.0)
+                by_wind = integral(t, trial[f"wind_{q}dot"])
                 targets[q] = targets[q] - (by_wind[last] - by_wind[first])
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part

@@ -7,12 +7,11 @@ from pathlib import PurePath
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 from scipy.stats import chi2
 
 from identification.regression.current import CurrentEstimate, estimate_current, over_ground
 from identification.regression.wind import ACCELERATIONS, measured_wind
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, integral
 from shipgym.checks import check_choice, check_keys, check_number
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
@@ -78,8 +77,8 @@ def _with_wind(
         remarks.append(f"the wind that was logged is not taken out: {error}")
     if option != "auto" and not any(ACCELERATIONS[0] in trial for trial in found.values()):
         raise InputError(
-            f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u and "
-            'v; name them in [columns], or take wind = "constant"'
+            f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u "
+            'and v; name them in [columns], or take wind = "constant"'
         )
     return found
 
@@ -115,7 +114,8 @@ def _take_out_estimated(
     ]
     headings = [trial["psi"] for trial in unknown if trial.use == "fit"]
     one_heading = bool(headings) and abs(np.exp(1j * np.concatenate(headings)).mean()) > ONE_HEADING
-    currents, doubts = {}, {}
+    currents: dict[str, Any] = {}
+    doubts: dict[str, list[str]] = {}
     for trial, mean, covariance, source in _estimates(unknown, length, speed, option):
         row = _row(mean, covariance) | {"source": source}
         doubt = "the trials keep to one heading" if one_heading else _doubt(mean, covariance, speed)
@@ -176,8 +176,8 @@ def _estimates(
         own = slice(2 * k, 2 * k + 2)
         yield trial, found.mean[own], found.covariance[own, own], "all trials" if shared else "trial"
     for trial in held_out:
-        own = found if shared else estimate_current([trial], length, speed, True, found.coefficients)
-        yield trial, own.mean[:2], own.covariance[:2, :2], "all trials" if shared else "trial"
+        last = found if shared else estimate_current([trial], length, speed, True, found.coefficients)
+        yield trial, last.mean[:2], last.covariance[:2, :2], "all trials" if shared else "trial"
 
 
 def _probability_of_one(each: CurrentEstimate) -> float:
@@ -228,7 +228,7 @@ def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     channels = dict(zip(COLUMNS, (north, east), strict=True))
     for name, speed in (("x", north), ("y", east)):
         if name in trial:
-            channels[name] = trial[name] - cumulative_trapezoid(speed, trial.t, initial=0.0)
+            channels[name] = trial[name] - integral(trial.t, speed)
     if trial.over_ground and trial.channels.keys() >= {"u", "v", "psi"}:
         drift = rotate_to_body(north, east, trial["psi"])
         for name, ground, own in zip("uv", over_ground(trial), drift, strict=True):
