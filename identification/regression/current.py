@@ -10,12 +10,12 @@ estimates with each trial, or each third of one, left out (jackknife): it holds 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from identification.regression.wind import accelerations
 from shipgym.arrays import Floats
+from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.trial import Trial
 from shipgym.trials.trial_import import rotate_to_body
@@ -34,8 +34,7 @@ ROUNDS, ENOUGH, DIFFERENCE = 20, 1e-3, 1e-4  # of Levenberg-Marquardt; its end; 
 SMALLEST = 0.003  # standard deviation of a residual, by U0
 
 
-@dataclass(frozen=True, eq=False)
-class CurrentEstimate:
+class CurrentEstimate(NamedTuple):
     """The currents of some trials, north and east after each other, and how certain they are."""
 
     mean: Floats  # m/s, shape (2 n_trials,); alike where shared
@@ -48,17 +47,9 @@ def estimate_current(
 ) -> CurrentEstimate:
     """The current of each trial, or of all.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        With psi, r, delta and velocities over ground; n, accelerations by wind and a speed u through the
-        water are used where they are there.
-    length, speed : float
-        Of the ship, m, and in service, m/s.
-    shared : bool
-        Whether all trials have one current.
-    known : array of shape (18,), optional
-        Coefficients of another estimate, which are then not fitted.
+    The trials have psi, r, delta and velocities over ground; n, accelerations by wind and a speed u through
+    the water are used where they are there. `length`, m, and `speed` in service, m/s, are the ship's;
+    `known`, shape (18,), are coefficients of another estimate, which are then not fitted.
     """
     runs = _Runs(trials, length, speed, shared, known)
     x, slopes, residuals = runs.fitted()
@@ -109,7 +100,7 @@ class _Runs:
         self.psi, self.valid = np.empty((2, len(grid), len(trials)))
         seen = np.full((len(grid), 3, len(trials)), np.nan)
         for k, trial in enumerate(trials):
-            wind = accelerations(trial)[:2] * travel / speed
+            wind = wind_accelerations(trial).T[:2] * travel / speed
             n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
             ahead, aside = over_ground(trial)
             c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
