@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
+from identification.regression.still_water import in_still_water
+from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -44,6 +47,7 @@ class Problem:
     samples: Samples  # the regression
     #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
+    sea: dict[str, Any]  # what is known of current and wind, for the provenance
 
 
 def pose(
@@ -54,7 +58,7 @@ def pose(
     Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
     particulars that do not suffice.
     """
-    everything = held_out(trials, options.hold_out)
+    everything, sea = in_still_water(held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
@@ -66,14 +70,21 @@ def pose(
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    regression = structure_samples(
-        used, table, ship, samples=options.samples, window=options.window, gear=steering,
-        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
+    regress = partial(
+        structure_samples, structure=table, particulars=ship, samples=options.samples, window=options.window,
+        gear=steering, smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
+    regression = regress(used)
+    if options.wind == "constant":
+        constants = constant_wind(used, regression, options.structure)
+        used, everything = (
+            [with_constant_wind(trial, constants) for trial in group] for group in (used, everything)
+        )
+        regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity)
+    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
 
 
 def _blank(

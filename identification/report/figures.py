@@ -14,6 +14,7 @@ from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
 from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
 from identification.validation.warnings import EQUATIONS
+from shipgym.arrays import Floats
 from shipgym.plots import (
     LIMIT,
     MEASURED,
@@ -33,8 +34,6 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-
-Floats = NDArray[np.float64]
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
 MOST_ROWS = 2500  # drawn of one equation

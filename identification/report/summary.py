@@ -8,6 +8,7 @@ from typing import Any
 from rich.table import Table
 
 from identification.fit import Fit
+from identification.report.sea import sea_sentences
 from identification.text import as_text, lined_table
 from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
 from shipgym.ships.particulars import ADDED_MASSES
@@ -30,7 +31,7 @@ def summary_table(fit: Fit) -> str:
     if "model_error" in provenance:
         error = provenance["model_error"]
         shown.append(f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']}).")
-    shown += undetermined(fit) + exactly_collinear(fit)
+    shown += sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit)
     return as_text(*shown, *([_against_reference(fit)] if "reference" in fit.metrics else []))
 
 

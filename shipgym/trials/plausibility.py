@@ -21,6 +21,7 @@ LIMITS: dict[str, float] = {
     "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
     "r_wave": 60.0 * _DEGREE, "phi_wave": 180.0 * _DEGREE, "p_wave": 360.0 * _DEGREE,
     "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
+    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * _DEGREE,
 }  # fmt: skip
 
 _FASTEST_TURN = 60.0 * _DEGREE

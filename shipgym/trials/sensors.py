@@ -172,6 +172,7 @@ class Sensors:
             use=trial.use,
             derived=trial.derived,
             length=trial.length,
+            over_ground=trial.over_ground,
         )
 
     def _sampled(self, trial: Trial) -> Floats:

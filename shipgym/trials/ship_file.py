@@ -21,7 +21,7 @@ from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import KINDS, USES, Trial
 from shipgym.trials.trial_import import Conventions
 
-_SECTIONS = ("ship", "steering", "columns", "conventions", "structure", "identify", "trials")
+_SECTIONS = ("ship", "steering", "columns", "conventions", "structure", "identify", "wind", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
 _TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
 
@@ -73,7 +73,9 @@ class ShipFile:
         steering = (
             SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
         )
-        identify = check_options(data.get("identify", {}), f"{path}: [identify]")
+        given = check_table(data.get("identify", {}), f"{path}: [identify]")
+        given = {**given, "wind": data["wind"]} if "wind" in data else given
+        identify = check_options(given, f"{path}: [identify]")
         data_only(identify, f"{path}: [identify]")
         structure = own_structure(data["structure"], f"{path}: [structure]") if "structure" in data else None
         return cls(path, particulars, steering, identify, _entries(path, data, particulars), structure)

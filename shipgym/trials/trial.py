@@ -59,6 +59,9 @@ class Trial:
         How many values of a channel were filled in, because they were missing or outliers.
     raw : Trial, optional
         The trial before it was smoothed or repaired.
+    over_ground : bool, optional
+        Whether `u` and `v` are velocities over ground, with the current in them, and not through the water.
+        By default where one of them was derived, as it is from positions.
 
     Raises
     ------
@@ -74,6 +77,7 @@ class Trial:
     derived: frozenset[str]
     length: float | None
     repaired: Mapping[str, int]
+    over_ground: bool
 
     def __init__(
         self,
@@ -87,6 +91,7 @@ class Trial:
         length: float | None = None,
         repaired: Mapping[str, int] | None = None,
         raw: Trial | None = None,
+        over_ground: bool | None = None,
     ) -> None:
         check_text(name, "trial: name")
         where = f"trial '{name}'"
@@ -105,6 +110,7 @@ class Trial:
             derived=frozenset(derived),
             length=None if length is None else check_number(length, f"{where}: length", above=0.0),
             repaired=MappingProxyType(dict(repaired or {})),
+            over_ground=bool({"u", "v"} & set(derived)) if over_ground is None else bool(over_ground),
             _raw=raw,
         )
 
@@ -158,16 +164,17 @@ class Trial:
 
     def _settings(self) -> dict[str, Any]:
         """The keyword arguments that make this trial of its channels."""
-        names = ("name", "kind", "use", "derived", "length")
+        names = ("name", "kind", "use", "derived", "length", "over_ground")
         own = {name: getattr(self, name) for name in names}
         return own | {"repaired": dict(self.repaired), "raw": vars(self)["_raw"]}
 
     def with_(self, **changes: Any) -> Trial:
-        """Return a copy with another ``name``, ``kind``, ``use`` or ``length``."""
-        unknown = changes.keys() - {"name", "kind", "use", "length"}
+        """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
+        known = ("name", "kind", "use", "length", "over_ground")
+        unknown = changes.keys() - set(known)
         if unknown:
             raise InputError(
-                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only name, kind, use, length"
+                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only {', '.join(known)}"
             )
         return Trial(self.t, self.channels, **(self._settings() | changes))
 
@@ -238,6 +245,7 @@ class Trial:
         t, channels, derived, repaired = import_csv(Path(path), columns, conventions)
         name = Path(path).name if name is None else name
         facts: dict[str, Any] = {"derived": derived, "repaired": repaired, "length": length}
+        facts["over_ground"] = True if velocity_frame == "earth" and "u" in channels else None
         return cls(t, channels, name=name, kind=kind, use=use, **facts)
 
     def to_csv(self, path: str | Path) -> None:

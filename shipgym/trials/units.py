@@ -17,6 +17,8 @@ UNITS: dict[str, dict[str, float]] = {
     "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
     "force": {"N": 1.0, "kN": 1000.0},
     "moment": {"N m": 1.0, "kN m": 1000.0},
+    "acceleration": {"m/s^2": 1.0},
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
 }
 
 #: The quantity that each channel measures.
@@ -26,6 +28,7 @@ QUANTITIES: dict[str, str] = {
     "delta_command": "angle", "n_command": "shaft speed", "X": "force", "Y": "force", "N": "moment",
     "psi_wave": "angle", "r_wave": "angular rate", "phi_wave": "angle", "p_wave": "angular rate",
     "current_north": "speed", "current_east": "speed", "wind_speed": "speed", "wind_from": "angle",
+    "wind_udot": "acceleration", "wind_vdot": "acceleration", "wind_rdot": "angular acceleration",
 }  # fmt: skip
 
 #: Names of the channels, without time.

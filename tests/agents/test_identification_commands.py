@@ -41,7 +41,7 @@ GENERAL = [
     'structure = "linear-steering"', 'samples = "integral"', 'name = "mine"', "window = 9", "smooth = false",
     'preprocessing = "savgol"', "repair = true", 'uncertainty = "bootstrap"', "guarded = false",
     'hold_out = ["zigzag_10_10.csv"]', 'prior = "clarke"', "prior_strength = 0.1",
-    'prior_folds = "largest-rudder"',
+    'prior_folds = "largest-rudder"', "current = { north = 0.1, east = -0.2 }", 'wind = "none"',
 ]  # fmt: skip
 
 

@@ -668,3 +668,14 @@ def test_what_no_ship_does_begins_at_its_limit(tmp_path, channel, unit, largest)
     path = write(tmp_path / "more.csv", {"t": T, channel: np.full(T.size, 1.01 * largest)})
     with pytest.raises(InputError, match=rf"{channel} = .* found, expected at most"):
         Trial.from_csv(path, columns)
+
+
+def test_velocities_derived_from_positions_are_over_ground(tmp_path):
+    """GNSS positions hold the current, a log's velocities do not; copies and pickles remember which it is."""
+    whole = Trial(T, manoeuvre()[0])
+    whole.to_csv(tmp_path / "log.csv")
+    assert not Trial.from_csv(tmp_path / "log.csv").over_ground
+    Trial(T, {name: whole[name] for name in ("x", "y", "psi")}).to_csv(tmp_path / "gnss.csv")
+    gnss = Trial.from_csv(tmp_path / "gnss.csv")
+    assert all(copy.over_ground for copy in (gnss, gnss.with_(name="a"), pickle.loads(pickle.dumps(gnss))))
+    assert not gnss.with_(over_ground=False).with_channels({"u": gnss["u"]}).over_ground

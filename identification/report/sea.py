@@ -1,0 +1,82 @@
+"""What was taken out of the trials for current and wind: sentences, and tracks through the water."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.fit import Fit
+from identification.regression.still_water import SIGNIFICANT
+from shipgym.plots import LIMIT, MEASURED, MODEL, axis, label, layout, line, subplots
+
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure
+
+KNOT = 1852.0 / 3600.0
+NORMAL_95 = 1.96
+SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
+
+
+def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
+    """Which current and wind the trials had, by the provenance of a model, and what became of them."""
+    of_trials: dict[str, list[str]] = {}
+    for name, row in provenance.get("currents", {}).items():
+        of_trials.setdefault(_current(row), []).append(PurePath(name).name)
+    found = [f"{', '.join(names)}: {text}" for text, names in of_trials.items()]
+    wind = provenance.get("wind", {})
+    if "mean_speeds" in wind:
+        speeds = wind["mean_speeds"].values()
+        found.append(
+            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces are taken out"
+        )
+    for name, row in wind.get("accelerations", {}).items():
+        parts = [
+            f"{axis[5]}dot {value:.2g} {'m' if axis[5] == 'v' else 'rad'}/s²" for axis, value in row.items()
+        ]
+        found.append(f"{PurePath(name).name}: constant acceleration taken out, {', '.join(parts)}")
+    return found
+
+
+def _current(row: Mapping[str, Any]) -> str:
+    """One current in words: set and drift, interval, and whether there is one."""
+    text = f"current of {_set_and_drift(row)}, {SOURCES[row['source']]}"
+    if "standard_errors" in row:
+        north, east = (NORMAL_95 * error for error in row["standard_errors"])
+        text += f", north {row['north']:.3f} ± {north:.3f}, east {row['east']:.3f} ± {east:.3f} m/s (95 %)"
+        text += f", which {'differs' if row['probability'] < SIGNIFICANT else 'does not differ'} from zero"
+    return text + ("; taken out" if row["taken_out"] else "; left in")
+
+
+def _set_and_drift(row: Mapping[str, Any]) -> str:
+    speed, towards = np.hypot(row["north"], row["east"]), np.degrees(np.arctan2(row["east"], row["north"]))
+    return f"{speed:.2f} m/s ({speed / KNOT:.2f} knots) towards {towards % 360.0:03.0f} deg"
+
+
+def track_figure(fit: Fit) -> Figure | None:
+    """Tracks over ground and through the water, and the way of the current; None where none was taken out."""
+    rows = {n: row for n, row in (fit.model.provenance or {}).get("currents", {}).items() if row["taken_out"]}
+    trials = [trial for trial in fit.trials if trial.name in rows and {"x", "y"} <= trial.channels.keys()]
+    if not trials:
+        return None
+    titles = [f"{PurePath(t.name).name}: {_set_and_drift(rows[t.name])}" for t in trials]
+    lines, columns = -(-len(trials) // 2), min(len(trials), 2)
+    figure = subplots(lines, columns, titles=titles, vertical_spacing=0.36 / max(lines, 2))
+    for k, trial in enumerate(trials):
+        place, row = {"row": k // 2 + 1, "col": k % 2 + 1}, rows[trial.name]
+        drift = np.array([row["east"], row["north"]]) * trial.duration
+        end = np.array([trial["y"][-1], trial["x"][-1]])
+        tracks: list[tuple[Any, Any, str, str]] = [
+            (trial.raw["y"], trial.raw["x"], "over ground", MEASURED),
+            (trial["y"], trial["x"], "through the water", MODEL),
+            (*np.array([end, end + drift]).T, "the water meanwhile", LIMIT),
+        ]
+        for east, north, name, colour in tracks:
+            figure.add_trace(line(east, north, name, colour, 1.7, showlegend=k == 0), **place)
+        label(
+            figure, "east, m", axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1), **place
+        )
+    figure.update_layout(layout(300 * lines + 80, titled=True, hovermode="closest"))
+    return figure
