@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from agents.cli.command import FAILED, IdentifyOptions, Json, ShipFileArgument, answered, fail
-from shipgym.trials.identify_table import AUTO, Options
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -50,13 +49,13 @@ def identify_command(
         _identify(read, settings, out, as_json)
 
 
-def _chosen(ship: Path, options: dict[str, Any], unnamed: str = AUTO) -> tuple[ShipFile, dict[str, Any]]:
-    """The ship file, and the options: of the command line first; `unnamed`: the structure else."""
+def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFile, dict[str, Any]]:
+    """The ship file, and the options: of the command line first; `unnamed`: the structure if not auto."""
     from agents.identifying import identification_settings
     from shipgym.trials.ship_file import ShipFile
 
     read = ShipFile.load(ship)
-    return read, identification_settings(read, options, unnamed)
+    return read, identification_settings(read, options, *unnamed)
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
@@ -150,7 +149,7 @@ def advise_command(
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
-    read, settings = _chosen(ship, options, Options.structure)
+    read, settings = _chosen(ship, options, "abkowitz")
     with err.status("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
@@ -188,7 +187,7 @@ def reduce_command(
     from identification.result import FILES
     from shipgym.files import write_json
 
-    read, settings = _chosen(ship, options, Options.structure)
+    read, settings = _chosen(ship, options, "abkowitz")
     with whole_folder(out, (*FILES, "reduction.json")) as draft, err.status("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
