@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import checked_observation, heading_error
+from agents.controllers.memory import checked_observation, deviations
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -115,6 +115,8 @@ class Controller:
     #: What it observes, and names of its gains where they are not those of `feedback`.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
     gain_names: ClassVar[tuple[str, ...]] = ()
+    #: What it reads of the ship beside her heading, where that does not follow from `feedback`.
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a length, or its name.
@@ -210,23 +212,22 @@ class Controller:
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; nothing is remembered, and the state is returned as given."""
         seen = checked_observation(observation, self.observation_names)
-        deviations = self._deviations(seen[..., : len(self.observation_names)])
-        order = np.full(seen.shape[:-1], self.neutral_rudder)
-        for gain, (signal, sign) in self.feedback.items():
-            order = order + sign * self.gains[gain] * deviations[signal]
+        seen = seen[..., : len(self.observation_names)] * self.observation_scales
+        order, _ = self.steer(dict(zip(self.observation_names, seen.T, strict=True)), np.zeros(0), None)
         limit = self.observation_scales[self.observation_names.index("rudder")]
         return np.clip(order / limit, -1.0, 1.0)[..., None].astype(np.float32), state
 
-    def _deviations(self, seen: Floats) -> dict[str, Floats]:
-        """Deviations from straight running by signal, SI units, each of shape (...)."""
-        values = dict(zip(self.observation_names, (seen * self.observation_scales).T, strict=True))
-        return {
-            "heading_error": heading_error(values),
-            "yaw_rate": values["yaw_rate"],
-            "sway": values["sway"] - self.neutral_sway,
-            "rudder": values["rudder"] - self.neutral_rudder,
-            "heading_error_integral": values["heading_error_integral"],
-        }
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Any) -> tuple[Floats, Floats]:
+        """Commanded rudder, rad, not yet limited, and the memory, of which this controller has none.
+
+        `seen`: what is observed by name, SI units, each of one shape, which is that of the order.
+        """
+        found = deviations(seen, self.neutral_rudder, self.neutral_sway)
+        by_signal = dict(zip(SIGNALS, np.moveaxis(found, -1, 0), strict=True))
+        order = np.full(found.shape[:-1], self.neutral_rudder)
+        for gain, (signal, sign) in self.feedback.items():
+            order = order + sign * self.gains[gain] * by_signal[signal]
+        return order, memory
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse to steer what shows other quantities first, or in other scales, than those designed for.

@@ -1,0 +1,123 @@
+"""A controller as it stands on a bridge: numbers of one ship in SI units in, the ordered rudder out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.los_autopilot import Guided
+from agents.controllers.stateful import Stateful
+from shipgym.engine.records import field_types
+from shipgym.errors import InputError
+from shipgym.tasks.contract import Seen
+from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.path_following import Observation
+from shipgym.tasks.steering import INTEGRAL_ZONE, Extras, Helm
+from shipgym.tasks.task import rounded_interval
+
+#: Unit and meaning of what autopilots may be given, in order.
+INPUTS = {
+    "set_point": ("rad", "heading to steer, clockwise from north"), "heading": ("rad", "clockwise from north"),
+    "yaw_rate": ("rad/s", "to starboard positive"), "sway": ("m/s", "through the water, to starboard positive"),
+    "surge": ("m/s", "through the water"), "rudder": ("rad", "measured angle, to starboard positive"),
+    "cross_track": ("m", "distance from the leg, to starboard of it positive"),
+}  # fmt: skip
+OF_GUIDANCE = ("rad", "direction of the leg of the path, clockwise from north")
+#: Observations that an autopilot makes itself.
+OWN = ("heading_error_sin", "heading_error_cos", "last_command", "heading_error_integral")
+
+
+def inputs_of(agent: Any) -> dict[str, tuple[str, str]]:
+    """Unit and meaning of what a controller reads, by name."""
+    names = {"set_point", "heading", *_reads(agent)}
+    known = {name: about for name, about in INPUTS.items() if name in names}
+    known |= {name: ("SI", "as the environment shows it") for name in sorted(names - known.keys())}
+    return known | ({"set_point": OF_GUIDANCE} if isinstance(agent, Guided) else {})
+
+
+def _reads(agent: Any) -> set[str]:
+    if isinstance(agent, Guided):
+        return {"cross_track"} | _reads(agent.autopilot)
+    if not isinstance(agent, Controller):
+        base = getattr(agent, "base", None)
+        return {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
+    if type(agent).steer is not Controller.steer:
+        return set(agent.reads)
+    return {signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]} & INPUTS.keys()
+
+
+def interval_of(agent: Any) -> float:
+    """Control interval, s: that of the design, or of the environment that a policy learned in."""
+    if isinstance(agent, Controller):
+        return float(agent.design["dt"])
+    per_length_time = agent.observation_scales[agent.observation_names.index("yaw_rate")]
+    return float(getattr(agent, "env_options", {}).get("dt") or rounded_interval(1.0 / per_length_time))
+
+
+@cache
+def bounds() -> dict[str, tuple[float, float]]:
+    """Bounds of observations by name, in multiples of their scale."""
+    notes = [note for record in (Helm, Extras, Observation) for note in field_types(record, notes=True).items()]
+    seen = [(name, one) for name, note in notes for one in getattr(note, "__metadata__", ())]
+    return {name: (one.low, one.high) for name, one in seen if isinstance(one, Seen)}
+
+
+class Autopilot:
+    """Any controller or policy, stepped once in each control interval in double precision.
+
+    It adds what an environment would: the integral of the heading error, and the last command.
+
+    Parameters
+    ----------
+    agent : Controller or Policy
+        Guidance is given the direction of the leg as its set-point. A policy that learned to follow paths is
+        given the course that its environment shows: the leg's less atan(cross-track error / lookahead).
+
+    Raises
+    ------
+    InputError
+        For a policy that commands the shaft too.
+    """
+
+    def __init__(self, agent: Any) -> None:
+        if getattr(agent, "action", "rudder") == "rudder-shaft":
+            raise InputError("autopilot: a policy that commands rudder and shaft found, expected rudder alone")
+        self.agent, self.inputs, self.dt = agent, inputs_of(agent), interval_of(agent)
+        self.pilot = agent.autopilot if isinstance(agent, Guided) else agent
+        self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
+        self.limit = self.scales["rudder"]
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget everything, as when the autopilot is switched on."""
+        self.begins, self.drift, self.integral, self.last_command = True, np.zeros(1), 0.0, 0.0
+        self.memory: Any = np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Stateful) else None
+
+    def step(self, given: Mapping[str, float]) -> float:
+        """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""
+        error = wrapped(given["set_point"] - given["heading"])
+        if isinstance(self.agent, Guided):
+            course, self.drift = self.agent.course(np.array([given["cross_track"]]), self.drift)
+            error = wrapped(error + course[0])
+        reach = self.scales["heading_error_integral"]
+        gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
+        self.integral = min(max(self.integral + gathered, -reach), reach)
+        own = (np.sin(error), np.cos(error), self.last_command, self.integral)
+        order = self._order({**given, **dict(zip(OWN, own, strict=True))})
+        self.begins, self.last_command = False, min(max(order, -self.limit), self.limit)
+        return self.last_command
+
+    def _order(self, seen: Mapping[str, float]) -> float:
+        pilot = self.pilot
+        if isinstance(pilot, Controller):
+            arrays = {name: np.array([seen.get(name, 0.0)]) for name in pilot.observation_names}
+            order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
+            return float(order[0])
+        names, scales = pilot.observation_names, pilot.observation_scales
+        shown = [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in zip(names, scales, strict=True)]
+        action, self.memory = pilot.predict(np.array(shown, dtype=np.float32), self.memory, self.begins)
+        return float(action[0]) * self.limit
