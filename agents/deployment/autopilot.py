@@ -61,7 +61,9 @@ def interval_of(agent: Any) -> float:
 @cache
 def bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
-    notes = [note for record in (Helm, Extras, Observation) for note in field_types(record, notes=True).items()]
+    notes = [
+        note for record in (Helm, Extras, Observation) for note in field_types(record, notes=True).items()
+    ]
     seen = [(name, one) for name, note in notes for one in getattr(note, "__metadata__", ())]
     return {name: (one.low, one.high) for name, one in seen if isinstance(one, Seen)}
 
@@ -85,7 +87,9 @@ class Autopilot:
 
     def __init__(self, agent: Any) -> None:
         if getattr(agent, "action", "rudder") == "rudder-shaft":
-            raise InputError("autopilot: a policy that commands rudder and shaft found, expected rudder alone")
+            raise InputError(
+                "autopilot: a policy that commands rudder and shaft found, expected rudder alone"
+            )
         self.agent, self.inputs, self.dt = agent, inputs_of(agent), interval_of(agent)
         self.pilot = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
@@ -118,6 +122,8 @@ class Autopilot:
             order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
             return float(order[0])
         names, scales = pilot.observation_names, pilot.observation_scales
-        shown = [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in zip(names, scales, strict=True)]
+        shown = [
+            np.clip(seen[name] / scale, *bounds()[name]) for name, scale in zip(names, scales, strict=True)
+        ]
         action, self.memory = pilot.predict(np.array(shown, dtype=np.float32), self.memory, self.begins)
         return float(action[0]) * self.limit
