@@ -112,12 +112,16 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
 
     def __init__(self, received: Callable[[str], None], ends: set[Line]) -> None:
         self.received, self.ends, self.rest = received, ends, b""
-        self.send: Callable[[bytes], Any] = lambda data: None
+        self.transport: Any = None
 
     def connection_made(self, transport: Any) -> None:
         """A stream, or a socket of datagrams, is open."""
+        self.transport = transport
         self.ends.add(self)
-        self.send = transport.write if hasattr(transport, "write") else transport.sendto
+
+    def send(self, data: bytes) -> None:
+        """Send bytes to the other end."""
+        self.transport.write(data)
 
     def connection_lost(self, error: Exception | None) -> None:
         """It is closed."""
@@ -127,24 +131,24 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
         """Bytes of a stream, in any portions."""
         *lines, self.rest = (self.rest + data).split(b"\n")
         self.rest = self.rest if len(self.rest) <= LONGEST_LINE else b""
-        for line in lines:
+        for line in filter(bytes.strip, lines):
             self.received(line[:LONGEST_LINE].decode("ascii", "replace").strip())
 
 
 class Datagrams(Line):
     """The same over UDP: what is sent goes to whoever was heard last."""
 
-    transport: Any
-
-    def connection_made(self, transport: Any) -> None:
-        """The socket is open."""
-        super().connection_made(transport)
-        self.transport = transport
+    peer: Any = None
 
     def datagram_received(self, data: bytes, address: Any) -> None:
         """One datagram, of whole lines."""
-        self.send = lambda out: self.transport.sendto(out, address)
+        self.peer = address
         self.data_received(data + b"\n")
+
+    def send(self, data: bytes) -> None:
+        """Send a datagram; nobody is known before the first is received, unless the socket is connected."""
+        if self.peer or self.transport.get_extra_info("peername"):
+            self.transport.sendto(data, self.peer)
 
     def error_received(self, error: Exception) -> None:
         """Nobody listens at the other end yet."""
@@ -189,11 +193,7 @@ class Link:
         loop = asyncio.get_running_loop()
         if kind == "udp":
             where = {"remote_addr": (host, port)} if serve else {"local_addr": (host, port)}
-            transport, _ = await loop.create_datagram_endpoint(
-                lambda: Datagrams(self.received, self.ends), **where
-            )  # type: ignore[arg-type]
-            if serve:
-                next(iter(self.ends)).send = transport.sendto
+            await loop.create_datagram_endpoint(lambda: Datagrams(self.received, self.ends), **where)  # type: ignore[arg-type]
         elif serve:
             server = await loop.create_server(lambda: Line(self.received, self.ends), host, port)
             self.closers.append(server.close)
@@ -207,9 +207,18 @@ class Link:
             raise InputError("pyserial is not installed: pip install 'shipgym[nmea]'") from None
         port = serial.Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
         line, loop = Line(self.received, self.ends), asyncio.get_running_loop()
-        line.send, self.ends = port.write, {line}
-        loop.add_reader(port.fileno(), lambda: line.data_received(port.read(4096)))
-        self.closers += [lambda: loop.remove_reader(port.fileno()), port.close]
+        line.connection_made(port)
+        number = port.fileno()
+
+        def read() -> None:
+            try:
+                line.data_received(port.read(LONGEST_LINE))
+            except OSError as error:  # unplugged
+                loop.remove_reader(number)
+                line.connection_lost(error)
+
+        loop.add_reader(number, read)
+        self.closers.append(lambda: loop.remove_reader(number))
 
     def send(self, text: str) -> None:
         """Send sentences to all that are connected."""
@@ -219,5 +228,5 @@ class Link:
 
     def close(self) -> None:
         """Close whatever is open."""
-        for close in self.closers:
+        for close in (*self.closers, *(end.transport.close for end in self.ends)):
             close()
