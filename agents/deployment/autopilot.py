@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,33 +14,22 @@ from agents.controllers.los_autopilot import Guided
 from agents.controllers.stateful import Stateful
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
+from shipgym.files import read_toml
 from shipgym.tasks.contract import Seen
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.path_following import Observation
 from shipgym.tasks.steering import INTEGRAL_ZONE, Extras, Helm
 from shipgym.tasks.task import rounded_interval
 
-#: Unit and meaning of what autopilots may be given, in order.
-INPUTS = {
-    "set_point": ("rad", "heading to steer, clockwise from north"), "heading": ("rad", "clockwise from north"),
-    "yaw_rate": ("rad/s", "to starboard positive"), "sway": ("m/s", "through the water, to starboard positive"),
-    "surge": ("m/s", "through the water"), "rudder": ("rad", "measured angle, to starboard positive"),
-    "cross_track": ("m", "distance from the leg, to starboard of it positive"),
-}  # fmt: skip
-OF_GUIDANCE = ("rad", "direction of the leg of the path, clockwise from north")
+#: Unit and meaning of variables by name, of ships and autopilots.
+VARIABLES = read_toml(Path(__file__).with_name("variables.toml"), "table of variables")
+INPUTS = VARIABLES["autopilot_input"]
 #: Observations that an autopilot makes itself.
 OWN = ("heading_error_sin", "heading_error_cos", "last_command", "heading_error_integral")
 
 
-def inputs_of(agent: Any) -> dict[str, tuple[str, str]]:
-    """Unit and meaning of what a controller reads, by name."""
-    names = {"set_point", "heading", *_reads(agent)}
-    known = {name: about for name, about in INPUTS.items() if name in names}
-    known |= {name: ("SI", "as the environment shows it") for name in sorted(names - known.keys())}
-    return known | ({"set_point": OF_GUIDANCE} if isinstance(agent, Guided) else {})
-
-
 def _reads(agent: Any) -> set[str]:
+    """What a controller reads of the ship beside her heading."""
     if isinstance(agent, Guided):
         return {"cross_track"} | _reads(agent.autopilot)
     if not isinstance(agent, Controller):
@@ -48,14 +38,6 @@ def _reads(agent: Any) -> set[str]:
     if type(agent).steer is not Controller.steer:
         return set(agent.reads)
     return {signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]} & INPUTS.keys()
-
-
-def interval_of(agent: Any) -> float:
-    """Control interval, s: that of the design, or of the environment that a policy learned in."""
-    if isinstance(agent, Controller):
-        return float(agent.design["dt"])
-    per_length_time = agent.observation_scales[agent.observation_names.index("yaw_rate")]
-    return float(getattr(agent, "env_options", {}).get("dt") or rounded_interval(1.0 / per_length_time))
 
 
 @cache
@@ -69,35 +51,32 @@ def bounds() -> dict[str, tuple[float, float]]:
 
 
 class Autopilot:
-    """Any controller or policy, stepped once in each control interval in double precision.
+    """Any controller or policy, stepped once in each control interval `dt` in double precision.
 
-    It adds what an environment would: the integral of the heading error, and the last command.
-
-    Parameters
-    ----------
-    agent : Controller or Policy
-        Guidance is given the direction of the leg as its set-point. A policy that learned to follow paths is
-        given the course that its environment shows: the leg's less atan(cross-track error / lookahead).
+    It adds what an environment would: the integral of the heading error, and the last command. `inputs` names
+    what it reads. Guidance is given the direction of the leg as its set-point, a policy that learned to follow
+    paths the course that its environment shows: the leg's less atan(cross-track error / lookahead).
 
     Raises
     ------
     InputError
-        For a policy that commands the shaft too.
+        For a policy that commands the shaft too, or reads what no ship is known to show.
     """
 
     def __init__(self, agent: Any) -> None:
-        if getattr(agent, "action", "rudder") == "rudder-shaft":
+        names = {"set_point", "heading", *_reads(agent)}
+        if getattr(agent, "action", "rudder") == "rudder-shaft" or not names <= INPUTS.keys():
             raise InputError(
-                "autopilot: a policy that commands rudder and shaft found, expected rudder alone"
+                f"autopilot: a policy that commands {getattr(agent, 'action', 'rudder')} and reads "
+                f"{', '.join(sorted(names))[:200]} found, expected rudder alone, by {', '.join(INPUTS)}"
             )
-        self.agent, self.inputs, self.dt = agent, inputs_of(agent), interval_of(agent)
+        self.agent, self.inputs = agent, [name for name in INPUTS if name in names]
         self.pilot = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
-        self.limit = self.scales["rudder"]
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget everything, as when the autopilot is switched on."""
+        self.limit, given = self.scales["rudder"], getattr(agent, "env_options", {}).get("dt")
+        self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
+        if isinstance(agent, Controller):
+            self.dt = float(agent.design["dt"])
         self.begins, self.drift, self.integral, self.last_command = True, np.zeros(1), 0.0, 0.0
         self.memory: Any = np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Stateful) else None
 
@@ -121,9 +100,9 @@ class Autopilot:
             arrays = {name: np.array([seen.get(name, 0.0)]) for name in pilot.observation_names}
             order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
             return float(order[0])
-        names, scales = pilot.observation_names, pilot.observation_scales
-        shown = [
-            np.clip(seen[name] / scale, *bounds()[name]) for name, scale in zip(names, scales, strict=True)
-        ]
-        action, self.memory = pilot.predict(np.array(shown, dtype=np.float32), self.memory, self.begins)
+        pairs = zip(pilot.observation_names, pilot.observation_scales, strict=True)
+        shown = np.array(
+            [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in pairs], dtype=np.float32
+        )
+        action, self.memory = pilot.predict(shown, self.memory, self.begins)
         return float(action[0]) * self.limit

@@ -15,7 +15,7 @@ import shipgym
 from agents.controllers.controller import Controller
 from agents.controllers.filtered_pid import notch_band
 from agents.controllers.los_autopilot import Guided
-from agents.deployment.autopilot import Autopilot, bounds
+from agents.deployment.autopilot import VARIABLES, Autopilot, bounds
 from agents.deployment.translator import KEYWORDS, Translator, literal
 from agents.policies.policy import ORDERS, LearnedPolicy
 from shipgym.engine.mathematics import sin_cos
@@ -31,26 +31,7 @@ from shipgym.tasks.steering import INTEGRAL_ZONE
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
 LAWS = ("lq-scheduled", "lqg", "pid-filtered")  # with a law of their own in the template
-#: Unit and meaning of a ship's state, and of what is given to her.
-STATE = {
-    "x": ("m", "north"), "y": ("m", "east"), "psi": ("rad", "heading"), "u": ("m/s", "surge"),
-    "v": ("m/s", "sway"), "r": ("rad/s", "yaw rate"), "p": ("rad/s", "roll rate"), "phi": ("rad", "heel"),
-    "q": ("rad/s2", "memory of yaw"), "delta": ("rad", "rudder angle"), "n": ("1/s", "shaft speed"),
-}  # fmt: skip
-SHIP_INPUTS = {
-    "rudder": ("rad", "rudder order, to starboard positive"), "shaft": ("1/s", "ordered shaft speed"),
-    "current_north": ("m/s", "current"), "current_east": ("m/s", "current"),
-    "wind_speed": ("m/s", "10 m above the sea; 0: no wind forces"),
-    "wind_from": ("rad", "direction the wind comes from"),
-}  # fmt: skip
-
-
-class Variable(NamedTuple):
-    """A number that is given to what was exported, or read of it."""
-
-    unit: str
-    about: str
-    start: float = 0.0
+Variables = dict[str, tuple[str, str, float]]  #: unit, meaning and first value
 
 
 @dataclass(frozen=True)
@@ -60,16 +41,15 @@ class Source:
     name: str
     header: str
     source: str
-    inputs: dict[str, Variable]
-    outputs: dict[str, Variable]
-    #: of an autopilot its control interval, of a ship the longest advised step, s
-    step: float
+    inputs: Variables
+    outputs: Variables
+    step: float  # s, of an autopilot its control interval, of a ship the longest advised step
     ship: bool
     notes: tuple[str, ...] = ()  # what was left out, and why
 
 
 class ShipInput(NamedTuple):
-    """What is given to a ship, held over a step (`SHIP_INPUTS`)."""
+    """What is given to a ship, held over a step (`variables.toml`)."""
 
     rudder: float
     shaft: float
@@ -92,28 +72,18 @@ def advance(motion: Motion, given: ShipInput, h: float, c: Any, ship: Ship, p: S
 
 
 def ship_source(model: ShipModel, name: str | None = None, water_depth: float = np.inf) -> Source:
-    """A ship model as C99: a table of terms, equations of her own, a grey box.
+    """A ship model as C99, by default of the model's name, in water of a depth in m.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship; with particulars too few for wind forces, these are left out.
-    name : str, optional
-        By which the C knows her; by default that of the model.
-    water_depth : float
-        m; for ships that know shallow water.
-
-    Raises
-    ------
-    InputError
-        For a name that C does not take, shallow water that the model does not know, and equations that use
-        more than arithmetic.
+    A ship with too few particulars for wind forces is written without them, as `Source.notes` says. Raises
+    InputError for a name that C does not take, shallow water that the model does not know, and equations of
+    one's own that use more than arithmetic.
     """
-    name, vessel, p = checked_name(name or model.name), model.vessel, model.particulars
-    notes: tuple[str, ...] = ()
+    name, vessel, p, notes = checked_name(name or model.name), model.vessel, model.particulars, ()
+    without = set() if "n" in model.command_names else {"shaft"}
     try:
         column = weather_column(model, Weather(wind=Wind(1.0, 0.0, gust=False)), 1.0, water_depth)
     except InputError as error:
+        without |= {"wind_speed", "wind_from"}
         notes, column = (f"wind is left out: {error}",), np.array(flat(CALM))
     column[leaves(SeaParameters).index("wind_speed")] = 0.0  # it is given
     c = Translator(
@@ -121,78 +91,64 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
     )
     numbers = iter([*model.ship_numbers(water_depth), *column])
     kinds = {"SHIP": Ship, "COEFFICIENTS": vessel.coefficients, "SEA": SeaParameters}
-    begin = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
-    begin.setdefault("n", model.service_shaft_speed)
-    without = ({"shaft"} - {"shaft"} if "n" in model.command_names else {"shaft"}) | (
-        {"wind_speed", "wind_from"} if notes else set()
+    first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
+    begin = {"n": model.service_shaft_speed, "shaft": model.service_shaft_speed, **first}
+    inputs, outputs = (
+        {one: (*about, begin.get(one, 0.0)) for one, about in VARIABLES[kind].items() if one in known}
+        for kind, known in (
+            ("ship_input", {*ShipInput._fields} - without),
+            ("ship_state", {*first} | ({"n"} - without if "shaft" not in without else set())),
+        )
     )
-    used = {one: Variable(*about) for one, about in SHIP_INPUTS.items() if one not in without}
-    if "shaft" in used:
-        used["shaft"] = used["shaft"]._replace(start=begin["n"])
-    shown = [one for one in Motion._fields if one in model.state_names or (one == "n" and "shaft" in used)]
-    step = LONGEST_STEP * p["length"] / p["speed"]
-    data = {
-        "constants": {one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
-        "advance": c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
-        "lost": c.function(lost, Motion, Ship)[0],
-        "begin": c.constant(Motion, (begin.get(one, 0.0) for one in Motion._fields)),
-        "state": STATE, "states": model.state_names, "inputs": SHIP_INPUTS, "used": used, "step": step,
-        "speed": p["speed"], "shaft": begin["n"], "limit": model.steering.limit,
-        "structures": c.structures, "functions": c.functions,
-    }  # fmt: skip
-    title = f"Ship model '{_comment(model.name)}'"
-    header, source = (render(f"ship.{kind}.j2", name, title=title, **data) for kind in "hc")
-    outputs = {one: Variable(*STATE[one], begin[one]) for one in shown}
-    return Source(name, header, source, used, outputs, step, True, notes)
+    return _written(
+        "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"], notes,
+        constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
+        advance=c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
+        lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions,
+        begin=c.constant(Motion, (begin.get(one, 0.0) for one in Motion._fields)), variables=VARIABLES,
+        speed=p["speed"], shaft=begin["shaft"], limit=model.steering.limit,
+    )  # fmt: skip
 
 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:
     """A controller or a learned policy as C99, with the integral of the heading error.
 
-    Parameters
-    ----------
-    agent : Controller or LearnedPolicy
-        One whose law is a list of gains ("pid", "lq", one of your own with `feedback`), "lq-scheduled",
-        "lqg", "pid-filtered", guidance over one of these, or a policy that commands the rudder, with or
-        without one of these as its base.
-    name : str, optional
-        By which the C knows it; by default that of the controller.
-
-    Raises
-    ------
-    InputError
-        For any other controller, and for a name that C does not take.
+    Its law is a list of gains ("pid", "lq", one of your own with `feedback`), "lq-scheduled", "lqg" or
+    "pid-filtered", guidance over one of these, or a policy that commands the rudder, with or without one of
+    these as its base. Raises InputError for any other controller, and for a name that C does not take.
     """
     policy = agent if isinstance(agent, LearnedPolicy) else None
     base = agent if policy is None else policy.base
     guide = base if isinstance(base, Guided) else None
     pilot = base if guide is None else guide.autopilot
     linear = isinstance(pilot, Controller) and type(pilot).steer is Controller.steer
-    if pilot is not None and not linear and getattr(pilot, "kind", "") not in LAWS:
+    law = "linear" if linear else getattr(pilot, "kind", "")
+    if pilot is not None and not linear and law not in LAWS:
         raise InputError(
-            f"controller '{getattr(pilot, 'name', type(pilot).__name__)}': found, which cannot be written as C: it is "
-            f"no closed law. Export one of 'pid', 'lq', {', '.join(map(repr, LAWS))}, 'los', 'ilos' or 'alos' "
+            f"controller '{getattr(pilot, 'name', type(pilot).__name__)}' found, which is no closed law that C "
+            f"could be written of. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, 'los', 'ilos' or 'alos' "
             "over one of these, or a learned policy"
         )
-    name, bridge = checked_name(name or agent.name), Autopilot(agent)
-    memory = getattr(pilot, "memory_size", 0)
+    bridge = Autopilot(agent)
+    inputs = {one: (*VARIABLES["autopilot_input"][one], 0.0) for one in bridge.inputs}
+    outputs = {one: (*about, 0.0) for one, about in VARIABLES["autopilot_output"].items()}
     wave = pilot.design.get("wave_frequency", 0.0) if isinstance(pilot, Controller) else 0.0
-    data = {
-        "inputs": bridge.inputs, "dt": bridge.dt, "limit": bridge.limit, "zone": INTEGRAL_ZONE,
-        "reach": bridge.scales["heading_error_integral"], "policy": policy, "guide": guide, "pilot": pilot,
-        "law": "linear" if linear else getattr(pilot, "kind", ""), "memory": memory, "bounds": bounds(),
-        "band": notch_band(wave * bridge.dt), "orders": ORDERS,
-    }  # fmt: skip
-    title = f"Autopilot '{_comment(agent.name)}' for model '{_comment(agent.model_name)}'"
-    header, source = (render(f"autopilot.{kind}.j2", name, title=title, **data) for kind in "hc")
-    inputs = {one: Variable(*about) for one, about in bridge.inputs.items()}
-    order = {"order": Variable("rad", "ordered rudder, to starboard positive")}
-    return Source(name, header, source, inputs, order, bridge.dt, False)
+    return _written(
+        "autopilot", f"Autopilot '{agent.name}' for model '{agent.model_name}'", checked_name(name or agent.name),
+        inputs, outputs, bridge.dt, (), limit=bridge.limit, zone=INTEGRAL_ZONE, law=law, policy=policy,
+        reach=bridge.scales["heading_error_integral"], guide=guide, pilot=pilot, bounds=bounds(), orders=ORDERS,
+        memory=getattr(pilot, "memory_size", 0), band=notch_band(wave * bridge.dt),
+    )  # fmt: skip
 
 
-def _comment(text: str) -> str:
-    """A text that a comment of C may hold: letters, digits and a few signs."""
-    return re.sub(r"[^\w .,()+-]", "_", text, flags=re.ASCII)[:60]
+def _written(
+    kind: str, title: str, name: str, inputs: Variables, outputs: Variables, step: float, notes: tuple[str, ...],
+    **data: Any,
+) -> Source:  # fmt: skip
+    title = re.sub(r"[^\w .,()+-]", "_", title, flags=re.ASCII)[:120]  # what a comment of C may hold
+    data |= {"title": title, "inputs": inputs, "outputs": outputs, "step": step}
+    header, source = (render(f"{kind}.{suffix}.j2", name, **data) for suffix in "hc")
+    return Source(name, header, source, inputs, outputs, step, kind == "ship", notes)
 
 
 def checked_name(name: str) -> str:
@@ -211,11 +167,10 @@ def checked_name(name: str) -> str:
 
 def _single(value: float) -> str:
     """A number in single precision as C writes it."""
-    text = f"{float(value):.9g}"
-    return f"{text}f" if set(text) & set(".e") else f"{text}.0f"
+    return f"{float(value):.9e}f"
 
 
-def _rows(values: Any, number: Any) -> str:
+def _rows(values: Any, number: Any = literal) -> str:
     """Numbers of an array as C initialises it."""
     return "{" + ", ".join(number(one) if np.ndim(one) == 0 else _rows(one, number) for one in values) + "}"
 
@@ -226,9 +181,11 @@ def _environment() -> Environment:
     loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
     made = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     made.filters |= {
-        "c": literal, "float32": _single, "array": lambda values: _rows(values, literal),
-        "floats": lambda values: _rows(values, _single),
-    }  # fmt: skip
+        "c": literal,
+        "float32": _single,
+        "array": _rows,
+        "floats": lambda one: _rows(one, _single),
+    }
     return made
 
 

@@ -11,7 +11,6 @@ import builtins
 import inspect
 import math
 import textwrap
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -27,33 +26,28 @@ from shipgym.engine.specialise import named_globals
 from shipgym.errors import InputError
 
 Kind = Any  #: float, int, bool, a record, a table, or a tuple of kinds
-Text = tuple[ast.expr, Kind]  #: an expression whose unparsed text is C, and what it is
 NUMBERS = {float: "double", int: "int", bool: "int"}
-#: Functions that C has, or that `templates/prelude.c.j2` defines.
-SHARED = (
-    "sqrt fabs copysign sin cos tan asin acos atan atan2 sinh cosh tanh exp log hypot floor ceil pow".split()
-)
-IN_C: dict[Any, str] = {getattr(math, name): name for name in SHARED}
-IN_C |= {
-    getattr(np, name.replace("asin", "arcsin").replace("acos", "arccos").replace("atan", "arctan")): name
-    for name in SHARED
-    if name != "pow"
-}
-IN_C |= {
+#: Functions that C has, or `templates/prelude.c.j2`, by what they are called in Python.
+IN_C: dict[Any, str] = {
     abs: "fabs",
     np.abs: "fabs",
     min: "least",
     max: "largest",
-    math.radians: "radians",
     power_of_bits: "power_of_bits",
 }
-COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
-LOGICAL = {ast.And: "&&", ast.Or: "||", ast.BitAnd: "&", ast.BitOr: "|"}
-KEYWORDS = frozenset(
-    "auto break case char const continue default do double else enum extern float for goto if inline int long "
-    "register restrict return short signed sizeof static struct switch typedef union unsigned void volatile "
-    "while".split()
-)
+for (
+    _name
+) in "sqrt fabs copysign sin cos tan asin acos atan atan2 tanh exp log hypot floor ceil pow radians".split():
+    _in_numpy = _name.replace("a", "arc", 1) if _name[:2] in ("as", "ac", "at") else _name
+    IN_C |= {getattr(math, _name): _name, getattr(np, _in_numpy, _name): _name}
+SIGNS = {
+    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&",
+    ast.Or: "||", ast.BitAnd: "&", ast.BitOr: "|",
+}  # fmt: skip
+KEYWORDS = frozenset((
+    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
+    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"
+).split())  # fmt: skip
 
 
 @dataclass
@@ -106,13 +100,13 @@ class Translator:
         return next(one for one in names if one not in taken)
 
     def constant(self, kind: Kind, numbers: Iterator[float]) -> str:
-        """A record of such numbers, in order, as C initialises it; tables stand before it."""
+        """A record of such numbers, in order, as C initialises it; its table stands before it."""
         if kind is float:
             return literal(next(numbers))
         if is_table(kind):
-            name, rows = f"{self.prefix}_table", ", ".join(literal(next(numbers)) for _ in range(kind.rows))
-            self.structures.append(f"static const double {name}[{kind.rows}] = {{{rows}}};\n")
-            return name
+            rows = ", ".join(literal(next(numbers)) for _ in range(kind.rows))
+            self.structures.append(f"static const double {self.prefix}_table[{kind.rows}] = {{{rows}}};\n")
+            return f"{self.prefix}_table"
         return "{" + ", ".join(self.constant(one, numbers) for one in members(kind).values()) + "}"
 
 
@@ -147,29 +141,22 @@ class _Body(ast.NodeTransformer):
         if not isinstance(tree, ast.FunctionDef):
             raise self._refusal(tree)
         self.globals = dict(named_globals(function, translator.parts))
-        self.arguments = dict(zip([one.arg for one in tree.args.args], kinds, strict=True))
-        self.kinds = dict(self.arguments)
-        self.body = self._folded(tree.body)
-        used: set[str] | None = None
-        while used != (now := _names(self.body, ast.Load).keys()):
-            used, self.body = set(now), _read(self.body, now)
-        self.used = set(now)
-        nested = _names([s for s in self.body if isinstance(s, ast.If | ast.For)], ast.Store).keys()
-        again = {name for name, times in _names(self.body, ast.Store).items() if times > 1}
-        #: declared before the rest, because they are set in a branch or several times
-        self.first = ((nested | again) & self.used) - self.arguments.keys()
-        self.returned: Kind = None
+        self.arguments = {one.arg: kind for one, kind in zip(tree.args.args, kinds, strict=True)}  # noqa: C416
+        self.kinds, self.returned = dict(self.arguments), None
+        self.body, self.used = self._folded(tree.body), {""}
+        while self.used != (now := set(_names(self.body, ast.Load))):
+            self.used, self.body = now, _read(self.body, now)
 
     def written(self, name: str) -> tuple[str, Kind]:
         """The C of the function, and what it returns."""
         lines, of = self._statements(self.body), self.translator.type
-        lines = [f"(void){c_name(one)};" for one in self.arguments if one not in self.used] + lines
-        lines = [f"{of(self.kinds[one])} {c_name(one)};" for one in sorted(self.first)] + lines
+        unused = [f"    (void){c_name(one)};" for one in self.arguments if one not in self.used]
+        local = [
+            f"    {of(self.kinds[one])} {c_name(one)};" for one in self.kinds if one not in self.arguments
+        ]
         given = ", ".join(f"{of(kind)} {c_name(one)}" for one, kind in self.arguments.items())
-        text = "\n".join(
-            [f"static {of(self.returned)} {name}({given}) {{", *(f"    {line}" for line in lines), "}\n"]
-        )
-        return text, self.returned
+        head = f"static {of(self.returned)} {name}({given}) {{"
+        return "\n".join([head, *local, *unused, *lines, "}\n"]), self.returned
 
     def _refusal(self, node: ast.AST) -> InputError:
         where = f"{self.function.__module__}.{self.function.__name__}, line {getattr(node, 'lineno', 0)}"
@@ -195,25 +182,20 @@ class _Body(ast.NodeTransformer):
         """Statements without docstrings, branches that constants exclude, and what follows a return."""
         kept: list[ast.stmt] = []
         for node in (self.visit(one) for one in body if not isinstance(one, ast.Expr)):
-            if isinstance(node, ast.If) and isinstance(known := self._known(node.test), bool):
-                kept += self._folded(node.body if known else node.orelse)
-            else:
-                kept.append(node)
+            known = self._known(node.test) if isinstance(node, ast.If) else None
+            kept += self._folded(node.body if known else node.orelse) if isinstance(known, bool) else [node]
             if kept and isinstance(kept[-1], ast.Return):
                 break
         return kept
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
         """A conditional expression, or what a known condition chooses."""
-        known = self._known(node.test)
-        return (
-            self.visit(node.body if known else node.orelse)
-            if isinstance(known, bool)
-            else self.generic_visit(node)
-        )
+        if isinstance(known := self._known(node.test), bool):
+            return self.visit(node.body if known else node.orelse)
+        return self.generic_visit(node)
 
     def _statements(self, body: Iterable[ast.stmt]) -> list[str]:
-        return [line for node in body for line in self._statement(node)]
+        return [f"    {line}" for node in body for line in self._statement(node)]
 
     def _statement(self, node: ast.stmt) -> list[str]:
         match node:
@@ -222,65 +204,52 @@ class _Body(ast.NodeTransformer):
                 self.returned = float if kind is int else kind
                 return [f"return {text};"]
             case ast.If():
-                lines = [f"if ({self._c(node.test)[0]}) {{", *self._inner(node.body)]
-                return [*lines, *(["} else {", *self._inner(node.orelse)] if node.orelse else []), "}"]
+                other = ["} else {", *self._statements(node.orelse)] if node.orelse else []
+                return [f"if ({self._c(node.test)[0]}) {{", *self._statements(node.body), *other, "}"]
             case ast.For(
                 target=ast.Name(id=name), iter=ast.Call(func=ast.Name(id="range"), args=[end]), orelse=[]
-            ):  # fmt: skip
-                self.first.discard(name)
+            ):
                 self.kinds[name], i = int, c_name(name)
-                return [f"for (int {i} = 0; {i} < {self._c(end)[0]}; ++{i}) {{", *self._inner(node.body), "}"]
-            case ast.Assign(targets=[target]) | ast.AnnAssign(target=target, value=ast.expr()):
-                return self._assigned(target, node.value)  # type: ignore[arg-type]
-            case ast.AugAssign(target=ast.Name(id=name)):
-                return self._assigned(node.target, ast.BinOp(ast.Name(name, ast.Load()), node.op, node.value))
+                head = f"for ({i} = 0; {i} < {self._c(end)[0]}; ++{i}) {{"
+                return [head, *self._statements(node.body), "}"]
+            case (
+                ast.Assign(targets=[target], value=value)
+                | ast.AnnAssign(target=target, value=ast.expr() as value)
+            ):
+                return self._assigned(target, value)
         raise self._refusal(node)
-
-    def _inner(self, body: Iterable[ast.stmt]) -> list[str]:
-        return [f"    {line}" for line in self._statements(body)]
 
     def _assigned(self, target: ast.expr, value: ast.expr) -> list[str]:
         match target, value:
             case ast.Name(id=name), _:
-                text, kind = self._c(value)
-                return [self._stored(name, kind, text)]
-            case ast.Tuple(elts=names), ast.Tuple(elts=values) if (
-                not _names(values, ast.Load).keys() & _names(names, ast.Store).keys()
-            ):
-                pairs = [
-                    (one, inside)
-                    for one, inside in zip(names, values, strict=True)
-                    if getattr(one, "id", "") in self.used
+                return [self._stored(name, *self._c(value))]
+            case ast.Tuple(elts=to), ast.Tuple(elts=of) if not _names(of, ast.Load) & _names(to, ast.Store):
+                return [
+                    line for one, inside in zip(to, of, strict=True) if _names([one], ast.Store) & self.used
+                    for line in self._assigned(one, inside)
+                ]  # fmt: skip
+            case ast.Tuple(elts=to), _:
+                (text, kind), whole = self._c(value), f"tuple_{target.lineno}"
+                return [self._stored(whole, text, kind)] + [
+                    self._stored(one.id, f"{whole}.{part}", inside)
+                    for one, (part, inside) in zip(to, members(kind).items(), strict=True)
+                    if isinstance(one, ast.Name) and one.id in self.used
                 ]
-                return [line for one, inside in pairs for line in self._assigned(one, inside)]
-            case ast.Tuple(elts=names), _:
-                text, kind = self._c(value)
-                wanted = [
-                    (one.id, *part)
-                    for one, part in zip(names, members(kind).items(), strict=True)
-                    if one.id in self.used
-                ]  # type: ignore[attr-defined]
-                whole = f"tuple_{target.lineno}"
-                lines = [f"const {self.translator.type(kind)} {whole} = {text};"]
-                return lines + [self._stored(name, kind, f"{whole}.{part}") for name, part, kind in wanted]
         raise self._refusal(target)
 
-    def _stored(self, name: str, kind: Kind, text: str) -> str:
-        again = name in self.first or name in self.arguments
-        self.kinds[name] = kind = float if again and kind is int else kind
-        declared = "" if again else f"const {self.translator.type(kind)} ".replace("const const ", "const ")
-        return f"{declared}{c_name(name)} = {text};"
+    def _stored(self, name: str, text: str, kind: Kind) -> str:
+        self.kinds[name] = float if kind is int else kind
+        return f"{c_name(name)} = {text};"
 
     def _c(self, node: ast.expr) -> tuple[str, Kind]:
-        """The text of an expression and its kind; Python's brackets are those that C needs."""
+        """The text of an expression and its kind."""
         expression, kind = self._expression(node)
         return ast.unparse(expression), kind
 
-    def _expression(self, node: ast.expr) -> Text:
+    def _expression(self, node: ast.expr) -> tuple[ast.expr, Kind]:
+        """An expression whose unparsed text is C, with the brackets of Python, and its kind."""
         if isinstance(known := self._known(node), bool | int | float | np.number):
-            return _atom(literal(known)), bool if isinstance(known, bool) else int if isinstance(
-                known, int
-            ) else float
+            return _atom(literal(known)), type(known) if type(known) in NUMBERS else float
         match node:
             case ast.Name(id=name) if name in self.kinds:
                 return _atom(c_name(name)), self.kinds[name]
@@ -288,12 +257,11 @@ class _Body(ast.NodeTransformer):
                 record, kind = self._expression(owner)
                 if is_record(kind) and name in field_types(kind):
                     return ast.Attribute(record, c_name(name), ast.Load()), field_types(kind)[name]
-            case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div()):
+            case ast.BinOp(op=ast.Add() | ast.Sub() | ast.Mult() | ast.Div() as op):
                 (left, a), (right, b) = self._expression(node.left), self._expression(node.right)
-                whole = a is int and b is int
-                if whole and isinstance(node.op, ast.Div):
-                    left, whole = _atom(f"(double)({ast.unparse(left)})"), False
-                return ast.BinOp(left, node.op, right), int if whole else float
+                if isinstance(op, ast.Div):
+                    left, a = (_atom(f"(double)({ast.unparse(left)})"), float) if a is int else (left, a)
+                return ast.BinOp(left, op, right), int if a is int and b is int else float
             case ast.BinOp(op=ast.Pow()):
                 power = self._known(node.right)
                 name = "whole_power" if isinstance(power, int) and power > 0 else "pow"
@@ -303,16 +271,13 @@ class _Body(ast.NodeTransformer):
                 return ast.UnaryOp(node.op, inside), kind
             case ast.UnaryOp(op=ast.Not()):
                 return _atom(f"!({self._c(node.operand)[0]})"), bool
-            case ast.Compare() if {type(op) for op in node.ops} <= COMPARISONS.keys():
-                texts = [self._c(one)[0] for one in (node.left, *node.comparators)]
-                signs = [COMPARISONS[type(op)] for op in node.ops]
-                pairs = [f"({a} {sign} {b})" for (a, b), sign in zip(pairwise(texts), signs, strict=True)]
+            case ast.Compare() if {type(op) for op in node.ops} <= SIGNS.keys():
+                texts = pairwise(self._c(one)[0] for one in (node.left, *node.comparators))
+                pairs = [f"({a} {SIGNS[type(op)]} {b})" for (a, b), op in zip(texts, node.ops, strict=True)]
                 return _atom(pairs[0] if len(pairs) == 1 else f"({' && '.join(pairs)})"), bool
             case ast.BoolOp() | ast.BinOp(op=ast.BitAnd() | ast.BitOr()):
                 parts = node.values if isinstance(node, ast.BoolOp) else [node.left, node.right]
-                return _atom(
-                    f"({f' {LOGICAL[type(node.op)]} '.join(self._c(one)[0] for one in parts)})"
-                ), bool
+                return _atom(f"({f' {SIGNS[type(node.op)]} '.join(self._c(one)[0] for one in parts)})"), bool
             case ast.IfExp():
                 (yes, kind), (no, other) = self._c(node.body), self._c(node.orelse)
                 return _atom(f"({self._c(node.test)[0]} ? {yes} : {no})"), other if kind is int else kind
@@ -322,46 +287,47 @@ class _Body(ast.NodeTransformer):
                 return self._called(node, self._callee(node.func))
         raise self._refusal(node)
 
-    def _made(self, parts: Sequence[tuple[str, Kind]], record: Kind = None) -> Text:
+    def _made(self, parts: Sequence[tuple[str, Kind]], record: Kind = None) -> tuple[ast.expr, Kind]:
         """A structure of given parts."""
         kind = record or tuple(float if one is int else one for _, one in parts)
         inside = ", ".join(f".{name} = {text}" for name, (text, _) in zip(members(kind), parts, strict=True))
         return _atom(f"({self.translator.type(kind)}){{{inside}}}"), kind
 
     def _callee(self, node: ast.expr) -> Any:
-        """What is called, found where Python would find it."""
+        """What is called, found where Python would find it; of a part its function."""
+        found = None
         match node:
             case ast.Name(id=name):
-                return self.globals.get(name, getattr(builtins, name, None))
+                found = self.globals.get(name, getattr(builtins, name, None))
             case ast.Attribute(value=owner, attr=name) if isinstance(
                 module := self._known(owner), ModuleType
             ):
-                return getattr(module, name, None)
-        raise self._refusal(node)
+                found = getattr(module, name, None)
+        return found.function if isinstance(found, Part) else found
 
-    def _called(self, node: ast.Call, function: Any) -> Text:
-        if isinstance(function, Part) and function.code is not None:
-            if function.function.__name__ != "row_of":
-                raise self._refusal(node)
-            table, row = (self._c(one)[0] for one in node.args)
-            return _atom(f"{table}[{row}]"), float
-        function = function.function if isinstance(function, Part) else function
+    def _called(self, node: ast.Call, function: Any) -> tuple[ast.expr, Kind]:
+        texts = ", ".join(self._c(one)[0] for one in node.args)
+        if getattr(function, "__name__", "") == "row_of":  # a part that Numba has instructions for
+            return _atom(f"({texts.partition(', ')[0]})[{texts.partition(', ')[2]}]"), float
         if function in (float, int):
-            return _atom(f"(({NUMBERS[function]})({self._c(node.args[0])[0]}))"), function
-        if not is_record(function) and function in IN_C and not node.keywords:
-            return _atom(f"{IN_C[function]}({', '.join(self._c(one)[0] for one in node.args)})"), float
-        if not is_record(function) and not isinstance(function, FunctionType):
+            return _atom(f"(({NUMBERS[function]})({texts}))"), function
+        record = is_record(function)
+        if not record and isinstance(function, FunctionType | type(abs) | np.ufunc) and function in IN_C:
+            return _atom(f"{IN_C[function]}({texts})"), float
+        if not (record or isinstance(function, FunctionType)):
             raise self._refusal(node)
         try:
             bound = inspect.signature(function).bind(
                 *node.args, **{str(k.arg): k.value for k in node.keywords}
             )
         except TypeError:
-            raise self._refusal(node)
+            raise self._refusal(node) from None
         bound.apply_defaults()
-        given = [one if isinstance(one, ast.expr) else ast.Constant(one) for one in bound.arguments.values()]
-        parts = [self._c(one) for one in given]
-        if is_record(function):
+        parts = [
+            self._c(one if isinstance(one, ast.expr) else ast.Constant(one))
+            for one in bound.arguments.values()
+        ]
+        if record:
             return self._made(parts, function)
         name, kind = self.translator.function(function, *(kind for _, kind in parts))
         if kind is None:
@@ -374,19 +340,18 @@ def _atom(text: str) -> ast.expr:
     return ast.Name(text, ast.Load())
 
 
-def _names(body: Iterable[ast.AST], context: type[ast.expr_context]) -> Counter[str]:
-    """How often names are read or written in statements."""
+def _names(body: Iterable[ast.AST], context: type[ast.expr_context]) -> set[str]:
+    """Names that are read or written in statements."""
     nodes = (node for statement in body for node in ast.walk(statement))
-    return Counter(node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, context))
+    return {node.id for node in nodes if isinstance(node, ast.Name) and isinstance(node.ctx, context)}
 
 
-def _read(body: Iterable[ast.stmt], used: Iterable[str]) -> list[ast.stmt]:
+def _read(body: Iterable[ast.stmt], used: set[str]) -> list[ast.stmt]:
     """Statements without those whose results nobody reads; expressions have no other effect."""
     kept = []
     for node in body:
         if isinstance(node, ast.If | ast.For):
             node.body, node.orelse = _read(node.body, used), _read(node.orelse, used)
-        written = _names([node], ast.Store).keys()
-        if isinstance(node, ast.Return | ast.If) or written & set(used):
+        if isinstance(node, ast.Return | ast.If) or _names([node], ast.Store) & used:
             kept.append(node)
     return kept

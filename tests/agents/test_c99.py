@@ -133,9 +133,9 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
 
 
 def test_what_is_no_closed_law_is_refused():
-    with pytest.raises(InputError, match="'lq-adaptive': found, .* no closed law. Export one of 'pid', 'lq'"):
+    with pytest.raises(InputError, match="'lq-adaptive' found, which is no closed law .*Export .pid., .lq."):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
-    with pytest.raises(InputError, match="rudder and shaft found, expected rudder alone"):
+    with pytest.raises(InputError, match="commands rudder-shaft .*expected rudder alone"):
         autopilot_source(random_policy(action="rudder-shaft"))
 
 
@@ -151,7 +151,7 @@ def unwritable(x):
 
 
 def test_python_that_is_not_arithmetic_is_refused_with_its_line():
-    with pytest.raises(InputError, match=r"unwritable, line 3: 'sum\(\[x, x\]\)' found, which cannot be"):
+    with pytest.raises(InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"):
         Translator({}, "it").function(unwritable, float)
 
 
