@@ -181,15 +181,14 @@ def _environment() -> Environment:
     loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
     made = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     made.filters |= {
-        "c": literal,
-        "float32": _single,
-        "array": _rows,
-        "floats": lambda one: _rows(one, _single),
-    }
+        "c": literal, "float32": _single, "array": _rows, "floats": lambda one: _rows(one, _single),
+        "deg": lambda angle: round(np.degrees(angle), 4), "knots": lambda speed: round(speed * 3600.0 / 1852.0, 4),
+        "heading": lambda angle: round(np.degrees(angle) % 360.0, 4) % 360.0,
+    }  # fmt: skip
     return made
 
 
-def render(template: str, name: str, **data: Any) -> str:
-    """A text of C or XML made from a template."""
+def render(template: str, name: str = "", **data: Any) -> str:
+    """A text of C, XML or NMEA 0183 made from a template."""
     made = _environment().get_template(template)
     return made.render(**data, name=name, NAME=name.upper(), version=shipgym.__version__)

@@ -5,38 +5,23 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import cache
 from importlib import import_module
-from math import copysign, degrees, isfinite, pi
+from math import copysign
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from shipgym.errors import InputError
+from shipgym.files import read_toml
+from shipgym.trials.units import UNITS
 
-KNOT, MILE, DEGREE, PER_MINUTE = 1852.0 / 3600.0, 1852.0, pi / 180.0, pi / 180.0 / 60.0
 LONGEST_LINE = 512  # bytes; 82 are the standard's
 BAUD = 4800  # of the standard
-#: By type of sentence: for each quantity its field, the unit of it, and what other fields must say.
-FIELDS: dict[str, dict[str, tuple[int, float, dict[int, str]]]] = {
-    "HDT": {"heading": (0, DEGREE, {1: "T"})},
-    "THS": {"heading": (0, DEGREE, {1: "A"})},
-    "ROT": {"yaw_rate": (0, PER_MINUTE, {1: "A"})},
-    "RSA": {"rudder": (0, DEGREE, {1: "A"})},
-    "ROR": {"order": (0, DEGREE, {1: "A"}), "released": (0, DEGREE, {1: "V"})},
-    "VBW": {"surge": (0, KNOT, {2: "A"}), "sway": (1, KNOT, {2: "A"})},
-    "VTG": {"course": (0, DEGREE, {1: "T"}), "speed": (4, KNOT, {5: "N"})},
-    "RMC": {"course": (7, DEGREE, {1: "A"}), "speed": (6, KNOT, {1: "A"})},
-    "XTE": {"cross_track": (2, MILE, {0: "A", 1: "A", 4: "N"})},
-    "APB": {
-        "cross_track": (2, MILE, {0: "A", 1: "A", 4: "N"}), "leg": (7, DEGREE, {0: "A", 1: "A", 8: "T"}),
-        "to_steer": (12, DEGREE, {0: "A", 1: "A", 13: "T"}),
-    },
-}  # fmt: skip
-STEER_TO = 3  # field of XTE and APB that says to which side to steer
-#: Largest magnitude that is believed; more is an error of the sensor.
-BELIEVED = {
-    "heading": 2.0 * pi, "course": 2.0 * pi, "leg": 2.0 * pi, "to_steer": 2.0 * pi, "yaw_rate": 0.5,
-    "rudder": 0.5 * pi, "order": 0.5 * pi, "released": 0.5 * pi, "surge": 50.0, "sway": 20.0, "speed": 50.0, "cross_track": 1e5,
-}  # fmt: skip
+TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
+TO_SI = {name: factor for units in UNITS.values() for name, factor in units.items()}
+STEER_TO = {"L": 1.0, "R": -1.0}  # sign of the cross-track error
+EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
 
 class Reading(NamedTuple):
@@ -47,14 +32,16 @@ class Reading(NamedTuple):
     talker: str  # who sent it: HE, GP, ...
 
 
-def library() -> ModuleType:
-    """pynmea2, taught what it does not know; InputError where it is not installed."""
+@cache
+def library(name: str = "pynmea2") -> ModuleType:
+    """pynmea2, taught what it does not know, or pyserial; InputError where it is not installed."""
     try:
-        found = import_module("pynmea2")
+        found = import_module(name)
     except ImportError:
-        raise InputError("pynmea2 is not installed: pip install 'shipgym[nmea]'") from None
-    for name in FIELDS.keys() - found.TalkerSentence.sentence_types.keys():
-        type(name, (found.TalkerSentence,), {"fields": ()})
+        raise InputError(f"{name} is not installed: pip install 'shipgym[nmea]'") from None
+    if name == "pynmea2":
+        for one in TABLES["fields"].keys() - found.TalkerSentence.sentence_types.keys():
+            type(one, (found.TalkerSentence,), {"fields": ()})
     return found
 
 
@@ -66,62 +53,42 @@ def readings(line: str) -> list[Reading] | None:
     nmea = library()
     try:
         sentence = nmea.parse(line, check=True)
-        fields, kind, talker = sentence.data, sentence.sentence_type, sentence.talker
-        return list(_told(fields, FIELDS.get(kind, {}), talker))
+        if not isinstance(sentence, nmea.TalkerSentence):
+            return []
+        return list(_told(sentence.data, TABLES["fields"].get(sentence.sentence_type, {}), sentence.talker))
     except nmea.SentenceTypeError:
         return []
-    except AttributeError:  # a sentence of a maker's own
-        return []
-    except (nmea.ParseError, ValueError, IndexError):
+    except (ValueError, IndexError, KeyError):
         return None
 
 
-def _told(
-    fields: list[str], kinds: dict[str, tuple[int, float, dict[int, str]]], talker: str
-) -> Iterator[Reading]:
-    for quantity, (place, unit, needed) in kinds.items():
-        if all(fields[k] == text for k, text in needed.items()) and fields[place]:
-            value = float(fields[place]) * unit
-            if quantity == "cross_track":
-                value = copysign(value, {"L": 1.0, "R": -1.0}[fields[STEER_TO]])
-            if isfinite(value) and abs(value) <= BELIEVED[quantity]:
+def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Reading]:
+    for quantity, one in kinds.items():
+        if all(fields[int(k)] == text for k, text in one["needs"].items()) and fields[one["at"]]:
+            value = float(fields[one["at"]]) * TO_SI[one["unit"]]
+            value = copysign(value, STEER_TO[fields[one["side"]]]) if "side" in one else value
+            if abs(value) <= TABLES["believed"][quantity]:
                 yield Reading(quantity, value, talker)
 
 
-def sentence(talker: str, kind: str, *fields: str | float) -> str:
-    """A sentence with its checksum and the end of its line; numbers with four decimals at most."""
-    texts = [f"{one:.4f}".rstrip("0").rstrip(".") if isinstance(one, float) else one for one in fields]
-    return str(library().TalkerSentence(talker, kind, texts).render(newline=True))
-
-
-def heading_deg(angle: float) -> float:
-    """A heading in rad as degrees from 0 to 360."""
-    return round(degrees(angle) % 360.0, 4) % 360.0
+def sentences(text: str) -> str:
+    """Lines such as HEHDT,90,T as sentences, with their checksums."""
+    checksum = library().NMEASentence.checksum
+    return "".join(f"${line}*{checksum(line):02X}\r\n" for line in text.splitlines())
 
 
 class Line(asyncio.Protocol, asyncio.DatagramProtocol):
-    """One end of a connection: lines in, sentences out, whatever it runs over.
-
-    Parameters
-    ----------
-    received : callable
-        Told each line.
-    ends : set of Line
-        All ends that are open; this one adds itself.
-    """
+    """One end of a connection: `received` is told each line; it stands among `ends` while it is open."""
 
     def __init__(self, received: Callable[[str], None], ends: set[Line]) -> None:
         self.received, self.ends, self.rest = received, ends, b""
         self.transport: Any = None
+        self.peer: Any = None  # who was heard last, over UDP
 
     def connection_made(self, transport: Any) -> None:
         """A stream, or a socket of datagrams, is open."""
-        self.transport = transport
+        self.transport = self.transport or transport
         self.ends.add(self)
-
-    def send(self, data: bytes) -> None:
-        """Send bytes to the other end."""
-        self.transport.write(data)
 
     def connection_lost(self, error: Exception | None) -> None:
         """It is closed."""
@@ -134,38 +101,29 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
         for line in filter(bytes.strip, lines):
             self.received(line[:LONGEST_LINE].decode("ascii", "replace").strip())
 
-
-class Datagrams(Line):
-    """The same over UDP: what is sent goes to whoever was heard last."""
-
-    peer: Any = None
-
     def datagram_received(self, data: bytes, address: Any) -> None:
         """One datagram, of whole lines."""
         self.peer = address
         self.data_received(data + b"\n")
 
-    def send(self, data: bytes) -> None:
-        """Send a datagram; nobody is known before the first is received, unless the socket is connected."""
-        if self.peer or self.transport.get_extra_info("peername"):
-            self.transport.sendto(data, self.peer)
-
     def error_received(self, error: Exception) -> None:
         """Nobody listens at the other end yet."""
 
+    def send(self, data: bytes) -> None:
+        """Send bytes; a datagram to whoever was heard last, or to where the socket is connected."""
+        if not hasattr(self.transport, "sendto"):
+            self.transport.write(data)
+        elif self.peer or self.transport.get_extra_info("peername"):
+            self.transport.sendto(data, self.peer)
+
 
 class Link:
-    """A connection by its address: `tcp:HOST:PORT`, `udp:HOST:PORT`, `serial:DEVICE` or `serial:DEVICE@BAUD`.
-
-    Attributes
-    ----------
-    ends : set of Line
-        What is connected.
-    """
+    """A connection by its address: `tcp:HOST:PORT`, `udp:HOST:PORT`, `serial:DEVICE` or `serial:DEVICE@BAUD`."""
 
     def __init__(self, received: Callable[[str], None]) -> None:
-        self.received, self.ends = received, set[Line]()
-        self.closers: list[Callable[[], Any]] = []
+        self.ends: set[Line] = set()  # what is connected
+        self.others: list[Any] = []  # a server, what reads a serial line
+        self.line = lambda: Line(received, self.ends)
 
     async def open(self, address: str, serve: bool = False) -> None:
         """Connect, or, as instruments do, wait to be connected to over TCP, and send first over UDP.
@@ -173,52 +131,29 @@ class Link:
         Raises InputError for an address of another form, or one that cannot be opened.
         """
         kind, _, rest = address.partition(":")
+        (host, _, port), loop = rest.rpartition(":"), asyncio.get_running_loop()
         try:
             if kind == "serial" and rest:
-                self._open_serial(*rest.partition("@")[::2])
-            elif kind in ("tcp", "udp"):
-                host, _, port = rest.rpartition(":")
-                await self._open_socket(kind, host or "127.0.0.1", int(port), serve)
+                await self._open_serial(*rest.partition("@")[::2])
+            elif kind == "udp":
+                where = "remote_addr" if serve else "local_addr"
+                await loop.create_datagram_endpoint(self.line, **{where: (host, int(port))})  # type: ignore[arg-type]
+            elif kind == "tcp" and serve:
+                self.others.append(await loop.create_server(self.line, host, int(port)))
+            elif kind == "tcp":
+                await loop.create_connection(self.line, host, int(port))
             else:
-                raise ValueError("unknown kind")
+                raise ValueError
         except (ValueError, OverflowError):
-            raise InputError(
-                f"address: '{address[:80]}' found, expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or "
-                "serial:DEVICE@BAUD"
-            ) from None
+            raise InputError(f"address: '{address[:80]}' found, {EXPECTED}") from None
         except OSError as error:
             raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from None
 
-    async def _open_socket(self, kind: str, host: str, port: int, serve: bool) -> None:
-        loop = asyncio.get_running_loop()
-        if kind == "udp":
-            where = {"remote_addr": (host, port)} if serve else {"local_addr": (host, port)}
-            await loop.create_datagram_endpoint(lambda: Datagrams(self.received, self.ends), **where)  # type: ignore[arg-type]
-        elif serve:
-            server = await loop.create_server(lambda: Line(self.received, self.ends), host, port)
-            self.closers.append(server.close)
-        else:
-            await loop.create_connection(lambda: Line(self.received, self.ends), host, port)
-
-    def _open_serial(self, device: str, baud: str) -> None:
-        try:
-            serial = import_module("serial")
-        except ImportError:
-            raise InputError("pyserial is not installed: pip install 'shipgym[nmea]'") from None
-        port = serial.Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
-        line, loop = Line(self.received, self.ends), asyncio.get_running_loop()
-        line.connection_made(port)
-        number = port.fileno()
-
-        def read() -> None:
-            try:
-                line.data_received(port.read(LONGEST_LINE))
-            except OSError as error:  # unplugged
-                loop.remove_reader(number)
-                line.connection_lost(error)
-
-        loop.add_reader(number, read)
-        self.closers.append(lambda: loop.remove_reader(number))
+    async def _open_serial(self, device: str, baud: str) -> None:
+        port = library("serial").Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
+        line = self.line()
+        line.transport = port  # written to at once, read when there is something
+        self.others.append((await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0])
 
     def send(self, text: str) -> None:
         """Send sentences to all that are connected."""
@@ -228,5 +163,5 @@ class Link:
 
     def close(self) -> None:
         """Close whatever is open."""
-        for close in (*self.closers, *(end.transport.close for end in self.ends)):
-            close()
+        for one in (*self.others, *(end.transport for end in self.ends)):
+            one.close()

@@ -10,11 +10,17 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, load_agent
 from agents.cli import app
-from agents.deployment.nmea import Link, Reading, readings, sentence
+from agents.deployment.nmea import Link, Reading, readings, sentences
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, steer
 from shipgym.errors import InputError
 from tests.agents.policies import MARINER
+
+
+def sentence(address, *fields):
+    """One with its checksum."""
+    return sentences(",".join([address, *map(str, fields)]))
+
 
 PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
 
@@ -23,16 +29,16 @@ PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
     ("line", "expected"),
     [
         ("$HEHDT,180.0,T*26", [("heading", np.pi, "HE")]),
-        (sentence("HE", "THS", 90.0, "A"), [("heading", np.pi / 2, "HE")]),
-        (sentence("HE", "THS", 90.0, "V"), []),
-        (sentence("TI", "ROT", -60.0, "A"), [("yaw_rate", -np.pi / 180.0, "TI")]),
-        (sentence("II", "RSA", -10.0, "A", "", "V"), [("rudder", -np.pi / 18.0, "II")]),
-        (sentence("EC", "XTE", "A", "A", "0.5", "L", "N", "A"), [("cross_track", 926.0, "EC")]),
-        (sentence("EC", "XTE", "A", "A", "0.5", "R", "N", "A"), [("cross_track", -926.0, "EC")]),
-        (sentence("GP", "VTG", 90.0, "T", "", "M", 10.0, "N"), [("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP")]),
-        (sentence("GP", "GLL", "5400.0", "N", "00700.0", "E"), []),
-        (sentence("HE", "HDT", "", "T"), []),
-        (sentence("HE", "HDT", 999.0, "T"), []),
+        (sentence("HETHS", 90.0, "A"), [("heading", np.pi / 2, "HE")]),
+        (sentence("HETHS", 90.0, "V"), []),
+        (sentence("TIROT", -60.0, "A"), [("yaw_rate", -np.pi / 180.0, "TI")]),
+        (sentence("IIRSA", -10.0, "A", "", "V"), [("rudder", -np.pi / 18.0, "II")]),
+        (sentence("ECXTE", "A", "A", "0.5", "L", "N", "A"), [("cross_track", 926.0, "EC")]),
+        (sentence("ECXTE", "A", "A", "0.5", "R", "N", "A"), [("cross_track", -926.0, "EC")]),
+        (sentence("GPVTG", 90.0, "T", "", "M", 10.0, "N"), [("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP")]),
+        (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
+        (sentence("HEHDT", "", "T"), []),
+        (sentence("HEHDT", 999.0, "T"), []),
         ("$PGRME,15.0,M*1A", []),
     ],
 )  # fmt: skip
@@ -65,18 +71,18 @@ def tell(found, now, heading=0.4, rudder=0.0, talker="HE"):
 
 def test_it_waits_for_all_that_it_reads():
     found = Helm(PID_MARINER, 0.5, Limits())
-    found.hear(sentence("HE", "HDT", 20.0, "T"), 0.0)
+    found.hear(sentence("HEHDT", 20.0, "T"), 0.0)
     found.watch(1.0, 0.0)
     found.steer(0.0)
     assert (found.state, found.order) == (STANDBY, 0.0)
-    assert "ROR,0,V" in found.sentences()
+    assert "ROR,0.0,V" in found.sentences()
 
 
 def test_it_steers_to_its_set_point():
     found = helm()
     found.steer(0.0)
     assert found.order == pytest.approx(PID_MARINER.gains["proportional"] * 0.1 + PID_MARINER.neutral_rudder)
-    assert f"AGROR,{np.degrees(found.order):.4f},A" in found.sentences()
+    assert f"AGROR,{round(np.degrees(found.order), 4)},A" in found.sentences()
 
 
 def test_it_hands_over_for_good_when_a_sensor_falls_silent():
@@ -139,8 +145,7 @@ class NoisyShip(SimulatedShip):
     """Her line carries what no sentence is, and a compass whose checksums are wrong."""
 
     def sentences(self):
-        yield from super().sentences()
-        yield "noise", "\x00" + "x" * 600 + "\r\n$HEHDT,270.0,T*00\r\n$HEHDT,\r\n"
+        return super().sentences() + "\x00" + "x" * 600 + "\r\n$HEHDT,270.0,T*00\r\n$HEHDT,\r\n"
 
 
 def sailed(agent, kind=SimulatedShip, seconds=120.0, speed_up=60.0, drop=None, **more):
@@ -193,10 +198,10 @@ def test_datagrams_and_a_serial_line_carry_it_too():
         ends = [Link(heard.append), Link(lambda line: None)]
         await ends[0].open(f"udp:127.0.0.1:{port}")
         await ends[1].open(f"udp:127.0.0.1:{port}", serve=True)
-        ends[1].send(sentence("HE", "HDT", 1.0, "T"))
+        ends[1].send(sentence("HEHDT", 1.0, "T"))
         serial = Link(heard.append)
         await serial.open(f"serial:{os.ttyname(slave)}@38400")
-        os.write(master, sentence("HE", "HDT", 2.0, "T").encode())
+        os.write(master, sentence("HEHDT", 2.0, "T").encode())
         while len(heard) < 2:
             await asyncio.sleep(0.01)
         serial.send("order\r\n")
