@@ -1,4 +1,4 @@
-"""Measure what docs/deployment.md publishes: C steps, an FMU against real time, the live loop's period; cross-compile.
+"""Measure what docs/deployment.md publishes: C on this computer and on ARM, an FMU, the live loop.
 
 `python scripts/deployment_speed.py [--seconds 60]`; needs gcc and the extras fmu and nmea.
 """
@@ -52,13 +52,21 @@ int main(void) {{
 
 def timed(source: Source, compiler: str, steps: int, runner: str | None = None) -> str:
     """What a program that steps it prints."""
-    call = f"{source.name}_step(&state, &input" + (f", 0.5 * {source.name.upper()}_LONGEST_STEP)" if source.ship else ")")
+    call = f"{source.name}_step(&state, &input" + (
+        f", 0.5 * {source.name.upper()}_LONGEST_STEP)" if source.ship else ")"
+    )
     text = MAIN.format(name=source.name, steps=steps, first=next(iter(source.inputs)), call=call)
     with tempfile.TemporaryDirectory() as folder:
-        for file, content in {f"{source.name}.h": source.header, f"{source.name}.c": source.source, "main.c": text}.items():
+        for file, content in {
+            f"{source.name}.h": source.header,
+            f"{source.name}.c": source.source,
+            "main.c": text,
+        }.items():
             (Path(folder) / file).write_text(content, encoding="utf-8")
         flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-static"]
-        subprocess.run([compiler, *flags, "main.c", f"{source.name}.c", "-o", "main", "-lm"], cwd=folder, check=True)
+        subprocess.run(
+            [compiler, *flags, "main.c", f"{source.name}.c", "-o", "main", "-lm"], cwd=folder, check=True
+        )
         command = [*([runner] if runner else []), "./main"]
         return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -71,7 +79,11 @@ def real_time_factor(source: Source, version: str) -> float:
         path = f"{folder}/it.fmu"
         write_fmu(source, path, version)
         unzipped = fmpy.extract(path)
-        options = {"step_size": source.step, "output_interval": source.step, "stop_time": 20_000 * source.step}
+        options = {
+            "step_size": source.step,
+            "output_interval": source.step,
+            "stop_time": 20_000 * source.step,
+        }
         begin = time.perf_counter()
         fmpy.simulate_fmu(unzipped, validate=False, start_values={"rudder": 0.1}, **options)
         elapsed = time.perf_counter() - begin
@@ -121,7 +133,8 @@ def main() -> None:
                 print(f"{name}: {compiler} is not installed", file=sys.stderr)
             else:
                 runner = shutil.which(QEMU[compiler])
-                print(f"{name}: {compiler}: compiled; qemu: {timed(source, compiler, STEPS // 100, runner) if runner else 'not there'}")
+                found = timed(source, compiler, STEPS // 100, runner) if runner else "no emulator (qemu-user)"
+                print(f"{name}: {compiler}, emulated: {found}")
     for version in ("2.0", "3.0"):
         print(f"ship.fmu, FMI {version}: {real_time_factor(exported['ship'], version):.0f} times real time")
     for load in (0, 2 * (os.cpu_count() or 1)):
@@ -131,7 +144,8 @@ def main() -> None:
         off = np.abs(periods(seconds) - 0.1) * 1e3
         print(
             f"live loop, {load} busy processes on {os.cpu_count()} cores: {len(off)} periods, off 100 ms by "
-            f"{np.median(off):.2f} ms at the median, {np.quantile(off, 0.99):.2f} ms at the 99th percentile, {off.max():.2f} ms at most"
+            f"{np.median(off):.2f} ms at the median, {np.quantile(off, 0.99):.2f} ms at the 99th percentile, "
+            f"{off.max():.2f} ms at most"
         )
         for one in busy:
             one.terminate()

@@ -13,10 +13,8 @@ from agents.cli.command import FAILED, Json, answered, fail
 Address = Annotated[
     str, typer.Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
 ]
-Duration = Annotated[float | None, typer.Option(min=0.0, help="Seconds after which it ends; default: never.")]
-SpeedUp = Annotated[
-    float, typer.Option(min=0.01, max=1000.0, help="Seconds that pass in one; the same at both ends.")
-]
+Duration = Annotated[float, typer.Option(min=0.0, help="Seconds after which it ends; default: never.")]
+SpeedUp = Annotated[float, typer.Option(min=0.01, help="Seconds that pass in one; the same at both ends.")]
 
 
 @answered
@@ -27,22 +25,13 @@ def steer_command(
     ],
     nmea: Address,
     heading: Annotated[
-        float | None,
-        typer.Option(metavar="DEG", help="Heading to steer, degrees; default: the plotter's (APB)."),
+        float | None, typer.Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
     ] = None,
-    silence: Annotated[
-        float, typer.Option(metavar="S", help="Silence of a sensor that is too long, s.")
-    ] = 3.0,
-    disagreement: Annotated[
-        float, typer.Option(metavar="DEG", help="Difference of two compasses that is too large, degrees.")
-    ] = 5.0,
-    rudder: Annotated[
-        float, typer.Option(metavar="DEG", help="Difference of rudder and order that is too large, degrees.")
-    ] = 5.0,
-    rudder_rate: Annotated[
-        float, typer.Option(metavar="DEG/S", help="Slowest rate of the steering gear, degrees a second.")
-    ] = 2.3,
-    duration: Duration = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="When it hands over: silence_s=3, rudder_deg=5; repeatable."),
+    ] = None,
+    duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
     as_json: Json = False,
 ) -> None:
@@ -56,15 +45,16 @@ def steer_command(
     from agents.cli.terminal import out as console
     from agents.cli.terminal import print_json
     from agents.deployment.steering import Limits, steer
+    from shipgym.checks import check_keys
+    from shipgym.files import named_values
 
-    limits = Limits(
-        silence_s=silence, disagreement_deg=disagreement, rudder_deg=rudder, rudder_rate_deg_s=rudder_rate
-    )
+    limits = named_values(limit or (), "--limit", "silence_s=3")
+    check_keys(limits, Limits.__dataclass_fields__, "--limit")
+    course = None if heading is None else radians(heading)
     found = asyncio.run(
         steer(
-            load_agent(agent), nmea, heading=None if heading is None else radians(heading), limits=limits,
-            duration=inf if duration is None else duration, speed_up=speed_up,
-            told=lambda line: None if as_json else console.print(line, soft_wrap=True),
+            load_agent(agent), nmea, heading=course, limits=Limits(**limits), duration=duration,
+            speed_up=speed_up, told=lambda line: None if as_json else console.print(line, soft_wrap=True),
         )
     )  # fmt: skip
     if as_json:
@@ -79,14 +69,16 @@ def simulate_command(
         str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
     ],
     nmea: Address,
-    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter tells of, degrees.")] = 0.0,
+    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter tells of.")] = 0.0,
     sea: Annotated[str, typer.Option(help="calm, slight, moderate or rough.")] = "calm",
     seed: Annotated[int, typer.Option(min=0, help="Of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        typer.Option(metavar="HDT=60", help="Let a sentence fall silent after so many seconds; repeatable."),
+        typer.Option(
+            metavar="HDT=60", help="Sentence that falls silent, and after how many seconds; repeatable."
+        ),
     ] = None,
-    duration: Duration = None,
+    duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
     """Sail a ship model as the other end of `shipgym steer`: instruments out, rudder orders in.
@@ -94,14 +86,11 @@ def simulate_command(
     Over TCP it waits to be connected to, by the autopilot and a chart plotter at once.
     """
     from agents.deployment.simulated import SimulatedShip, simulate_ship
-    from shipgym.errors import InputError
+    from shipgym.checks import check_number
+    from shipgym.files import named_values
     from shipgym.ships import load_model
 
-    pairs = [one.partition("=") for one in drop or ()]
-    try:
-        dropped = {kind.upper(): float(after) for kind, _, after in pairs}
-    except ValueError:
-        raise InputError(f"--drop: {drop} found, expected a sentence and a time in s, HDT=60") from None
+    given = named_values(drop or (), "--drop", "HDT=60")
+    dropped = {kind.upper(): check_number(after, f"--drop {kind}") for kind, after in given.items()}
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
-    last = inf if duration is None else duration
-    asyncio.run(simulate_ship(ship, nmea, duration=last, speed_up=speed_up, drop=dropped))
+    asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))

@@ -28,6 +28,7 @@ from shipgym.sea.weather_column import CALM, weather_column
 from shipgym.ships import ShipModel
 from shipgym.ships.simulate import LONGEST_STEP
 from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
 LAWS = ("lq-scheduled", "lqg", "pid-filtered")  # with a law of their own in the template
@@ -101,8 +102,8 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
         )
     )
     return _written(
-        "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"], notes,
-        constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
+        "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"],
+        notes=notes, constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
         advance=c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
         lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions,
         begin=c.constant(Motion, (begin.get(one, 0.0) for one in Motion._fields)), variables=VARIABLES,
@@ -125,8 +126,8 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     law = "linear" if linear else getattr(pilot, "kind", "")
     if pilot is not None and not linear and law not in LAWS:
         raise InputError(
-            f"controller '{getattr(pilot, 'name', type(pilot).__name__)}' found, which is no closed law that C "
-            f"could be written of. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, 'los', 'ilos' or 'alos' "
+            f"controller '{getattr(pilot, 'name', type(pilot).__name__)}' found, which is no closed law that "
+            f"could be C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, 'los', 'ilos' or 'alos' "
             "over one of these, or a learned policy"
         )
     bridge = Autopilot(agent)
@@ -134,16 +135,17 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     outputs = {one: (*about, 0.0) for one, about in VARIABLES["autopilot_output"].items()}
     wave = pilot.design.get("wave_frequency", 0.0) if isinstance(pilot, Controller) else 0.0
     return _written(
-        "autopilot", f"Autopilot '{agent.name}' for model '{agent.model_name}'", checked_name(name or agent.name),
-        inputs, outputs, bridge.dt, (), limit=bridge.limit, zone=INTEGRAL_ZONE, law=law, policy=policy,
-        reach=bridge.scales["heading_error_integral"], guide=guide, pilot=pilot, bounds=bounds(), orders=ORDERS,
+        "autopilot", f"Autopilot '{agent.name}' for model '{agent.model_name}'",
+        checked_name(name or agent.name), inputs, outputs, bridge.dt, limit=bridge.limit, zone=INTEGRAL_ZONE,
+        reach=bridge.scales["heading_error_integral"], law=law, policy=policy, guide=guide, pilot=pilot,
+        bounds=bounds(), orders=ORDERS,
         memory=getattr(pilot, "memory_size", 0), band=notch_band(wave * bridge.dt),
     )  # fmt: skip
 
 
 def _written(
-    kind: str, title: str, name: str, inputs: Variables, outputs: Variables, step: float, notes: tuple[str, ...],
-    **data: Any,
+    kind: str, title: str, name: str, inputs: Variables, outputs: Variables, step: float,
+    notes: tuple[str, ...] = (), **data: Any,
 ) -> Source:  # fmt: skip
     title = re.sub(r"[^\w .,()+-]", "_", title, flags=re.ASCII)[:120]  # what a comment of C may hold
     data |= {"title": title, "inputs": inputs, "outputs": outputs, "step": step}
@@ -182,7 +184,7 @@ def _environment() -> Environment:
     made = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     made.filters |= {
         "c": literal, "float32": _single, "array": _rows, "floats": lambda one: _rows(one, _single),
-        "deg": lambda angle: round(np.degrees(angle), 4), "knots": lambda speed: round(speed * 3600.0 / 1852.0, 4),
+        "deg": lambda angle: round(np.degrees(angle), 4), "knots": lambda speed: round(speed / UNITS["speed"]["kn"], 4),
         "heading": lambda angle: round(np.degrees(angle) % 360.0, 4) % 360.0,
     }  # fmt: skip
     return made

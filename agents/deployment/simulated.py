@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
+from contextlib import closing, suppress
 from math import atan2, cos, hypot, inf, radians, sin
 
 import numpy as np
@@ -65,8 +66,8 @@ class SimulatedShip:
         minutes, seconds = divmod(self.steps * STEP, 60.0)
         cross = s["y"] * cos(self.leg) - s["x"] * sin(self.leg)
         text = render(
-            "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg, off=f"{abs(cross) / MINUTE:.5f}",
-            side="L" if cross >= 0.0 else "R", course=atan2(east, north), speed=hypot(north, east),
+            "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg,
+            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=atan2(east, north), speed=hypot(north, east),
             latitude=f"{int(latitude):02d}{latitude % 1 * 60:07.4f}",
             longitude=f"{int(longitude):03d}{longitude % 1 * 60:07.4f}",
             time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",
@@ -86,11 +87,9 @@ async def simulate_ship(
     loop, link = asyncio.get_running_loop(), Link(ship.hear)
     await link.open(address, serve=True)
     begin, dropped = loop.time(), dict(drop or {})
-    try:
+    with closing(link), suppress(asyncio.CancelledError):
         while (now := ship.steps * STEP) < duration:
             await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))
             lines = ship.sentences().splitlines(keepends=True)
             link.send("".join(line for line in lines if now < dropped.get(line[3:6], inf)))
             ship.advance()
-    finally:
-        link.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Iterable
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from math import ceil, cos, inf, radians, sin
 from typing import Any
@@ -16,7 +17,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
 
-STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
+STANDBY, STEERING, MANUAL, GONE = "standby", "steering", "manual", "connection closed"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
 ANGLES = ("heading", "course", "leg", "to_steer", "rudder")
 
@@ -119,16 +120,16 @@ class Helm:
             self.sensors.take(reading, now)
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
-        """Look at the sensors: begin when all are there, hand over for good when one is not to be trusted."""
+        """Begin when all sensors are there; hand over for good when one is wrong, or at another fault."""
         given = self._given(now)
         silent = [name.replace("_", " ") for name, value in given.items() if value is None]
         if self.state == STANDBY and not silent:
             self.state = STEERING
-        elif self.state == STEERING:
-            if silent and not fault:
-                fault = f"no {' and no '.join(silent)} for {self.limits.silence_s:g} s"
-            if fault := fault or self.sensors.fault(self.order, step, now):
-                self.state, self.alarm = MANUAL, fault
+        elif self.state == STEERING and not fault:
+            fault = f"no {' and no '.join(silent)} for {self.limits.silence_s:g} s" if silent else None
+            fault = fault or self.sensors.fault(self.order, step, now)
+        if fault and self.state != MANUAL:
+            self.state, self.alarm = MANUAL, fault
 
     def steer(self, now: float) -> None:
         """One control interval."""
@@ -183,25 +184,19 @@ async def steer(
     await link.open(address)
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
     tick, begin, number, state = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
-    try:
-        while number * tick < duration:
+    with closing(link), suppress(asyncio.CancelledError):  # the end that an interruption asks for
+        while number * tick < duration and state != GONE:
             due = begin + number * tick
             await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
             now = loop.time() * speed_up
-            late = (
-                f"a step came {now - due:.1f} s late" if now - due > helm.limits.late_s * speed_up else None
-            )
-            helm.watch(tick, now, late if link.ends else "the connection was closed")
+            late = helm.state == STEERING and now - due > helm.limits.late_s * speed_up
+            fault = f"a step came {now - due:.1f} s late" if late else None
+            helm.watch(tick, now, fault if link.ends else "the connection was closed")
             if number % parts == 0:
                 helm.steer(now)
             link.send(helm.sentences())
             if helm.state != state:
-                state = helm.state
-                told(
-                    f"{number * tick:.1f} s: {state}"
-                    + (f": ALARM, {helm.alarm}: take the wheel" if helm.alarm else "")
-                )
-            number += 1
-    finally:
-        link.close()
+                alarm = f": ALARM, {helm.alarm}: take the wheel" if helm.alarm else ""
+                told(f"{number * tick:.1f} s: {helm.state}{alarm}")
+            state, number = helm.state if link.ends else GONE, number + 1
     return helm

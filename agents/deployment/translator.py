@@ -10,6 +10,7 @@ import ast
 import builtins
 import inspect
 import math
+import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -35,19 +36,22 @@ IN_C: dict[Any, str] = {
     max: "largest",
     power_of_bits: "power_of_bits",
 }
-for (
-    _name
-) in "sqrt fabs copysign sin cos tan asin acos atan atan2 tanh exp log hypot floor ceil pow radians".split():
-    _in_numpy = _name.replace("a", "arc", 1) if _name[:2] in ("as", "ac", "at") else _name
-    IN_C |= {getattr(math, _name): _name, getattr(np, _in_numpy, _name): _name}
+for _name in (
+    "sqrt", "fabs", "copysign", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "log",
+    "hypot", "floor", "ceil", "pow", "radians",
+):  # fmt: skip
+    IN_C |= {
+        getattr(math, _name): _name,
+        getattr(np, _name.replace("a", "arc", _name[0] == "a"), None): _name,
+    }
 SIGNS = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&",
     ast.Or: "||", ast.BitAnd: "&", ast.BitOr: "|",
 }  # fmt: skip
-KEYWORDS = frozenset((
-    "auto break case char const continue default do double else enum extern float for goto if inline int long register "
-    "restrict return short signed sizeof static struct switch typedef union unsigned void volatile while"
-).split())  # fmt: skip
+KEYWORDS = frozenset(re.findall(r"\w+", """
+    auto break case char const continue default do double else enum extern float for goto if inline int long
+    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+"""))  # fmt: skip
 
 
 @dataclass
@@ -141,7 +145,7 @@ class _Body(ast.NodeTransformer):
         if not isinstance(tree, ast.FunctionDef):
             raise self._refusal(tree)
         self.globals = dict(named_globals(function, translator.parts))
-        self.arguments = {one.arg: kind for one, kind in zip(tree.args.args, kinds, strict=True)}  # noqa: C416
+        self.arguments = {one.arg: kind for one, kind in zip(tree.args.args, kinds, strict=True)}
         self.kinds, self.returned = dict(self.arguments), None
         self.body, self.used = self._folded(tree.body), {""}
         while self.used != (now := set(_names(self.body, ast.Load))):

@@ -133,15 +133,15 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
 
 
 def test_what_is_no_closed_law_is_refused():
-    with pytest.raises(InputError, match="'lq-adaptive' found, which is no closed law .*Export .pid., .lq."):
+    with pytest.raises(InputError, match=r"'lq-adaptive' found, which is no closed law .*Export .pid., .lq."):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
-    with pytest.raises(InputError, match="commands rudder-shaft .*expected rudder alone"):
+    with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):
         autopilot_source(random_policy(action="rudder-shaft"))
 
 
 @pytest.mark.parametrize("name", ["9lives", "double", "", "x" * 32])
 def test_a_name_that_c_does_not_take_is_refused(name):
-    with pytest.raises(InputError, match="expected at most 31 letters.*--name"):
+    with pytest.raises(InputError, match=r"expected at most 31 letters.*--name"):
         autopilot_source(CONTROLLERS["pid"], name or "é")
 
 

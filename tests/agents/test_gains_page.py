@@ -1,4 +1,4 @@
-"""An autopilot written after docs/deployment.md alone, from `pid.json` or `lq.json`, does what the controller does."""
+"""An autopilot written after docs/deployment.md alone does what the controller does."""
 
 import json
 import math

@@ -35,7 +35,10 @@ PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
         (sentence("IIRSA", -10.0, "A", "", "V"), [("rudder", -np.pi / 18.0, "II")]),
         (sentence("ECXTE", "A", "A", "0.5", "L", "N", "A"), [("cross_track", 926.0, "EC")]),
         (sentence("ECXTE", "A", "A", "0.5", "R", "N", "A"), [("cross_track", -926.0, "EC")]),
-        (sentence("GPVTG", 90.0, "T", "", "M", 10.0, "N"), [("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP")]),
+        (
+            sentence("GPVTG", 90.0, "T", "", "M", 10.0, "N"),
+            [("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP")],
+        ),
         (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
         (sentence("HEHDT", "", "T"), []),
         (sentence("HEHDT", 999.0, "T"), []),
@@ -132,7 +135,7 @@ def test_speeds_are_those_over_ground_where_no_log_tells_them():
 
 
 def test_what_no_sentence_tells_is_refused():
-    with pytest.raises(InputError, match="roll, roll_rate.*which no sentence of NMEA 0183 tells it"):
+    with pytest.raises(InputError, match=r"roll, roll_rate.*which no sentence of NMEA 0183 tells it"):
         Helm(load_agent("container-roll-path-ppo"), None, Limits())
 
 
