@@ -35,7 +35,7 @@ def steer_command(
     speed_up: SpeedUp = 1.0,
     as_json: Json = False,
 ) -> None:
-    """Steer by instruments over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB, XTE in, ROR and HTD out.
+    """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB and XTE in, ROR and HTD out.
 
     It begins when all that the autopilot reads is there. When a sensor falls silent, two disagree, the rudder
     does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and steers no

@@ -54,8 +54,8 @@ class Autopilot:
     """Any controller or policy, stepped once in each control interval `dt` in double precision.
 
     It adds what an environment would: the integral of the heading error, and the last command. `inputs` names
-    what it reads. Guidance is given the direction of the leg as its set-point, a policy that learned to follow
-    paths the course that its environment shows: the leg's less atan(cross-track error / lookahead).
+    what it reads. Guidance is given the direction of the leg as its set-point, a policy that learned to
+    follow paths the course that its environment shows: the leg's less atan(cross-track error / lookahead).
 
     Raises
     ------

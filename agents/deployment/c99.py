@@ -94,16 +94,14 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
     kinds = {"SHIP": Ship, "COEFFICIENTS": vessel.coefficients, "SEA": SeaParameters}
     first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
     begin = {"n": model.service_shaft_speed, "shaft": model.service_shaft_speed, **first}
+    known = {*ShipInput._fields, *model.state_names, *model.command_names} - without
     inputs, outputs = (
         {one: (*about, begin.get(one, 0.0)) for one, about in VARIABLES[kind].items() if one in known}
-        for kind, known in (
-            ("ship_input", {*ShipInput._fields} - without),
-            ("ship_state", {*first} | ({"n"} - without if "shaft" not in without else set())),
-        )
+        for kind in ("ship_input", "ship_state")
     )
     return _written(
         "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"],
-        notes=notes, constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
+        constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()}, notes=notes,
         advance=c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
         lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions,
         begin=c.constant(Motion, (begin.get(one, 0.0) for one in Motion._fields)), variables=VARIABLES,
@@ -184,7 +182,8 @@ def _environment() -> Environment:
     made = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     made.filters |= {
         "c": literal, "float32": _single, "array": _rows, "floats": lambda one: _rows(one, _single),
-        "deg": lambda angle: round(np.degrees(angle), 4), "knots": lambda speed: round(speed / UNITS["speed"]["kn"], 4),
+        "deg": lambda angle: round(np.degrees(angle), 4),
+        "knots": lambda speed: round(speed / UNITS["speed"]["kn"], 4),
         "heading": lambda angle: round(np.degrees(angle) % 360.0, 4) % 360.0,
     }  # fmt: skip
     return made

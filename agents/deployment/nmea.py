@@ -118,7 +118,7 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
 
 
 class Link:
-    """A connection by its address: `tcp:HOST:PORT`, `udp:HOST:PORT`, `serial:DEVICE`, `serial:DEVICE@BAUD`."""
+    """A connection by its address: tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD."""
 
     def __init__(self, received: Callable[[str], None]) -> None:
         self.ends: set[Line] = set()  # what is connected

@@ -67,7 +67,8 @@ class SimulatedShip:
         cross = s["y"] * cos(self.leg) - s["x"] * sin(self.leg)
         text = render(
             "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg,
-            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=atan2(east, north), speed=hypot(north, east),
+            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=atan2(east, north),
+            speed=hypot(north, east),
             latitude=f"{int(latitude):02d}{latitude % 1 * 60:07.4f}",
             longitude=f"{int(longitude):03d}{longitude % 1 * 60:07.4f}",
             time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",

@@ -50,7 +50,8 @@ SIGNS = {
 }  # fmt: skip
 KEYWORDS = frozenset(re.findall(r"\w+", """
     auto break case char const continue default do double else enum extern float for goto if inline int long
-    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
+    register restrict return short signed sizeof static struct switch typedef union unsigned void volatile
+    while
 """))  # fmt: skip
 
 
