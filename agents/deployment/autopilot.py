@@ -36,7 +36,7 @@ def _reads(agent: Any) -> set[str]:
         base = getattr(agent, "base", None)
         return {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
     if type(agent).steer is not Controller.steer:
-        return set(agent.reads)
+        return {*agent.reads}
     return {signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]} & INPUTS.keys()
 
 
@@ -71,7 +71,7 @@ class Autopilot:
                 f"{', '.join(sorted(names))[:200]} found, expected rudder alone, by {', '.join(INPUTS)}"
             )
         self.agent, self.inputs = agent, [name for name in INPUTS if name in names]
-        self.pilot = agent.autopilot if isinstance(agent, Guided) else agent
+        self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
         self.limit, given = self.scales["rudder"], getattr(agent, "env_options", {}).get("dt")
         self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
@@ -89,7 +89,7 @@ class Autopilot:
         reach = self.scales["heading_error_integral"]
         gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
         self.integral = min(max(self.integral + gathered, -reach), reach)
-        own = (np.sin(error), np.cos(error), self.last_command, self.integral)
+        own = (float(np.sin(error)), float(np.cos(error)), self.last_command, self.integral)
         order = self._order({**given, **dict(zip(OWN, own, strict=True))})
         self.begins, self.last_command = False, min(max(order, -self.limit), self.limit)
         return self.last_command

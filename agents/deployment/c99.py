@@ -79,7 +79,8 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
     InputError for a name that C does not take, shallow water that the model does not know, and equations of
     one's own that use more than arithmetic.
     """
-    name, vessel, p, notes = checked_name(name or model.name), model.vessel, model.particulars, ()
+    name, vessel, p = checked_name(name or model.name), model.vessel, model.particulars
+    notes: tuple[str, ...] = ()
     without = set() if "n" in model.command_names else {"shaft"}
     try:
         column = weather_column(model, Weather(wind=Wind(1.0, 0.0, gust=False)), 1.0, water_depth)
@@ -101,9 +102,9 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
     )
     return _written(
         "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"],
-        constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()}, notes=notes,
+        constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
         advance=c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
-        lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions,
+        lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions, notes=notes,
         begin=c.constant(Motion, (begin.get(one, 0.0) for one in Motion._fields)), variables=VARIABLES,
         speed=p["speed"], shaft=begin["shaft"], limit=model.steering.limit,
     )  # fmt: skip

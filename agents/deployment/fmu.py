@@ -55,8 +55,9 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     with atomic_path(path) as draft:
         binary = _compiled(files, source.name)
         with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
-            for name, content in [*files.items(), (_place(source.name, version), binary)]:
-                archive.writestr(ZipInfo(name), content, ZIP_DEFLATED)
+            archive.writestr(ZipInfo(_place(source.name, version)), binary, ZIP_DEFLATED)
+            for name, text in files.items():
+                archive.writestr(ZipInfo(name), text, ZIP_DEFLATED)
 
 
 def _headers(version: int) -> list[Path]:

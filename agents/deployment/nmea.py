@@ -150,7 +150,9 @@ class Link:
             raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from None
 
     async def _open_serial(self, device: str, baud: str) -> None:
-        port = library("serial").Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
+        port: Any = library("serial").Serial(
+            device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True
+        )
         line = self.line()
         line.transport = port  # written to at once, read when there is something
         self.others.append((await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0])

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Mapping
 from contextlib import closing, suppress
 from math import atan2, cos, hypot, inf, radians, sin
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class SimulatedShip:
         self.states[0], self.steps = self.states[1], self.steps + 1
 
     @property
-    def now(self) -> dict[str, float]:
+    def now(self) -> dict[str, Any]:
         """Her state by name."""
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 

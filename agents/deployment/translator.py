@@ -147,7 +147,8 @@ class _Body(ast.NodeTransformer):
             raise self._refusal(tree)
         self.globals = dict(named_globals(function, translator.parts))
         self.arguments = {one.arg: kind for one, kind in zip(tree.args.args, kinds, strict=True)}
-        self.kinds, self.returned = dict(self.arguments), None
+        self.kinds = dict(self.arguments)
+        self.returned: Kind = None
         self.body, self.used = self._folded(tree.body), {""}
         while self.used != (now := set(_names(self.body, ast.Load))):
             self.used, self.body = now, _read(self.body, now)
@@ -193,7 +194,7 @@ class _Body(ast.NodeTransformer):
                 break
         return kept
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
         """A conditional expression, or what a known condition chooses."""
         if isinstance(known := self._known(node.test), bool):
             return self.visit(node.body if known else node.orelse)
@@ -254,7 +255,7 @@ class _Body(ast.NodeTransformer):
     def _expression(self, node: ast.expr) -> tuple[ast.expr, Kind]:
         """An expression whose unparsed text is C, with the brackets of Python, and its kind."""
         if isinstance(known := self._known(node), bool | int | float | np.number):
-            return _atom(literal(known)), type(known) if type(known) in NUMBERS else float
+            return _atom(literal(known.real)), type(known) if type(known) in NUMBERS else float
         match node:
             case ast.Name(id=name) if name in self.kinds:
                 return _atom(c_name(name)), self.kinds[name]

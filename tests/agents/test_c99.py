@@ -133,7 +133,9 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
 
 
 def test_what_is_no_closed_law_is_refused():
-    with pytest.raises(InputError, match=r"'lq-adaptive' found, which is no closed law .*Export .pid., .lq."):
+    with pytest.raises(
+        InputError, match=r"'lq-adaptive' found, which is no closed law that could be C. Export 'pid', 'lq'"
+    ):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
     with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):
         autopilot_source(random_policy(action="rudder-shaft"))
