@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import checked_observation, deviations
+from agents.controllers.memory import Flags, begun, checked_observation, deviations
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -210,17 +210,42 @@ class Controller:
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`; nothing is remembered, and the state is returned as given."""
-        seen = checked_observation(observation, self.observation_names)
-        seen = seen[..., : len(self.observation_names)] * self.observation_scales
-        order, _ = self.steer(dict(zip(self.observation_names, seen.T, strict=True)), np.zeros(0), None)
+        """See `Policy.predict`; the state is an array of shape (memory_size,) or (n, memory_size).
+
+        A controller that remembers nothing returns the state as given.
+        """
+        n, size = len(self.observation_names), self.memory_size
+        given = checked_observation(observation, self.observation_names)
+        shape, rows = given.shape[:-1], np.atleast_2d(given)[:, :n] * self.observation_scales
+        memory, begins = begun(state if size else None, episode_start, shape, size)
+        seen = dict(zip(self.observation_names, rows.T, strict=True))
+        order, kept = self.steer(seen, memory.reshape(len(rows), size), begins.reshape(-1))
         limit = self.observation_scales[self.observation_names.index("rudder")]
-        return np.clip(order / limit, -1.0, 1.0)[..., None].astype(np.float32), state
+        action = np.clip(order / limit, -1.0, 1.0)[:, None].astype(np.float32)
+        return action.reshape(*shape, 1), kept.reshape(*shape, size) if size else state
 
-    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Any) -> tuple[Floats, Floats]:
-        """Commanded rudder, rad, not yet limited, and the memory, of which this controller has none.
+    @property
+    def memory_size(self) -> int:
+        """How many numbers it remembers of each ship."""
+        return 0
 
-        `seen`: what is observed by name, SI units, each of one shape, which is that of the order.
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """Commanded rudder and what is remembered next.
+
+        Parameters
+        ----------
+        seen : dict of str to array of shape (n,)
+            What is observed by name, SI units.
+        memory : array of shape (n, memory_size)
+            Zeros where an episode begins.
+        begins : bool array of shape (n,)
+            Whether it does.
+
+        Returns
+        -------
+        order : array of shape (n,)
+            Rad, not yet limited.
+        memory : array of shape (n, memory_size)
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
         by_signal = dict(zip(SIGNALS, np.moveaxis(found, -1, 0), strict=True))

@@ -11,7 +11,6 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.los_autopilot import Guided
-from agents.controllers.stateful import Stateful
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
 from shipgym.files import read_toml
@@ -78,7 +77,9 @@ class Autopilot:
         if isinstance(agent, Controller):
             self.dt = float(agent.design["dt"])
         self.begins, self.drift, self.integral, self.last_command = True, np.zeros(1), 0.0, 0.0
-        self.memory: Any = np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Stateful) else None
+        self.memory: Any = (
+            np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Controller) else None
+        )
 
     def step(self, given: Mapping[str, float]) -> float:
         """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import gc
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -184,6 +185,7 @@ async def steer(
     await link.open(address)
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
     tick, begin, number, state = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
+    gc.freeze()  # so that no collection of garbage looks through all that was imported, which takes long
     with closing(link), suppress(asyncio.CancelledError):  # the end that an interruption asks for
         while number * tick < duration and state != GONE:
             due = begin + number * tick
