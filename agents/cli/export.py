@@ -47,8 +47,8 @@ def export_command(
 
     if not (onnx or c or fmu):
         raise InputError("nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX")
-    if onnx:
-        export_onnx(load_agent(what), onnx)
+    if not (c or fmu) and (name, fmi, depth) != (None, "3.0", float("inf")):
+        raise InputError("--name, --fmi and --depth found, which are for --c and --fmu alone; leave them out")
     if c or fmu:
         source = _source(what, name, depth)
         for note in source.notes:
@@ -60,6 +60,8 @@ def export_command(
                 (draft / file).write_text(text, encoding="utf-8")
     if fmu:
         write_fmu(source, fmu, fmi)
+    if onnx:
+        export_onnx(load_agent(what), onnx)
     for path in filter(None, (onnx, c, fmu)):
         console.print(f"written: {path}", soft_wrap=True)
 
@@ -68,11 +70,14 @@ def _source(what: str, name: str | None, depth: float) -> Source:
     """C99 of whatever a file or a name stands for."""
     from agents.agent_file import list_pretrained, load_agent
     from agents.deployment.c99 import autopilot_source, ship_source
+    from shipgym.errors import InputError
     from shipgym.files import read_json
     from shipgym.ships import load_model
 
     file, what_it_is = Path(what), "file of a controller or a model"
     content = read_json(file, what_it_is, "take another copy") if file.suffix == ".json" else {}
     if "kind" in content or what in list_pretrained():
+        if depth != float("inf"):
+            raise InputError(f"--depth: {depth:g} found, but {what} is an autopilot; leave it out")
         return autopilot_source(load_agent(what), name or file.stem)
     return ship_source(load_model(what), name or file.stem, depth)

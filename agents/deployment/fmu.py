@@ -41,6 +41,8 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
         the standard are needed.
     """
     version, path = int(check_choice(fmi, VERSIONS, "fmi")[0]), Path(path)
+    if path.suffix != ".fmu":
+        raise InputError(f"{str(path)[:200]}: found, expected a name that ends in .fmu, as importers do")
     files = {f"sources/{one.name}": one.read_text(encoding="utf-8") for one in _headers(version)}
     token = str(uuid.uuid5(uuid.NAMESPACE_URL, source.header + source.source + fmi))
     data = {"fmi": version, "token": token, **vars(source)}

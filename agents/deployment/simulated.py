@@ -12,6 +12,7 @@ import numpy as np
 
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
@@ -33,7 +34,7 @@ class SimulatedShip:
     def __init__(
         self, model: ShipModel, leg: float = 0.0, weather: Weather | str | None = None, seed: int = 0
     ) -> None:
-        self.model, self.leg, self.order, self.steps = model, leg, 0.0, 0
+        self.model, self.leg, self.order, self.steps = model, check_number(leg, "leg"), 0.0, 0
         self.passage = Passage(model, Conditions(weather=weather, seed=seed), STEP)
         self.states = self.passage.states(model.service_state, 1)
 
@@ -87,6 +88,7 @@ async def simulate_ship(
     that fall silent, and when, s. Raises InputError for an address that cannot be opened.
     """
     loop, link = asyncio.get_running_loop(), Link(ship.hear)
+    check_number(speed_up, "speed_up", above=0.0)
     await link.open(address, serve=True)
     begin, dropped = loop.time(), dict(drop or {})
     with closing(link), suppress(asyncio.CancelledError):

@@ -180,6 +180,8 @@ async def steer(
     InputError
         For an address that cannot be opened, or an autopilot that reads what no sentence tells.
     """
+    for name, number in (("speed_up", speed_up), ("heading", heading or 0.0)):
+        check_number(number, name)
     helm, loop = Helm(agent, heading, limits or Limits()), asyncio.get_running_loop()
     link = Link(lambda line: helm.hear(line, loop.time() * speed_up))
     await link.open(address)
