@@ -36,7 +36,8 @@ def _reads(agent: Any) -> set[str]:
         return {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
     if type(agent).steer is not Controller.steer:
         return {*agent.reads}
-    return {signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]} & INPUTS.keys()
+    used = [signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]]
+    return {one for one in used if one in INPUTS}
 
 
 @cache
@@ -72,7 +73,7 @@ class Autopilot:
         self.agent, self.inputs = agent, [name for name in INPUTS if name in names]
         self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
-        self.limit, given = self.scales["rudder"], getattr(agent, "env_options", {}).get("dt")
+        self.limit, given = float(self.scales["rudder"]), getattr(agent, "env_options", {}).get("dt")
         self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
         if isinstance(agent, Controller):
             self.dt = float(agent.design["dt"])

@@ -123,7 +123,7 @@ class Link:
     def __init__(self, received: Callable[[str], None]) -> None:
         self.ends: set[Line] = set()  # what is connected
         self.others: list[Any] = []  # a server, what reads a serial line
-        self.line = lambda: Line(received, self.ends)
+        self.line: Callable[[], Line] = lambda: Line(received, self.ends)
 
     async def open(self, address: str, serve: bool = False) -> None:
         """Connect, or, as instruments do, wait to be connected to over TCP, and send first over UDP.
@@ -150,10 +150,8 @@ class Link:
             raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from None
 
     async def _open_serial(self, device: str, baud: str) -> None:
-        port: Any = library("serial").Serial(
-            device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True
-        )
-        line = self.line()
+        serial, line = library("serial"), self.line()
+        port = serial.Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
         line.transport = port  # written to at once, read when there is something
         self.others.append((await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0])
 

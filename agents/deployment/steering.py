@@ -18,7 +18,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
 
-STANDBY, STEERING, MANUAL, GONE = "standby", "steering", "manual", "connection closed"
+STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
 ANGLES = ("heading", "course", "leg", "to_steer", "rudder")
 
@@ -111,7 +111,7 @@ class Helm:
             raise InputError(
                 f"autopilot: it reads {', '.join(sorted(unknown))}, which no sentence of NMEA 0183 tells it"
             )
-        self.counts = {"sentences": 0, "damaged": 0}
+        self.silent, self.counts = ["sensors"], {"sentences": 0, "damaged": 0}
 
     def hear(self, line: str, now: float) -> None:
         """Take in a line that was received."""
@@ -123,7 +123,7 @@ class Helm:
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over for good when one is wrong, or at another fault."""
         given = self._given(now)
-        silent = [name.replace("_", " ") for name, value in given.items() if value is None]
+        self.silent = silent = [name.replace("_", " ") for name, value in given.items() if value is None]
         if self.state == STANDBY and not silent:
             self.state = STEERING
         elif self.state == STEERING and not fault:
@@ -140,6 +140,13 @@ class Helm:
     def _given(self, now: float) -> dict[str, float | None]:
         set_point = self.sensors.value(self.plotted, now) if self.heading is None else self.heading
         return {**self.sensors.numbers(self.needed, now), "set_point": set_point}
+
+    @property
+    def status(self) -> str:
+        """What it does, what it waits for, or why it has handed over."""
+        if self.state == STANDBY:
+            return f"{STANDBY}, waits for {', '.join(self.silent)}"
+        return f"{MANUAL}: ALARM, {self.alarm}: take the wheel" if self.alarm else self.state
 
     def sentences(self) -> str:
         """Rudder order and status, and the alarm if there is one."""
@@ -186,10 +193,10 @@ async def steer(
     link = Link(lambda line: helm.hear(line, loop.time() * speed_up))
     await link.open(address)
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
-    tick, begin, number, state = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
+    tick, begin, number, status = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
     gc.freeze()  # so that no collection of garbage looks through all that was imported, which takes long
     with closing(link), suppress(asyncio.CancelledError):  # the end that an interruption asks for
-        while number * tick < duration and state != GONE:
+        while number * tick < duration:
             due = begin + number * tick
             await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
             now = loop.time() * speed_up
@@ -199,8 +206,9 @@ async def steer(
             if number % parts == 0:
                 helm.steer(now)
             link.send(helm.sentences())
-            if helm.state != state:
-                alarm = f": ALARM, {helm.alarm}: take the wheel" if helm.alarm else ""
-                told(f"{number * tick:.1f} s: {helm.state}{alarm}")
-            state, number = helm.state if link.ends else GONE, number + 1
+            if helm.status != status:
+                told(f"{number * tick:.1f} s: {helm.status}")
+            status, number = helm.status, number + 1
+            if not link.ends:
+                break
     return helm
