@@ -29,21 +29,11 @@ from shipgym.errors import InputError
 Kind = Any  #: float, int, bool, a record, a table, or a tuple of kinds
 NUMBERS = {float: "double", int: "int", bool: "int"}
 #: Functions that C has, or `templates/prelude.c.j2`, by what they are called in Python.
-IN_C: dict[Any, str] = {
-    abs: "fabs",
-    np.abs: "fabs",
-    min: "least",
-    max: "largest",
-    power_of_bits: "power_of_bits",
-}
-for _name in (
-    "sqrt", "fabs", "copysign", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "tanh", "exp", "log",
-    "hypot", "floor", "ceil", "pow", "radians",
-):  # fmt: skip
-    IN_C |= {
-        getattr(math, _name): _name,
-        getattr(np, _name.replace("a", "arc", _name[0] == "a"), None): _name,
-    }
+IN_C: dict[Any, str] = {abs: "fabs", np.abs: "fabs", min: "least", max: "largest"} | {
+    getattr(library, name.replace("a", "arc", library is np and name[0] == "a")): name
+    for name in re.findall(r"\w+", """sqrt fabs copysign sin cos tan asin acos atan atan2 tanh exp log hypot
+        floor ceil radians""") for library in (math, np)
+} | {math.pow: "pow", power_of_bits: "power_of_bits"}  # fmt: skip
 SIGNS = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=", ast.And: "&&",
     ast.Or: "||", ast.BitAnd: "&", ast.BitOr: "|",
@@ -158,7 +148,7 @@ class _Body(ast.NodeTransformer):
         lines, of = self._statements(self.body), self.translator.type
         unused = [f"    (void){c_name(one)};" for one in self.arguments if one not in self.used]
         local = [
-            f"    {of(self.kinds[one])} {c_name(one)};" for one in self.kinds if one not in self.arguments
+            f"    {of(kind)} {c_name(one)};" for one, kind in self.kinds.items() if one not in self.arguments
         ]
         given = ", ".join(f"{of(kind)} {c_name(one)}" for one, kind in self.arguments.items())
         head = f"static {of(self.returned)} {name}({given}) {{"
@@ -314,7 +304,8 @@ class _Body(ast.NodeTransformer):
     def _called(self, node: ast.Call, function: Any) -> tuple[ast.expr, Kind]:
         texts = ", ".join(self._c(one)[0] for one in node.args)
         if getattr(function, "__name__", "") == "row_of":  # a part that Numba has instructions for
-            return _atom(f"({texts.partition(', ')[0]})[{texts.partition(', ')[2]}]"), float
+            table, _, row = texts.partition(", ")
+            return _atom(f"{table}[(int)({row})]"), float
         if function in (float, int):
             return _atom(f"(({NUMBERS[function]})({texts}))"), function
         record = is_record(function)

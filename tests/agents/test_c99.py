@@ -2,6 +2,7 @@
 
 import ctypes
 import subprocess
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -13,13 +14,17 @@ from agents.cli import app
 from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
 from agents.deployment.autopilot import Autopilot
-from agents.deployment.c99 import autopilot_source, ship_source
+from agents.deployment.c99 import ShipInput, advance, autopilot_source, ship_source
 from agents.deployment.translator import Translator
 from shipgym.engine import mathematics
 from shipgym.engine.motion import Motion
+from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea.open_sea import sea_functions
+from shipgym.sea.weather_column import CALM
 from shipgym.ships import load_model
+from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from tests.agents.policies import MARINER, random_policy
 
 FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
@@ -62,6 +67,32 @@ def test_a_ship_in_c_sails_as_the_library_does(name, steps, tmp_path):
         expected = trial[channel]
         error = np.abs(found[:, Motion._fields.index(channel)] - expected).max()
         assert error <= 1e-12 * np.abs(expected).max(), channel
+
+
+def kernel_ship():
+    """A grey box whose table is a kernel of a few centres."""
+    box, random = load_model("kvlcc2-rm-svm"), np.random.default_rng(0)
+    shapes = ((8, 4), (8, 3))
+    kernel = Kernel(
+        np.array([0.0, 0.0, 0.0, 1.0]), np.full(4, 0.5), *(random.normal(size=one) for one in shapes)
+    )
+    structure = kernel_box(box.dynamics, kernel)
+    weights = dict(zip(structure.coefficient_names, 1e-3 * random.normal(size=9), strict=True))
+    return replace(box, coefficients=weights, covariance=None, own_table=structure)
+
+
+@pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])
+def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
+    model = kernel_ship() if name == "kernel" else load_model(name)
+    parts = {**model.vessel.parts(), **sea_functions(True)}
+    plain, numbers = Specialisation(parts, "plain", None).copy(advance), model.ship_numbers()
+    ship, coefficients = (parts[one].function(numbers, 0) for one in ("load_ship", "load_coefficients"))
+    rudder, shaft = np.radians(20.0), model.service_shaft_speed
+    found = sailed(tmp_path, model, [rudder] * 30, (0.1, 0.2, 0.0, 0.0), 1.0)
+    motion, given = Motion(*found[0].tolist()), ShipInput(rudder, shaft, 0.1, 0.2, 0.0, 0.0)
+    for row in found[1:]:
+        motion = plain(motion, given, 1.0, coefficients, ship, CALM)
+        np.testing.assert_allclose(row, motion, rtol=1e-12, atol=1e-15)
 
 
 def test_functions_of_the_engine_are_the_same_in_c_bit_by_bit(tmp_path):
