@@ -162,30 +162,11 @@ async def steer(
     agent: Any, address: str, *, heading: float | None = None, limits: Limits | None = None,
     duration: float = inf, speed_up: float = 1.0, told: Callable[[str], None] = print,
 ) -> Helm:  # fmt: skip
-    """Steer a ship over NMEA 0183.
+    """Steer a ship over NMEA 0183 for a duration in s; the helm as it was at the end.
 
-    Parameters
-    ----------
-    agent, heading, limits
-        As of `Helm`.
-    address : str
-        As of `Link`: `tcp:HOST:PORT`, `udp:HOST:PORT`, `serial:DEVICE@BAUD`.
-    duration : float
-        s, after which it ends.
-    speed_up : float
-        For simulated ships: how many seconds pass in one.
-    told : callable
-        Given a line for each change of state.
-
-    Returns
-    -------
-    Helm
-        As it was at the end: `state`, `alarm`, `counts`.
-
-    Raises
-    ------
-    InputError
-        For an address that cannot be opened, or an autopilot that reads what no sentence tells.
+    `agent`, `heading` and `limits` are those of `Helm`, `address` is that of a `Link`. Of simulated ships
+    `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises InputError for an
+    address that cannot be opened, and for an autopilot that reads what no sentence tells.
     """
     for name, number in (("speed_up", speed_up), ("heading", heading or 0.0)):
         check_number(number, name)

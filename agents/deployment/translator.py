@@ -151,7 +151,10 @@ class _Body(ast.NodeTransformer):
             f"    {of(kind)} {c_name(one)};" for one, kind in self.kinds.items() if one not in self.arguments
         ]
         given = ", ".join(f"{of(kind)} {c_name(one)}" for one, kind in self.arguments.items())
-        head = f"static {of(self.returned)} {name}({given}) {{"
+        about = re.sub(
+            r"[^\w .,:;()+-]", "", (self.function.__doc__ or "").strip().partition("\n")[0], flags=re.ASCII
+        )
+        head = f"/* {about} */\nstatic {of(self.returned)} {name}({given}) {{"
         return "\n".join([head, *local, *unused, *lines, "}\n"]), self.returned
 
     def _refusal(self, node: ast.AST) -> InputError:
