@@ -32,6 +32,7 @@ from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
 LAWS = ("lq-scheduled", "lqg", "pid-filtered")  # with a law of their own in the template
+SINGLE = "{:.9e}f".format  # a number in single precision as C writes it
 Variables = dict[str, tuple[str, str, float]]  #: unit, meaning and first value
 
 
@@ -166,11 +167,6 @@ def checked_name(name: str) -> str:
     return found
 
 
-def _single(value: float) -> str:
-    """A number in single precision as C writes it."""
-    return f"{float(value):.9e}f"
-
-
 def _rows(values: Any, number: Any = literal) -> str:
     """Numbers of an array as C initialises it."""
     return "{" + ", ".join(number(one) if np.ndim(one) == 0 else _rows(one, number) for one in values) + "}"
@@ -182,7 +178,7 @@ def _environment() -> Environment:
     loader = FunctionLoader(lambda name: (folder / name).read_text(encoding="utf-8"))
     made = Environment(loader=loader, undefined=StrictUndefined, trim_blocks=True, keep_trailing_newline=True)
     made.filters |= {
-        "c": literal, "float32": _single, "array": _rows, "floats": lambda one: _rows(one, _single),
+        "c": literal, "float32": SINGLE, "array": _rows, "floats": lambda one: _rows(one, SINGLE),
         "deg": lambda angle: round(np.degrees(angle), 4),
         "knots": lambda speed: round(speed / UNITS["speed"]["kn"], 4),
         "heading": lambda angle: round(np.degrees(angle) % 360.0, 4) % 360.0,

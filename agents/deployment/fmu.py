@@ -54,10 +54,12 @@ def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     }  # fmt: skip
     if version == 3:
         files["sources/buildDescription.xml"] = render("buildDescription.xml.j2", **data)
+    machine = platform.machine()
+    folder = "linux64" if version == 2 and machine == "x86_64" else f"{machine}-linux"
     with atomic_path(path) as draft:
         binary = _compiled(files, source.name)
         with ZipFile(draft, "w", ZIP_DEFLATED) as archive:
-            archive.writestr(ZipInfo(_place(source.name, version)), binary, ZIP_DEFLATED)
+            archive.writestr(ZipInfo(f"binaries/{folder}/{source.name}.so"), binary, ZIP_DEFLATED)
             for name, text in files.items():
                 archive.writestr(ZipInfo(name), text, ZIP_DEFLATED)
 
@@ -67,13 +69,6 @@ def _headers(version: int) -> list[Path]:
     if spec is None or spec.origin is None:
         raise InputError("fmpy is not installed, an FMU needs its headers: pip install 'shipgym[fmu]'")
     return sorted((Path(spec.origin).parent / "c-code").glob(f"fmi{version}*.h"))
-
-
-def _place(name: str, version: int) -> str:
-    """Where an importer looks for the binary of this computer."""
-    machine = platform.machine()
-    folder = "linux64" if version == 2 and machine == "x86_64" else f"{machine}-linux"
-    return f"binaries/{folder}/{name}.so"
 
 
 def _compiled(files: dict[str, str], name: str) -> bytes:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, LQG, PID, FilteredPID, IntegralLineOfSight, ScheduledLQ, load_agent
+from agents import LQ, LQG, PID, FilteredPID, IntegralLineOfSight, ScheduledLQ, Shielded, load_agent
 from agents.cli import app
 from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
@@ -149,7 +149,12 @@ def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
         assert abs(step(state, row.ctypes.data) - expected) <= within
 
 
-@pytest.mark.parametrize("agent", [LQ.from_model(MARINER), load_agent("mariner-calm-ppo")], ids=["lq", "ppo"])
+SHIELDED = Shielded.from_model(MARINER, random_policy())
+
+
+@pytest.mark.parametrize(
+    "agent", [CONTROLLERS["lq"], CONTROLLERS["ppo"], SHIELDED], ids=["lq", "ppo", "shield"]
+)
 def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(agent):
     env = gym.make("shipgym/CourseKeeping-v0", model="mariner")
     seen, _ = env.reset(seed=3)
