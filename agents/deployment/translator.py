@@ -47,16 +47,10 @@ KEYWORDS = frozenset(re.findall(r"\w+", """
 
 @dataclass
 class Translator:
-    """C functions and structures made so far.
+    """C functions and structures made so far, whose names begin with `prefix`.
 
-    Attributes
-    ----------
-    parts : mapping
-        What takes the place of globals, as in `shipgym.engine.specialise`.
-    prefix : str
-        Begins the names of all that is made.
-    types : dict
-        Names of structures by record or tuple of kinds; those given beforehand are declared elsewhere.
+    `parts` take the place of globals, as in `shipgym.engine.specialise`; `types` are names of structures by
+    record or tuple of kinds, those given beforehand declared elsewhere.
     """
 
     parts: Mapping[str, Any]
