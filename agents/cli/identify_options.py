@@ -9,8 +9,7 @@ from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from shipgym.errors import InputError
-from shipgym.files import toml_value
+from shipgym.files import named_values
 from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
 TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
@@ -86,10 +85,4 @@ def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
 
     Raises InputError for one that is not, or has no such name.
     """
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, value = text.partition("=")
-        if not sign or not name.strip():
-            raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
-        found[name.strip()] = toml_value(value.strip())
-    return check_options(found, "--set")
+    return check_options(named_values(texts, "--set", "seed=3"), "--set")

@@ -42,6 +42,7 @@ class FilteredPID(Stateful):
 
     kind: ClassVar[str] = "pid-filtered"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = PID.feedback
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate",)
     ranges: ClassVar[Mapping[str, Range]] = {
         **Controller.ranges, "reference_frequency": FROM_NONE, "largest_turn_rate": FROM_NONE,
         "tracking_rate": FROM_NONE, "wave_frequency": FROM_NONE,
