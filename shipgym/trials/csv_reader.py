@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -43,16 +44,10 @@ class CsvTable:
 
         InputError for a missing column, a row with more or fewer cells than the header, or text in a number.
         """
-        for name in names:
-            if name not in self.header:
-                raise InputError(
-                    f"{self.path}: column '{name}' not found.{did_you_mean(name, self.header)} "
-                    f"Columns present: {quoted(self.header)}. Name the column in [columns] (or columns=...)"
-                )
+        indices = [column_index(self, name) for name in names]
         self._check_ragged()
-        if not self.rows:
-            return np.empty((0, len(names)))
-        indices = [self.header.index(name) for name in names]
+        if not self.rows or not names:
+            return np.empty((len(self.rows), len(names)))
         rows = self._with_decimal_points()
         try:
             values = np.loadtxt(
@@ -61,8 +56,17 @@ class CsvTable:
         except ValueError:
             values = np.empty((0, 0))
         if len(values) != len(rows):  # a cell that is no number, or a quote that is not closed
-            values = self._cell_by_cell(rows, indices)
+            values = np.transpose([numbers_of(self, name, self.texts(name)) for name in names])
         return np.asarray(values, dtype=np.float64)
+
+    def texts(self, name: str) -> list[str]:
+        """The cells of a column without blanks around them; InputError as `numbers`."""
+        index = column_index(self, name)
+        self._check_ragged()
+        return [
+            (_cells(row, self.delimiter) if '"' in row else row.split(self.delimiter))[index].strip()
+            for row in self.rows
+        ]
 
     def _check_ragged(self) -> None:
         expected = len(self.header)
@@ -80,27 +84,56 @@ class CsvTable:
         """Read decimal commas as points, where the delimiter leaves no doubt."""
         if self.delimiter == "," or not any("," in row for row in self.rows):
             return self.rows
-        return [row if "." in row else row.replace(",", ".") for row in self.rows]
+        return [row.replace(",", ".") for row in self.rows]
 
-    def _cell_by_cell(self, rows: list[str], indices: list[int]) -> npt.NDArray[np.float64]:
-        values = np.empty((len(rows), len(indices)))
-        for row, text in enumerate(rows):
-            cells = _cells(text, self.delimiter)
-            for k, index in enumerate(indices):
-                cell = cells[index].strip()
-                try:
-                    values[row, k] = math.nan if cell.lower() in MISSING_WORDS else float(cell)
-                except ValueError:
-                    raise InputError(
-                        f"{self.path}: {self.place(row)}, column '{self.header[index]}': "
-                        f"'{cell}' found, expected a number; correct the cell, or leave it empty where the "
-                        'value is missing and import with repair = "interpolate"'
-                    ) from None
-        return values
+
+class Table(Protocol):
+    """A file of columns, whatever its kind."""
+
+    @property
+    def path(self) -> Path: ...  # noqa: D102 - the file, for messages
+    @property
+    def header(self) -> tuple[str, ...]: ...  # noqa: D102 - names of the columns
+
+    def place(self, row: int) -> str:
+        """The place of a row for a message."""
+
+    def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
+        """Some columns as numbers, as `CsvTable.numbers`."""
+
+    def texts(self, name: str) -> list[str]:
+        """The cells of a column as texts."""
+
+
+def column_index(table: Table, name: str) -> int:
+    """Where a column stands; InputError if there is none of this name."""
+    if name not in table.header:
+        raise InputError(
+            f"{table.path}: column '{name}' not found.{did_you_mean(name, table.header)} "
+            f"Columns present: {quoted(table.header)}. Name the column in [columns] (or columns=...)"
+        )
+    return table.header.index(name)
+
+
+def numbers_of(table: Table, name: str, cells: Sequence[str]) -> npt.NDArray[np.float64]:
+    """The numbers in the cells of a column, nan where there is none; InputError for other texts."""
+    values = np.empty(len(cells))
+    decimal_comma = getattr(table, "delimiter", "") != ","
+    for row, cell in enumerate(cells):
+        text = cell.replace(",", ".") if decimal_comma and "." not in cell else cell
+        try:
+            values[row] = math.nan if text.lower() in MISSING_WORDS else float(text)
+        except ValueError:
+            raise InputError(
+                f"{table.path}: {table.place(row)}, column '{name}': '{cell}' found, expected a number; "
+                "correct the cell, or leave it empty where the value is missing and import with "
+                'repair = "interpolate"'
+            ) from None
+    return values
 
 
 def read_table(path: str | Path) -> CsvTable:
-    """Read a CSV file in UTF-8 with one header line; delimiter comma, semicolon or tab.
+    """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
 
     Raises InputError for a missing file, a folder, an empty or binary file, and a header with no names or
     repeated ones.
@@ -132,7 +165,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
 
 
 def _read_lines(path: Path) -> list[str]:
-    text = read_text(path, "CSV file", LARGEST_CSV)
+    text = read_text(path, "CSV file", LARGEST_CSV, latin=True)
     if "\0" in text:
         raise InputError(
             f"{path}: binary content (a zero byte at byte {text.index(chr(0))}), expected CSV text; "
@@ -166,14 +199,15 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
         raise InputError(
             f"{path}: line {line}: column '{twice[0]}' stands twice in the header; rename or remove one"
         )
-    if all(_is_number(name) for name in header):
+    if all(is_number(name) for name in header):
         raise InputError(
             f"{path}: line {line} holds only numbers, expected a header with column names "
             "such as t,psi,u,v,r,delta"
         )
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a text is a number as Python reads it."""
     try:
         float(text)
     except ValueError:
