@@ -27,6 +27,7 @@ _WORDS = {"r": ("the yaw rate", "the heading"), "delta": ("the rudder", "the yaw
 _LEAST_RUDDER = math.radians(2.0)
 _WINDOW_S, _FEWEST = 5.0, 60
 _MEMORIES_S = (20.0, 80.0)
+_LEAST_DIRECTION = 0.02  # of what explains the change beside the channel
 _SURE = 5.0  # standard errors by which the channel must tell on the other
 
 
@@ -56,7 +57,9 @@ def clock_offset(t: Floats, target: Floats, late: Floats, others: Mapping[str, F
         ends = (np.interp(grid + delay + sign * half, t, sums[name]) for sign in (1.0, -1.0))
         return np.asarray(np.subtract(*ends) / (2.0 * half))
 
-    basis, _ = np.linalg.qr(np.column_stack([np.ones(grid.size), *(mean(name) for name in others)]))
+    known = np.column_stack([np.ones(grid.size), *(mean(name) for name in others)])
+    basis, sizes, _ = np.linalg.svd(known / np.linalg.norm(known, axis=0), full_matrices=False)
+    basis = basis[:, sizes > _LEAST_DIRECTION]
     change = change - basis @ (basis.T @ change)
     power = float(change @ change)
 
@@ -100,11 +103,14 @@ def rudder_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
     return clock_offset(t, r, delta, others)
 
 
-Series = Mapping[str, tuple[Floats, Floats]]
+def _opposes(t: Floats, r: Floats, delta: Floats) -> bool:
+    """Whether the rudder opposes the yaw acceleration by the yaw rate alone too."""
+    plain = clock_offset(t, r, delta, {"r": r})
+    return plain is not None and plain.gain < 0.0 and plain.sure > _SURE
 
 
 def corrected_clocks(
-    t: Floats, values: Mapping[str, Floats], series: Series, choice: str | None, where: str
+    t: Floats, values: Mapping[str, Floats], series: Mapping[str, tuple[Floats, Floats]], choice: str | None, where: str
 ) -> tuple[dict[str, tuple[Floats, Floats]], list[str]]:
     """The channels with late yaw rate and rudder put right, none where nothing is, and what was found in words.
 
@@ -125,12 +131,10 @@ def corrected_clocks(
         if offset is None or offset.sure < _SURE:
             continue
         told, other = _WORDS[name]
-        if name == "delta" and offset.gain < 0.0 and abs(offset.late) < LONGEST_S / 2:
+        if name == "delta" and offset.gain < 0.0 and _opposes(t, r, values["delta"]):
             raise InputError(
-                f"{where}: the yaw acceleration follows the rudder with the opposite sign, expected a "
-                "positive "
-                'rudder to turn the bow to starboard; write rudder_positive = "port" in [conventions], or '
-                "take it "
+                f"{where}: the yaw acceleration follows the rudder with the opposite sign, expected a positive "
+                'rudder to turn the bow to starboard; write rudder_positive = "port" in [conventions], or take it '
                 "out if it stands there"
             )
         error = math.hypot(offset.error, DYNAMICS_S[name])

@@ -1,11 +1,8 @@
-"""Times and positions as instruments write them: ISO 8601, Unix, date and time of day; degrees and "
-"minutes.
-"""
+"""Times and positions as instruments write them: clock times with or without a date, degrees and minutes."""
 
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
-from functools import lru_cache
 
 import numpy as np
 
@@ -13,101 +10,58 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 
 DAY = 86400.0
-_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%Y/%m/%d", "%d-%m-%Y", "%d%m%y", "%Y%m%d")
-_TIME = re.compile(r"(\d\d?):?(\d\d)(?::?(\d\d(?:[.,]\d+)?))?\s*([AaPp][Mm])?")
-_ZONE = re.compile(r"([+-])(\d\d):?(\d\d)")
+_TIME_OF_DAY = re.compile(r"\d\d?:\d\d(:\d\d([.,]\d+)?)?")
+_NUMBER = r"(\d+(?:[.,]\d+)?)"
 _ANGLE = re.compile(
-    r"\s*([NSEWnsew])?\s*([-+]?)(\d+(?:[.,]\d+)?)(?:\s*[°ºd\s]\s*(\d+(?:[.,]\d+)?))?(?:\s*['′’m\s]\s*(\d+(?:[.,]\d+)?))?"
-    r"\s*['′’\"″”ms]{0,2}\s*([NSEWnsew])?\s*"
+    rf"\s*([NSEW])?\s*([-+]?){_NUMBER}(?:\s*[°º\s]\s*{_NUMBER})?(?:\s*['\u2032\u2019\s]\s*{_NUMBER})?"
+    "\\s*['\u2032\u2019\"\u2033\u201d]{0,2}\\s*([NSEW])?\\s*",
+    re.IGNORECASE,
 )
 
 
 def zone_seconds(zone: str, where: str) -> float:
     """How far a clock is ahead of UTC, s, of a text such as "+02:00" or "UTC"; InputError for others."""
-    found = _ZONE.fullmatch(zone.strip()) if isinstance(zone, str) else None
-    if zone in ("UTC", "Z"):
-        return 0.0
-    if found is None or int(found[2]) > 14 or int(found[3]) > 59:
-        raise InputError(f'{where}: {zone!r} found, expected how far the clock is ahead of UTC, as "+02:00"')
-    return float(f"{found[1]}1") * (3600.0 * int(found[2]) + 60.0 * int(found[3]))
+    try:
+        ahead = datetime.fromisoformat(f"2000-01-01T00:00{'Z' if zone == 'UTC' else zone}").utcoffset()
+        return (ahead or timedelta()).total_seconds()
+    except (ValueError, TypeError):
+        raise InputError(
+            f'{where}: {zone!r} found, expected how far the clock is ahead of UTC, as "+02:00"'
+        ) from None
 
 
-def read_clock(times: Sequence[str], dates: Sequence[str] | None = None) -> tuple[Floats, bool]:
-    """Seconds of each text, nan where it is empty, and whether its date is known (seconds since 1970).
+def read_clock(texts: Sequence[str]) -> tuple[Floats, bool]:
+    """Seconds of each text, nan where it is empty, and whether they count from 1970 or are of the day.
 
-    A text is date and time (ISO 8601, or with one of the usual dates before it), or a time of the day, which
-    goes on at midnight. A date whose day and month may be exchanged is read such that the texts span the
-    shortest time. ValueError, with the text, for one that is no time.
+    A text is date and time in any usual form, or a time of the day, which goes on at midnight. Where day and
+    month may be exchanged, that is taken which makes the texts span the shorter time. ValueError for others.
     """
-    if dates is not None:
-        times = [f"{date} {time}".strip() for date, time in zip(dates, times, strict=True)]
-    known = [text for text in times if text]
-    first = known[0] if known else ""
-    if _TIME.fullmatch(first):
-        read, dated = _time_of_day, False
+    import pandas as pd
+
+    series = pd.Series(texts, dtype=str).str.strip().str.replace(",", ".").replace("", None)
+    first = next(filter(None, texts), "")
+    of_day = _TIME_OF_DAY.fullmatch(first) is not None
+    if of_day:
+        padded = series.where(series.str.count(":") == 2, series + ":00")
+        found = [pd.to_timedelta(padded, errors="coerce").dt.total_seconds()]
     else:
-        read, dated = _moment, True
-        if not _is_iso(first):
-            spans = {}
-            for form in _DATES:
-                try:
-                    ends = [_dated(text, form) for text in known]
-                except ValueError:
-                    continue
-                spans[form] = max(ends) - min(ends)
-            if not spans:
-                raise ValueError(first)
-            form = min(spans, key=lambda name: spans[name])
-            read = lambda text: _dated(text, form)  # noqa: E731
-    seconds = np.array([read(text) if text else np.nan for text in times])
-    if not dated:
-        filled = np.isfinite(seconds)
-        seconds[filled] = np.unwrap(seconds[filled], period=DAY)
-    return seconds, dated
-
-
-def _is_iso(text: str) -> bool:
-    try:
-        _moment(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _moment(text: str) -> float:
-    """Seconds since 1970 of ISO 8601; without a zone the clock is taken as UTC."""
-    try:
-        moment = datetime.fromisoformat(text)
-        return moment.replace(tzinfo=moment.tzinfo or UTC).timestamp()
-    except (ValueError, OverflowError):
-        raise ValueError(text) from None
-
-
-def _time_of_day(text: str) -> float:
-    found = _TIME.fullmatch(text)
-    if found is None:
-        raise ValueError(text)
-    hour, half = int(found[1]), (found[4] or "").lower()
-    hour = hour % 12 + 12 * (half == "pm") if half else hour
-    second = float((found[3] or "0").replace(",", "."))
-    if hour > 24 or int(found[2]) > 59 or second > 61.0:
-        raise ValueError(text)
-    return 3600.0 * hour + 60.0 * int(found[2]) + second
-
-
-@lru_cache(maxsize=1024)
-def _date(text: str, form: str) -> float:
-    return datetime.strptime(text, form).replace(tzinfo=UTC).timestamp()
-
-
-def _dated(text: str, form: str) -> float:
-    date, _, time = text.replace("T", " ").partition(" ")
-    return _date(date, form) + _time_of_day(time.strip())
+        orders = (False,) if first[:4].isdigit() else (True, False)
+        read = [pd.to_datetime(series, utc=True, format="mixed", dayfirst=k, errors="coerce") for k in orders]
+        found = [(moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds() for moments in read]
+    best = min(found, key=lambda seconds: (int(seconds.isna().sum()), seconds.max() - seconds.min()))
+    wrong = best.isna() & series.notna()
+    if wrong.any():
+        raise ValueError(texts[int(wrong.to_numpy().argmax())])
+    seconds = best.to_numpy(np.float64, copy=True)
+    known = np.isfinite(seconds)
+    if of_day:
+        seconds[known] = np.unwrap(seconds[known], period=DAY)
+    return seconds, not of_day
 
 
 def clock_text(seconds: float) -> str:
-    """A time since 1970, or of the day, as ISO 8601 in UTC."""
-    text = (datetime(1970, 1, 1) + timedelta(seconds=round(seconds, 3))).isoformat(sep=" ")
+    """A time since 1970, or of the day, in words of ISO 8601."""
+    text = datetime.fromtimestamp(round(seconds, 1), UTC).strftime("%Y-%m-%d %H:%M:%S")
     return text if seconds >= 2.0 * DAY else text.partition(" ")[2]
 
 
@@ -130,8 +84,7 @@ def _degrees(match: re.Match[str], minutes: bool) -> float:
     degrees, minute, second = (float((match[k] or "0").replace(",", ".")) for k in (3, 4, 5))
     if minutes and match[4] is None:
         degrees, minute = divmod(degrees, 100.0)
-    side = (match[1] or match[6] or "N").upper()
     if minute >= 60.0 or second >= 60.0:
         raise ValueError(match[0])
-    sign = -1.0 if (side in "SW") != (match[2] == "-") else 1.0
-    return sign * (degrees + minute / 60.0 + second / 3600.0)
+    south_or_west = (match[1] or match[6] or "N").upper() in "SW"
+    return (-1.0 if south_or_west != (match[2] == "-") else 1.0) * (degrees + minute / 60.0 + second / 3600.0)

@@ -1,7 +1,7 @@
 """Which column of a file holds which channel, in which unit, and where a sample stands in the file."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -88,6 +88,8 @@ def choose_columns(table: Table, columns: Mapping[str, Any] | None, part: bool =
     if part:
         chosen = {channel: column for channel, column in chosen.items() if column.name in table.header}
     time = chosen.pop("t", Column("t", "s"))
+    if time.unit == "s":
+        time = replace(time, unit=table.time_unit)
     if not chosen:
         raise InputError(
             f"{table.path}: columns: no channel named besides time, expected some of {quoted(QUANTITIES)}"

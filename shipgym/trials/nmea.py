@@ -1,59 +1,80 @@
-"""NMEA 0183 logs: position, speeds, heading, rate of turn, rudder, shaft and wind of whatever talkers there are.
+"""NMEA 0183 logs: position, speeds, heading, rate of turn, rudder, shaft and wind, of whatever talkers there are.
 
-The sentences are parsed by pynmea2; those that hold no channel (AIS, depth, satellites) are passed over.
+pynmea2 parses the sentences; those that hold no channel (AIS, depth, satellites) are passed over.
 """
 
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable
-from datetime import UTC, datetime
-from importlib import import_module
+from collections.abc import Iterator
+from datetime import UTC, datetime, time
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, check_readable, read_text
-from shipgym.trials.clock_texts import DAY, read_clock
-from shipgym.trials.csv_reader import LONGEST_LINE, MOST_LINES
+from shipgym.trials.clock_texts import DAY
+from shipgym.trials.csv_reader import MOST_LINES
 
 KNOT, DEGREE = 1852.0 / 3600.0, np.pi / 180.0
-#: Sentences that are read.
-SENTENCES = ("RMC", "GGA", "GLL", "ZDA", "VTG", "HDT", "THS", "HDG", "ROT", "RSA", "RPM", "VBW", "VHW", "MWV")
-#: Share of wrong checksums from which a log is refused.
-MOST_WRONG = 0.1
+#: Share of damaged sentences from which a log is refused.
+MOST_DAMAGED = 0.1
 
-_SENTENCE = re.compile(r"^(.*?)(\$[A-Z]{2}(?:%s),.*)$" % "|".join(SENTENCES))
+_POSITION = {"lat": ("latitude", 1.0), "lon": ("longitude", 1.0)}
+#: Of each sentence what it must say to be valid, and channel by field and factor to SI.
+SENTENCES: dict[str, tuple[tuple[str, str], dict[str, tuple[str, float]]]] = {
+    "RMC": (("status", "A"), _POSITION | {"sog": ("spd_over_grnd", KNOT), "cog": ("true_course", DEGREE)}),
+    "GGA": (("gps_qual", "123456"), _POSITION),
+    "GLL": (("status", "A"), _POSITION),
+    "VTG": (("", ""), {"sog": ("spd_over_grnd_kts", KNOT), "cog": ("true_track", DEGREE)}),
+    "HDT": (("", ""), {"psi": ("heading", DEGREE)}),
+    "THS": (("mode", "AEM"), {"psi": ("heading", DEGREE)}),
+    "HDG": (("", ""), {"psi": ("heading", DEGREE)}),
+    "VHW": (("", ""), {"stw": ("water_speed_knots", KNOT), "psi": ("heading_true", DEGREE)}),
+    "VBW": (("data_validity_water_spd", "A"), {"stw": ("lon_water_spd", KNOT), "v": ("trans_water_spd", KNOT)}),
+    "ROT": (("status", "A"), {"r": ("rate_of_turn", DEGREE / 60.0)}),
+    "RSA": (("rsa_starboard_status", "A"), {"delta": ("rsa_starboard", DEGREE)}),
+    "RPM": (("source", "S"), {"n": ("speed", 1.0 / 60.0)}),
+    "MWV": (("status", "A"), {"wind_from": ("wind_angle", DEGREE), "wind_speed": ("wind_speed", 1.0)}),
+    "ZDA": (("", ""), {}),
+}  # fmt: skip
+_SPEEDS = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0, "S": 1609.344 / 3600.0}
+#: The better sources: of heading true ones, of the speed through the water the log with two axes.
+_BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}
+_SENTENCE = re.compile(rf"^(.*?)(\$[A-Z]{{2}}(?:{'|'.join(SENTENCES)}),.*)$")
 _ANY = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
-_SPEEDS = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0}
-#: Of the sources of heading, the first that there is counts: true, then magnetic with the variation.
-_HEADINGS = ("HDT", "THS", "VHW", "HDG")
+_STAMP = re.compile(
+    r"\\[^\\]*c:(\d{9,13})|(\d{9,13}(?:\.\d+)?)\b|(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?)"
+)
 
 
 class Reading(NamedTuple):
-    """One value of a channel."""
+    """One value of a channel, or a time: the line, its time (s since 1970 or of the day, or nan), the "
+    "value.
+    """
 
     line: int
-    time: float  # s since 1970 or of the day; nan where the sentence has none
+    time: float
     value: float
 
 
 class Log(NamedTuple):
-    """What a log holds: columns on the clock of all readings, blank where a sentence says nothing."""
+    """What a log holds."""
 
     columns: dict[str, Floats]  # by channel in SI units, positions in degrees; nan where blank; ``t`` too
     lines: list[int]  # of the file behind each row
-    dated: bool  # whether t counts from 1970, else from midnight
     notes: list[str]  # what was left out
 
 
+Series = tuple[Floats, Floats, Floats]  # time, line and value
+Readings = dict[str, dict[str, list[Reading]]]  # by channel and source, the talker with the sentence
+
+
 def is_nmea(path: Path) -> bool:
-    """Whether a file begins as a log of NMEA sentences, from whatever line."""
+    """Whether a file begins with sentences of NMEA 0183."""
     check_readable(path, "CSV file")
     with path.open("rb") as file:
         return len(_ANY.findall(file.read(4096).decode("latin-1").replace("\r", "\n"))) >= 2
@@ -61,250 +82,142 @@ def is_nmea(path: Path) -> bool:
 
 def parse_log(path: Path) -> Log:
     """Read a log; raises InputError for a damaged one and one without time or channels."""
+    import pynmea2
+
+    if not hasattr(pynmea2, "THS"):  # which pynmea2 does not know
+        fields = (("True heading", "heading"), ("Mode", "mode"))
+        vars(pynmea2)["THS"] = type("THS", (pynmea2.TalkerSentence,), {"fields": fields})
     lines = read_text(path, "log of NMEA 0183", LARGEST_CSV, latin=True).splitlines()
     if len(lines) > MOST_LINES:
         raise InputError(f"{path}: {len(lines)} lines found, expected at most {MOST_LINES}; split the file")
-    readings: dict[tuple[str, str], list[Reading]] = defaultdict(list)
-    stamps: dict[str, list[Reading]] = defaultdict(list)
-    wrong, total, first_wrong = 0, 0, 0
-    library = _library()
+    readings: Readings = defaultdict(lambda: defaultdict(list))
+    damaged, total = [], 0
     for number, line in enumerate(lines, start=1):
-        found = _SENTENCE.match(line) if len(line) < LONGEST_LINE else None
+        found = _SENTENCE.match(line)
         if found is None:
             continue
         total += 1
         try:
-            message = library.parse(found[2], check=True)
-            kind = str(message.sentence_type)
-            time, values = _time_of(message), dict(_CHANNELS.get(kind, _nothing)(message))
-        except (library.ParseError, ValueError, TypeError, AttributeError, IndexError, OverflowError):
-            wrong, first_wrong = wrong + 1, first_wrong or number
+            message = pynmea2.parse(found[2], check=True)
+            time, values = _time_of(message), list(_values_of(message))
+        except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError, OverflowError):
+            damaged.append(number)
             continue
-        if (logged := _logger_stamp(found[1])) is not None:
-            stamps["logger"].append(Reading(number, logged, logged))
-        source = f"{message.talker}{kind}"
-        if time is not None:
-            stamps[source].append(Reading(number, time, time))
-        for channel, value in values.items():
-            readings[channel, source].append(Reading(number, np.nan if time is None else time, value))
-    if wrong > MOST_WRONG * total:
+        source = f"{message.talker}{message.sentence_type}"
+        if (logged := _stamp(found[1])) is not None:
+            readings["t"]["logger"].append(Reading(number, logged, logged))
+        if np.isfinite(time):
+            readings["t"][source].append(Reading(number, time, time))
+        for channel, value in values:
+            readings[channel][source].append(Reading(number, time, value))
+    if len(damaged) > MOST_DAMAGED * total:
         raise InputError(
-            f"{path}: {wrong} of {total} sentences are damaged (the first in line {first_wrong}), by their "
-            "checksums or fields, expected hardly any; the log was cut or copied as text: take the original"
+            f"{path}: {len(damaged)} of {total} sentences have a wrong checksum or broken fields (the first "
+            "in "
+            f"line {damaged[0]}), expected hardly any; the log was damaged on the way: take the original"
         )
-    notes = [f"{wrong} of {total} sentences with a wrong checksum were left out"] if wrong else []
-    return _assembled(path, readings, stamps, notes)
+    notes = [f"{len(damaged)} of {total} sentences with a wrong checksum left out"] if damaged else []
+    return _assembled(path, readings, notes)
 
 
-def _library() -> ModuleType:
-    """pynmea2, which does not know THS by itself."""
-    try:
-        library = import_module("pynmea2")
-    except ModuleNotFoundError:
-        raise InputError(
-            "pynmea2, which reads NMEA 0183, is not installed; install it with: pip install 'shipgym[logs]'"
-        ) from None
-    if "THS" not in vars(library):
-        fields = (("True heading", "heading"), ("Mode", "mode"))
-        vars(library)["THS"] = type("THS", (library.TalkerSentence,), {"fields": fields})
-    return library
+def _values_of(message: Any) -> Iterator[tuple[str, float]]:
+    """The channels of a sentence that is valid."""
+    kind = message.sentence_type
+    (flag, valid), fields = SENTENCES[kind]
+    if flag and str(getattr(message, flag) or " ") not in valid:
+        return
+    for channel, (field, factor) in fields.items():
+        told = (
+            getattr(message, field) if getattr(message, field[:3], " ") else None
+        )  # latitude of an empty lat
+        if told is None or told == "":
+            continue
+        value = factor * float(told)
+        if kind == "HDG":
+            for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
+                value += DEGREE * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
+        elif kind == "MWV":
+            value *= _SPEEDS[message.wind_speed_units] if channel == "wind_speed" else 1.0
+            channel += "" if message.reference == "T" else "_relative"
+        yield channel, value
 
 
-def _logger_stamp(text: str) -> float | None:
+def _stamp(text: str) -> float | None:
     """The time that a logger put before a sentence: Unix, ISO 8601, or a TAG block's c:."""
-    text = text.strip(" ,;\t[]")
-    tag = re.match(r"\\.*?c:(\d{9,13})", text)
-    if not text or (text.startswith("\\") and not tag):
+    found = _STAMP.search(text) if text else None
+    if found is None:
         return None
-    try:
-        seconds = float(tag[1] if tag else text)
-        return seconds / 1000.0 if seconds > 1e11 else seconds
-    except ValueError:
-        pass
-    try:
-        seconds, dated = read_clock([text])
-        return float(seconds[0]) if dated else None
-    except ValueError:
-        return None
+    if found[3]:
+        return datetime.fromisoformat(found[3]).replace(tzinfo=UTC).timestamp()
+    seconds = float(found[1] or found[2])
+    return seconds / 1000.0 if seconds > 1e11 else seconds
 
 
-def _time_of(message: Any) -> float | None:
-    """Seconds since 1970 where the sentence has a date, else of the day; None without a time."""
+def _time_of(message: Any) -> float:
+    """Seconds since 1970 where the sentence has a date, else of the day; nan without a time."""
     clock = getattr(message, "timestamp", None)
-    if not hasattr(clock, "hour"):
-        return None
+    if not isinstance(clock, time):
+        return np.nan
+    date = getattr(message, "datestamp", None) or datetime(1970, 1, 1)
     if message.sentence_type == "ZDA":
-        moment = datetime(int(message.year), int(message.month), int(message.day), tzinfo=UTC)
-    elif hasattr(date := getattr(message, "datestamp", None), "year"):
-        moment = datetime(date.year, date.month, date.day, tzinfo=UTC)
-    else:
-        moment = datetime(1970, 1, 1, tzinfo=UTC)
-    return float(
-        moment.timestamp() + 3600 * clock.hour + 60 * clock.minute + clock.second + 1e-6 * clock.microsecond
-    )
+        date = datetime(int(message.year), int(message.month), int(message.day))
+    day = datetime(date.year, date.month, date.day, tzinfo=UTC).timestamp()
+    return day + 3600 * clock.hour + 60 * clock.minute + clock.second + 1e-6 * clock.microsecond
 
 
-Found = Iterable[tuple[str, float]]
-
-
-def _nothing(_: Any) -> Found:
-    return ()
-
-
-def _position(message: Any) -> Found:
-    fine = message.gps_qual not in (0, None) if message.sentence_type == "GGA" else message.status == "A"
-    if fine and message.lat and message.lon:
-        yield from (("lat", message.latitude), ("lon", message.longitude))
-
-
-def _recommended(message: Any) -> Found:
-    if message.status != "A":
-        return
-    yield from _position(message)
-    if message.spd_over_grnd not in (None, ""):
-        yield "sog", KNOT * float(message.spd_over_grnd)
-    if message.true_course not in (None, ""):
-        yield "cog", DEGREE * float(message.true_course)
-
-
-def _track(message: Any) -> Found:
-    if message.spd_over_grnd_kts not in (None, "") and message.true_track not in (None, ""):
-        yield from (
-            ("sog", KNOT * float(message.spd_over_grnd_kts)),
-            ("cog", DEGREE * float(message.true_track)),
-        )
-
-
-def _heading(message: Any) -> Found:
-    if message.heading in (None, "") or getattr(message, "mode", "A") == "V":
-        return
-    value = float(message.heading)
-    if message.sentence_type == "HDG":
-        for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
-            value += {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
-    yield "psi", DEGREE * value
-
-
-def _water(message: Any) -> Found:
-    if message.water_speed_knots not in (None, ""):
-        yield "stw", KNOT * float(message.water_speed_knots)
-    if message.heading_true not in (None, ""):
-        yield "psi", DEGREE * float(message.heading_true)
-
-
-def _two_axes(message: Any) -> Found:
-    if message.data_validity_water_spd == "A":
-        yield "stw", KNOT * float(message.lon_water_spd)
-        if message.trans_water_spd not in (None, ""):
-            yield "v", KNOT * float(message.trans_water_spd)
-
-
-def _turn(message: Any) -> Found:
-    if message.status == "A" and message.rate_of_turn not in (None, ""):
-        yield "r", DEGREE / 60.0 * float(message.rate_of_turn)
-
-
-def _rudder(message: Any) -> Found:
-    if message.rsa_starboard_status == "A" and message.rsa_starboard not in (None, ""):
-        yield "delta", DEGREE * float(message.rsa_starboard)
-
-
-def _shaft(message: Any) -> Found:
-    if message.status == "A" and message.source == "S":
-        yield "n", float(message.speed) / 60.0
-
-
-def _wind(message: Any) -> Found:
-    if message.status == "A" and message.wind_speed_units in _SPEEDS:
-        ending = "" if message.reference == "T" else "_relative"
-        yield f"wind_from{ending}", DEGREE * float(message.wind_angle)
-        yield f"wind_speed{ending}", _SPEEDS[message.wind_speed_units] * float(message.wind_speed)
-
-
-_CHANNELS: dict[str, Callable[[Any], Found]] = {
-    "RMC": _recommended, "GGA": _position, "GLL": _position, "VTG": _track, "HDT": _heading, "THS": _heading,
-    "HDG": _heading, "VHW": _water, "VBW": _two_axes, "ROT": _turn, "RSA": _rudder, "RPM": _shaft,
-    "MWV": _wind,
-}  # fmt: skip
-
-
-def _assembled(
-    path: Path,
-    readings: dict[tuple[str, str], list[Reading]],
-    stamps: dict[str, list[Reading]],
-    notes: list[str],
-) -> Log:
-    if not readings:
-        raise InputError(
-            f"{path}: no sentence of a ship's motion found, expected some of {quoted(SENTENCES)}"
-        )
-    if not stamps:
-        raise InputError(
-            f"{path}: no time that can be read, expected RMC, GGA, GLL or ZDA, or a logger's time before "
-            "each "
-            "sentence; log one of these too"
-        )
-    clock = max(stamps, key=lambda name: _rank(name, stamps[name]))
-    times, first = np.unique(
-        np.maximum.accumulate([stamp.time for stamp in stamps[clock]]), return_index=True
-    )
-    lines = np.array([stamp.line for stamp in stamps[clock]])[first]
-    chosen: dict[str, tuple[Floats, npt.NDArray[np.intp], Floats]] = {}
-    for channel in dict.fromkeys(channel for channel, _ in readings):
-        source = _best([name for c, name in readings if c == channel], channel, readings)
-        line, time, value = np.array(readings[channel, source]).T
-        at = np.interp(line, lines, times)
-        own = np.isfinite(time) & (clock != "logger")
-        time = np.where(own, time + DAY * np.round((at - time) / DAY), at)
-        time, first = np.unique(np.round(time, 3), return_index=True)
-        chosen[channel] = time, line[first].astype(int), value[first]
-        others = sorted({name for c, name in readings if c == channel} - {source})
-        if others:
+def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
+    clocks = readings.pop("t", {})
+    if not readings or not clocks:
+        found = "sentence of a ship's motion" if clocks else "time that can be read"
+        wanted = quoted(SENTENCES) if clocks else "RMC, GGA, GLL or ZDA, or a logger's time before sentences"
+        raise InputError(f"{path}: no {found} in this log, expected some of {wanted}; log these too")
+    main = max(clocks, key=lambda name: _rank(name, clocks[name]))
+    stamps = np.array([(stamp.line, stamp.time) for stamp in clocks[main]])
+    times, first = np.unique(np.maximum.accumulate(stamps[:, 1]), return_index=True)
+    chosen: dict[str, Series] = {}
+    for channel, sources in readings.items():
+        source = max(sorted(sources), key=lambda s: (_BETTER.get(s[2:], 0), *_rank(s, sources[s])))
+        line, clock, value = np.array(sources[source]).T
+        at = np.interp(line, stamps[first, 0], times)
+        told = np.isfinite(clock) & (main != "logger")
+        clock = np.where(told, clock + DAY * np.round((at - clock) / DAY), at)
+        clock, kept = np.unique(np.round(clock, 3), return_index=True)
+        chosen[channel] = clock, line[kept], value[kept]
+        if others := sorted(sources.keys() - {source}):
             notes.append(f"{channel} is from {source}; {', '.join(others)} left out")
     _absolute_wind(chosen)
-    every = np.unique(np.concatenate([time for time, *_ in chosen.values()]))
-    columns, at_line = {"t": every}, np.zeros(every.size, dtype=int)
-    for channel, (time, line, value) in chosen.items():
-        place = np.searchsorted(every, time)
+    every = np.unique(np.concatenate([clock for clock, *_ in chosen.values()]))
+    columns, lines = {"t": every}, np.zeros(every.size, dtype=int)
+    for channel, (clock, line, value) in chosen.items():
+        place = np.searchsorted(every, clock)
         columns[channel] = np.full(every.size, np.nan)
-        columns[channel][place], at_line[place] = value, line
-    return Log(columns, at_line.tolist(), bool(times[0] > 2.0 * DAY), notes)
-
-
-def _best(sources: list[str], channel: str, readings: dict[tuple[str, str], list[Reading]]) -> str:
-    """The source that is most direct; of the headings first a true one, of the water's speed first VBW."""
-    order = {name: -k for k, name in enumerate(_HEADINGS)} if channel == "psi" else {"VBW": 1}
-    return max(sorted(sources), key=lambda s: (order.get(s[2:], 0), *_rank(s, readings[channel, s])))
+        columns[channel][place], lines[place] = value, line
+    return Log(columns, lines.tolist(), notes)
 
 
 def _rank(source: str, readings: list[Reading]) -> tuple[bool, bool, bool, int]:
-    """By this sources are preferred: the logger, those with dates, no display that passes on others' (II), "
-    "most.
-    """
-    dated = readings[0].time > 2.0 * DAY
+    """What is preferred: a logger, dates, no display that passes others' sentences on (II), many times."""
     times = {one.line if np.isnan(one.time) else one.time for one in readings}
-    return source == "logger", dated, not source.startswith("II"), len(times)
+    return source == "logger", readings[0].time > 2.0 * DAY, not source.startswith("II"), len(times)
 
 
-def _absolute_wind(chosen: dict[str, tuple[Floats, npt.NDArray[np.intp], Floats]]) -> None:
-    """Put the wind over ground in place of the one seen from the ship, where heading and velocity are "
-    "known.
-    """
-    told = chosen.pop("wind_from_relative", None), chosen.pop("wind_speed_relative", None)
-    if "wind_from" in chosen and "psi" in chosen:  # theoretical wind, from the bow
-        time, line, angle = chosen["wind_from"]
-        chosen["wind_from"] = time, line, angle + _at(time, chosen["psi"], angle=True)
+def _absolute_wind(chosen: dict[str, Series]) -> None:
+    """Make the wind that is told from the bow one over ground, where heading and velocity are known."""
+    angle, speed = chosen.pop("wind_from_relative", None), chosen.pop("wind_speed_relative", None)
+    theoretical = chosen.pop("wind_from", None), chosen.pop("wind_speed", None)
+
+    def at(clock: Floats, name: str) -> Floats:
+        return np.interp(
+            clock, chosen[name][0], np.unwrap(chosen[name][2]) if name != "sog" else chosen[name][2]
+        )
+
+    if "psi" not in chosen:
         return
-    chosen.pop("wind_from", None), chosen.pop("wind_speed", None)
-    if told[0] is None or told[1] is None or not {"psi", "sog", "cog"} <= chosen.keys():
-        return
-    time, line, angle = told[0]
-    speed, course = _at(time, chosen["sog"]), _at(time, chosen["cog"], angle=True)
-    toward = -told[1][2] * np.exp(1j * (angle + _at(time, chosen["psi"], angle=True)))
-    wind = toward + speed * np.exp(1j * course)
-    chosen["wind_from"], chosen["wind_speed"] = (time, line, np.angle(-wind)), (time, line, np.abs(wind))
-
-
-def _at(time: Floats, series: tuple[Floats, npt.NDArray[np.intp], Floats], angle: bool = False) -> Floats:
-    values = np.unwrap(series[2]) if angle else series[2]
-    return np.asarray(np.interp(time, series[0], values))
+    if theoretical[0] is not None and theoretical[1] is not None:
+        clock, line, value = theoretical[0]
+        chosen |= {"wind_from": (clock, line, value + at(clock, "psi")), "wind_speed": theoretical[1]}
+    elif angle is not None and speed is not None and {"sog", "cog"} <= chosen.keys():
+        clock, line, value = angle
+        seen = speed[2] * np.exp(1j * (value + at(clock, "psi")))  # where it comes from
+        wind = seen - at(clock, "sog") * np.exp(1j * at(clock, "cog"))
+        chosen |= {"wind_from": (clock, line, np.angle(wind)), "wind_speed": (clock, line, np.abs(wind))}

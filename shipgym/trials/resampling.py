@@ -1,7 +1,5 @@
 """Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
 
-from collections.abc import Mapping
-
 import numpy as np
 import numpy.typing as npt
 
@@ -9,11 +7,13 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 
-#: Channels whose slowest gives the common clock: nothing of the motion is invented between samples.
+#: Time and values of each channel.
+Series = dict[str, tuple[Floats, Floats]]
+#: The slowest of these gives the common clock, so that nothing of the motion is invented between samples.
 MOTION = ("x", "ground_north", "u", "psi", "r", "delta")
-_FEWEST = 3
 #: A step this many times the usual one of a channel is a hole, not a slow clock.
 HOLE_STEPS = 6.0
+_FEWEST = 3
 
 
 def have_own_clocks(present: npt.NDArray[np.bool_]) -> bool:
@@ -29,30 +29,27 @@ def have_own_clocks(present: npt.NDArray[np.bool_]) -> bool:
 
 def own_clock(channel: str, t: Floats, values: Floats, source: Source) -> tuple[Floats, Floats]:
     """Time and values of a channel where it has some; InputError for too few or time that goes back."""
-    rows = np.flatnonzero(np.isfinite(values) & np.isfinite(t))
-    name = next((source.columns[c].name for c in (channel,) if c in source.columns), channel)
+    rows = np.flatnonzero(np.isfinite(values))
+    clock, name = t[rows], source.columns[channel].name
     if rows.size < _FEWEST:
         raise InputError(
-            f"{source.table.path}: column '{name}' has {rows.size} values, expected at least {_FEWEST}; "
-            "leave it out"
+            f"{source.table.path}: column '{name}' has {rows.size} values, expected {_FEWEST} or more; leave "
+            "it out"
         )
-    clock = t[rows]
     back = np.diff(clock) <= 0.0
     if back.any():
         k = int(np.argmax(back))
         raise InputError(
             f"{source.at(int(rows[k + 1]), 't')}: time goes from {clock[k]:.10g} to {clock[k + 1]:.10g} s "
             "between "
-            f"values of '{name}', expected it to increase; sort the rows, remove the repeated ones, or, "
-            "where two "
-            "ships or receivers are in one file, keep the rows of one"
+            f"values of '{name}', expected it to increase; sort the rows, or, where two ships or receivers "
+            "are in "
+            "the file, keep those of one"
         )
     return clock, values[rows]
 
 
-def on_one_clock(
-    series: Mapping[str, tuple[Floats, Floats]], where: str
-) -> tuple[Floats, dict[str, Floats], list[str]]:
+def on_one_clock(series: Series, where: str) -> tuple[Floats, dict[str, Floats], list[str]]:
     """Time, the channels on it, and remarks, of channels on clocks of their own.
 
     The clock is that of the slowest channel of the motion, where all of these have values; the others are
@@ -61,30 +58,29 @@ def on_one_clock(
     clocks = [clock for clock, _ in series.values()]
     if all(clock is clocks[0] for clock in clocks):
         return clocks[0], {name: values for name, (_, values) in series.items()}, []
-    motion = {name: series[name][0] for name in MOTION if name in series} or {
-        name: clock for name, (clock, _) in series.items()
-    }
-    slowest = max(motion, key=lambda name: float(np.median(np.diff(motion[name]))))
-    t = motion[slowest]
-    inside = np.ones(t.size, dtype=bool)
-    notes = []
+    motion = {name: series[name][0] for name in series if name in MOTION} or dict(
+        zip(series, clocks, strict=True)
+    )
+    t = max(motion.values(), key=lambda clock: float(np.median(np.diff(clock))))
+    inside, notes = np.ones(t.size, dtype=bool), []
     for name, clock in motion.items():
-        inside &= (t >= clock[0]) & (t <= clock[-1])
         steps = np.diff(clock)
-        longest = HOLE_STEPS * max(float(np.median(steps)), float(np.median(np.diff(t))))
-        holes = np.flatnonzero(steps > longest)
+        holes = steps > HOLE_STEPS * max(float(np.median(steps)), float(np.median(np.diff(t))))
         after = np.clip(np.searchsorted(clock, t), 1, clock.size - 1)
-        inside &= ~(np.isin(after - 1, holes) & (t > clock[after - 1]) & (t < clock[after]))
-        if holes.size:
+        inside &= (
+            (t >= clock[0])
+            & (t <= clock[-1])
+            & ~(holes[after - 1] & (t > clock[after - 1]) & (t < clock[after]))
+        )
+        if holes.any():
             notes.append(
-                f"{name} has {holes.size} holes, the longest {steps.max():.4g} s from t = "
-                f"{clock[steps.argmax()]:.6g} s"
+                f"{name} has {holes.sum()} holes, of up to {steps.max():.4g} s; nothing is put there"
             )
     t = t[inside]
     if t.size < _FEWEST:
         raise InputError(
-            f"{where}: {', '.join(motion)} have {t.size} moments in common, expected channels that were "
-            "logged at "
-            "the same time; check the clocks, or name the channels that belong together"
+            f"{where}: {', '.join(motion)} have {t.size} moments in common, expected channels of one time; "
+            "check "
+            "their clocks"
         )
     return t, {name: np.interp(t, *pair) for name, pair in series.items()}, notes

@@ -13,13 +13,20 @@ from shipgym.errors import InputError
 from shipgym.trials.clock_offsets import corrected_clocks
 from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
-from shipgym.trials.csv_reader import MISSING_WORDS, Table, is_number
+from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
-from shipgym.trials.navigation import Instruments, correct_offsets, local_metres, rotate_to_body, to_midship
+from shipgym.trials.navigation import (
+    NO_OFFSETS,
+    Instruments,
+    correct_offsets,
+    local_metres,
+    rotate_to_body,
+    to_midship,
+)
 from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
-from shipgym.trials.resampling import have_own_clocks, on_one_clock, own_clock
-from shipgym.trials.units import QUANTITIES, si_factor, si_unit
+from shipgym.trials.resampling import Series, have_own_clocks, on_one_clock, own_clock
+from shipgym.trials.units import QUANTITIES, si_factor
 
 RUDDER_SIGNS = ("starboard", "port")
 VELOCITY_FRAMES = ("body", "earth")
@@ -47,7 +54,7 @@ class Conventions:
     xg: float | None = None
     repair: str | None = None
     where: str = "conventions"
-    instruments: Instruments = Instruments()
+    instruments: Instruments = NO_OFFSETS
 
     def __post_init__(self) -> None:
         check_choice(self.rudder_positive, RUDDER_SIGNS, f"{self.where} rudder_positive")
@@ -65,21 +72,21 @@ class Conventions:
 
 
 class Imported(NamedTuple):
-    """What is read from one table or several, in SI units, with the project's signs, at midship."""
+    """What is read from the files of one log, in SI units, with the project's signs, at midship."""
 
     t: Floats
     channels: dict[str, Floats]  # by name, shape (n_samples,)
     derived: frozenset[str]
     repaired: dict[str, int]  # how many values of a channel were filled in
-    over_ground: bool | None
-    notes: tuple[str, ...]
+    over_ground: bool | None  # whether surge and sway are; None: where they are derived
+    notes: list[str]  # remarks of the readers
     start: float | None  # clock at t = 0 as the file has it, s since 1970 or of the day
 
 
 class _Recorded(NamedTuple):
     """The chosen columns of one table, in SI units, on their own clocks."""
 
-    series: dict[str, tuple[Floats, Floats]]  # time and values of each channel
+    series: Series
     source: Source
     filled: dict[str, int]
     start: float | None  # as in `Imported`, but in UTC
@@ -88,7 +95,7 @@ class _Recorded(NamedTuple):
 def import_tables(
     tables: Sequence[Table], columns: Mapping[str, Any] | None, conventions: Conventions
 ) -> Imported:
-    """Read channels from the tables of one trial, as a rule one.
+    """Read channels from the tables of one log, as a rule one.
 
     The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels are in SI
     units, with the project's signs, in the body frame, at midship; each has shape (n_samples,). Anything
@@ -98,195 +105,183 @@ def import_tables(
     gnss = any("lat" in one for one in chosen)
     recorded = [_recorded(*pair, conventions.repair) for pair in zip(tables, chosen, strict=True)]
     series, source, where = _joined(recorded), recorded[0].source, str(tables[0].path)
-    t, values, gaps = on_one_clock(series, where)
-    late, notes = corrected_clocks(
-        t, _signed(values, conventions), series, conventions.instruments.clock_offsets, where
-    )
+    signed = {
+        name: (
+            clock,
+            0.0 - values if conventions.rudder_positive == "port" and name.startswith("delta") else values,
+        )
+        for name, (clock, values) in series.items()
+    }
+    t, values, gaps = on_one_clock(signed, where)
+    told = check_log(t, values, conventions.instruments, source, gnss)
+    late, notes = corrected_clocks(t, values, signed, conventions.instruments.clock_offsets, where)
     if late:
         t, values, gaps = on_one_clock(late, where)
-    notes = [*(note for table in tables for note in getattr(table, "notes", ())), *gaps, *notes]
+    notes = [*(note for table in tables for note in table.notes), *gaps, *told, *notes]
     check_consistency(t, values, conventions.velocity_frame, source)
-    notes += check_log(t, values, conventions.instruments, source, gnss)
     channels, derived, over_ground, more = to_project_conventions(t, values, conventions, where)
-    repaired = {name: n for one in recorded for name, n in one.filled.items() if n and name in channels}
+    filled = {name: n for one in recorded for name, n in one.filled.items() if n and name in channels}
     start = recorded[0].start
     if start is not None:
-        start += float(zone_seconds(chosen[0]["t"].zone, where))
+        start += zone_seconds(chosen[0]["t"].zone, where)
     ordered = {name: channels[name] for name in QUANTITIES if name in channels}
-    return Imported(t, ordered, derived, repaired, over_ground, (*notes, *more), start)
+    return Imported(t, ordered, derived, filled, over_ground, notes + more, start)
 
 
 def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _Recorded:
     """Read the chosen columns of a table, check them, and fill what is missing where that is asked for."""
+    for name, other in (("lat", "lon"), ("lon", "lat"), ("sog", "cog"), ("cog", "sog")):
+        if name in chosen and other not in chosen:
+            raise InputError(
+                f"{table.path}: columns: {name} found without {other}, expected both; name its column"
+            )
     t, start = _read_times(table, chosen)
-    values = np.column_stack([t, _read_numbers(table, chosen)])
-    if {"lat", "lon"} <= chosen.keys():
-        values = _with_local_positions(table, chosen, values, repair)
-    source = Source(table, chosen, np.arange(len(values)))
-    present = np.isfinite(values)
-    own_clocks = have_own_clocks(present[:, 1:])
-    filled: dict[str, int] = {}
-    if not own_clocks:
+    numbers = {c: table.numbers(column.name) for c, column in chosen.items() if c not in ("t", "lat", "lon")}
+    if "lat" in chosen:
+        numbers |= _local_positions(table, chosen, t, repair)
+        chosen |= {new: replace(chosen.pop(old), unit="m") for new, old in (("x", "lat"), ("y", "lon"))}
+    values = np.column_stack([t, *numbers.values()])
+    source = Source(table, {name: chosen[name] for name in ("t", *numbers)}, np.arange(len(values)))
+    present, filled = np.isfinite(values), {}
+    if own_clocks := have_own_clocks(present[:, 1:]):
+        values, source = values[present[:, 0]], replace(source, rows=np.flatnonzero(present[:, 0]))
+    else:
         values, source = _repaired(values, source, repair)
-        filled = dict(zip(chosen, (~present)[source.rows].sum(axis=0).tolist(), strict=True))
+        filled = dict(zip(source.columns, (~present)[source.rows].sum(axis=0).tolist(), strict=True))
     recorded = {
         channel: values[:, k] * si_factor(channel, column.unit)
-        for k, (channel, column) in enumerate(chosen.items())
+        for k, (channel, column) in enumerate(source.columns.items())
     }
     check_ranges(recorded, source)
     t = recorded.pop("t")
-    if {"sog", "cog"} <= recorded.keys():
-        speed, course = recorded.pop("sog"), recorded.pop("cog")
-        recorded |= {"ground_north": speed * np.cos(course), "ground_east": speed * np.sin(course)}
-    series = {channel: (t, column) for channel, column in recorded.items()}
-    if own_clocks:
-        series = {channel: own_clock(channel, t, column, source) for channel, column in recorded.items()}
-    if "psi" in series:
-        clock, raw_psi = series["psi"]
-        series["psi"] = clock, np.unwrap(raw_psi)
-        rows = source.rows[np.isfinite(recorded["psi"])]
-        check_heading(clock, series["psi"][1], raw_psi, replace(source, rows=rows))
+    series = {
+        channel: own_clock(channel, t, column, source) if own_clocks else (t, column)
+        for channel, column in recorded.items()
+    }
+    for name in {"psi", "wind_from"} & series.keys():
+        clock, raw = series[name]
+        series[name] = clock, np.unwrap(raw)
+        if name == "psi":
+            rows = source.rows[np.isfinite(recorded["psi"])]
+            check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
+    if "sog" in series:
+        (clock, speed), (_, course) = series.pop("sog"), series.pop("cog")
+        if speed.size != course.size:
+            raise InputError(
+                f"{table.path}: sog has {speed.size} values and cog {course.size}, expected both in a row"
+            )
+        series |= {
+            "ground_north": (clock, speed * np.cos(course)),
+            "ground_east": (clock, speed * np.sin(course)),
+        }
     return _Recorded(series, source, filled, start)
 
 
 def _read_times(table: Table, chosen: dict[str, Column]) -> tuple[Floats, float | None]:
     """Time of each row in the unit of its column, and the clock at zero in UTC where the column has one.
 
-    The column is noted to be in seconds where it holds texts or counts from 1970.
+    The column is in seconds from now on where it holds texts or counts from 1970.
     """
     column = chosen["t"]
-    if column.name not in table.header or not (cells := table.texts(column.name)):
-        return table.numbers([column.name])[:, 0], None
-    dates = None if column.date is None else table.texts(column.date)
-    first = next((cell for cell in cells if cell.lower() not in MISSING_WORDS), "0")
-    if dates is None and is_number(first):
-        values = table.numbers([column.name])[:, 0]
+    cells = table.texts(column.name)
+    if column.date is not None:
+        cells = [f"{date} {time}".strip() for date, time in zip(table.texts(column.date), cells, strict=True)]
+    if is_number(next(filter(None, cells), "0").replace(",", ".")):
+        values = table.numbers(column.name)
         if not column.unit.startswith("unix"):
             return values, None
         values = values * si_factor("t", column.unit)
     else:
         try:
-            values, _ = read_clock(cells, dates)
+            values, _ = read_clock(cells)
         except ValueError as error:
-            row = next((k for k, cell in enumerate(cells) if cell in str(error)), 0)
+            row = cells.index(str(error)) if str(error) in cells else 0
             raise InputError(
                 f"{table.path}: {table.place(row)}, column '{column.name}': no time that can be read: "
-                f"{str(error)!r} found, expected seconds, ISO 8601 (2024-05-31T09:30:00), or a time of day "
-                "with "
-                f'its date in a column of its own: t = {{ column = "{column.name}", date = "..." }}'
+                f"{cells[row][:40]!r} found, expected a number, ISO 8601 (2024-05-31T09:30:00), or a time of "
+                "day "
+                f'with its date beside it: t = {{ column = "{column.name}", date = "..." }}'
             ) from None
     chosen["t"] = replace(column, unit="s")
-    known = values[np.isfinite(values)]
-    zero = float(known[0]) if known.size else 0.0
+    zero = float(next(iter(values[np.isfinite(values)]), 0.0))
     return values - zero, zero - zone_seconds(column.zone, str(table.path))
 
 
-def _read_numbers(table: Table, chosen: Mapping[str, Column]) -> Floats:
-    """The other columns, shape (n_rows, n_columns), latitude and longitude in degrees whatever they are "
-    "in.
-    """
-    angles = [name for name in ("lat", "lon") if name in chosen]
-    names = [column.name for channel, column in chosen.items() if channel not in ("t", *angles)]
-    numbers = iter(table.numbers(names).T)
-    return np.column_stack(
-        [
-            _read_position(table, column) if channel in angles else next(numbers)
-            for channel, column in chosen.items()
-            if channel != "t"
-        ]
-    )
-
-
 def _read_position(table: Table, column: Column) -> Floats:
-    minutes = column.unit != "deg"
-    cells = ["" if cell.lower() in MISSING_WORDS else cell for cell in table.texts(column.name)]
+    """Degrees of latitude or longitude in whatever form."""
+    cells = table.texts(column.name)
     try:
-        return read_angles(cells, minutes)
+        return read_angles(cells, column.unit != "deg")
     except ValueError as error:
-        found = str(error)
-    try:
-        return table.numbers([column.name])[:, 0]
-    except InputError:
-        row = cells.index(found) if found in cells else 0
+        if is_number(str(error)):  # such as 1e-05
+            return table.numbers(column.name)
+        row = cells.index(str(error)) if str(error) in cells else 0
         raise InputError(
-            f"{table.path}: {table.place(row)}, column '{column.name}': {found!r} found, expected a latitude "
-            "or "
-            "longitude in degrees (57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N)"
+            f"{table.path}: {table.place(row)}, column '{column.name}': {str(error)!r} found, expected "
+            "degrees "
+            "(57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N)"
         ) from None
 
 
-def _with_local_positions(
-    table: Table, chosen: dict[str, Column], values: Floats, repair: str | None
-) -> Floats:
-    """The columns with metres from the first position as x and y in place of latitude and longitude."""
-    names = list(chosen)
-    lat, lon = (values[:, names.index(name)] for name in ("lat", "lon"))
-    source = Source(table, dict(chosen), np.arange(len(values)))
-    check_ranges({"lat": lat, "lon": lon}, source)
-    here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(values[:, 0]))
-    local = np.full((2, lat.size), np.nan)
+def _local_positions(
+    table: Table, chosen: dict[str, Column], t: Floats, repair: str | None
+) -> dict[str, Floats]:
+    """North and east of the first position, m, nan where there is none."""
+    lat, lon = (_read_position(table, chosen[name]) for name in ("lat", "lon"))
+    source = Source(table, chosen, np.arange(t.size))
+    here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
+    local = np.full((2, t.size), np.nan)
     if here.size:
+        check_ranges({"lat": lat, "lon": lon}, source)
         local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
-        far = find_outliers(values[here, 0] * si_factor("t", chosen["t"].unit), local[:, here], source, here)
+        far = find_outliers(t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here)
         if far.size and repair is None:
             k = int(far[0])
             raise InputError(
                 f"{source.at(k, 'lat')}: position {lat[k]:.5f}, {lon[k]:.5f} found, an outlier that no ship "
-                f"reaches from the positions beside it ({far.size} of {here.size}); empty it, or leave such "
-                "ones "
-                'out with repair = "interpolate"'
+                f"reaches from those beside it ({far.size} of {here.size} are); empty its cells, or leave "
+                "such "
+                'rows to be filled with repair = "interpolate"'
             )
         local[:, far] = np.nan
-    for name, new, column in (("lat", "x", local[0]), ("lon", "y", local[1])):
-        values[:, names.index(name)] = column
-        names[names.index(name)] = new
-    columns = [
-        replace(column, unit=si_unit(name)) if name in ("x", "y") else column
-        for name, column in zip(names, chosen.values(), strict=True)
-    ]
-    chosen.clear()
-    chosen.update(zip(names, columns, strict=True))
-    return values
+    return dict(zip(("x", "y"), local, strict=True))
 
 
-def _joined(recorded: Sequence[_Recorded]) -> dict[str, tuple[Floats, Floats]]:
+def _joined(recorded: Sequence[_Recorded]) -> Series:
     """The channels of all tables on the clock of the first."""
-    series = dict(recorded[0].series)
-    base = recorded[0]
+    base, series = recorded[0], dict(recorded[0].series)
     for other in recorded[1:]:
-        shift = (other.start or 0.0) - (base.start or 0.0)
-        paths = base.source.table.path, other.source.table.path
+        path = other.source.table.path
         if (base.start is None) != (other.start is None):
             raise InputError(
-                f"{paths[1]}: its time does not count as that of {paths[0]}, one of them has no clock, "
-                "expected "
-                "both to count from one moment; log clock time in both"
+                f"{path}: one of the files of this log has a clock and the other has not, expected times "
+                "that "
+                "count from one moment in both"
             )
-        clocks = [clock for clock, _ in base.series.values()]
-        first, last = min(clock[0] for clock in clocks), max(clock[-1] for clock in clocks)
-        clock = next(iter(other.series.values()))[0]
-        check_overlap(first, last, clock + shift, paths, other.source.columns["t"].name)
-        twice = series.keys() & other.series.keys()
-        if twice:
+        if twice := series.keys() & other.series.keys():
             raise InputError(
-                f"{paths[1]}: {quoted(sorted(twice))} stands in {paths[0]} too, expected each channel in one "
-                "file; name its column in [columns] by that file's header alone"
+                f"{path}: {quoted(sorted(twice))} stands in another file of this log too, expected each in "
+                "one; "
+                "rename the column that is not to be read"
             )
-        series |= {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
+        shift = (other.start or 0.0) - (base.start or 0.0)
+        moved = {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
+        check_overlap(series, moved, path, other.source.columns["t"].name)
+        series |= moved
     return series
 
 
 def to_project_conventions(
     t: Floats, recorded: Mapping[str, Floats], conventions: Conventions, where: str
 ) -> tuple[dict[str, Floats], frozenset[str], bool | None, list[str]]:
-    """Convert signs, frame and origin, and derive the channels that follow from others.
+    """Convert frame and origin, and derive the channels that follow from others.
 
-    The recorded channels are in SI units with the file's conventions, the heading without jumps, of shape
-    (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
+    The recorded channels are in SI units in the file's frame, the heading without jumps, the rudder positive to
+    starboard, of shape (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
     heading, the heading (relative to the start) from the yaw rate where no position is recorded. Returns the
     channels, the names of the derived ones, whether surge and sway are over ground, and remarks.
     """
-    channels = _signed(recorded, conventions)
+    channels = dict(recorded)
     derived: set[str] = set()
     notes = correct_offsets(t, channels, conventions.instruments, where)
     if "psi" in channels and "r" not in channels:
@@ -303,12 +298,6 @@ def to_project_conventions(
     notes += to_midship(t, channels, derived, conventions.instruments, where)
     over_ground = False if water else (conventions.velocity_frame == "earth" and "u" in recorded) or None
     return channels, frozenset(derived), over_ground, notes
-
-
-def _signed(recorded: Mapping[str, Floats], conventions: Conventions) -> dict[str, Floats]:
-    """The channels with a rudder that is positive to starboard."""
-    turned = ("delta", "delta_command") if conventions.rudder_positive == "port" else ()
-    return {name: 0.0 - values if name in turned else values for name, values in recorded.items()}
 
 
 def _earth_to_body(channels: dict[str, Floats], derived: set[str], where: str) -> None:
