@@ -291,6 +291,7 @@ def _evaluated(
     model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
+    provenance |= problem.sea
     provenance["steering"] = "estimated" if call["steering"] is None else "given"
     model = replace(model, provenance=provenance)
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")

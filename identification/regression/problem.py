@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples
+from identification.regression.still_water import in_still_water
+from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -43,6 +46,7 @@ class Problem:
     samples: Samples  # the regression
     #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
+    sea: dict[str, Any]  # what is known of current and wind, for the provenance
 
 
 def pose(
@@ -56,26 +60,45 @@ def pose(
     Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
     particulars that do not suffice.
     """
-    everything = _held_out(trials, options.hold_out)
+    everything, sea = in_still_water(_held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
         )
     used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
+    used, everything = ([_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything))
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    regression = structure_samples(
-        used, table, ship, samples=options.samples, window=options.window, gear=steering,
-        smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
+    regress = partial(
+        structure_samples, structure=table, particulars=ship, samples=options.samples, window=options.window,
+        gear=steering, smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
     )  # fmt: skip
+    regression = regress(used)
+    if options.wind == "constant":
+        constants = constant_wind(used, regression, options.structure)
+        used, everything = (
+            [with_constant_wind(trial, constants) for trial in group] for group in (used, everything)
+        )
+        regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = _gear(used, table) if steering is None else steering
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity)
+    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
+
+
+def _at_constant_speed(
+    trial: Trial, table: Structure, particulars: Particulars | Mapping[str, Any] | None
+) -> Trial:
+    """A trial of heading and rudder alone at the ship's service speed, for a structure of the yaw rate alone."""
+    speed = (particulars or {}).get("speed")
+    if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
+        return trial
+    still = {"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))}
+    return trial.with_channels(still)
 
 
 def _blank(

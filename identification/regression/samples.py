@@ -26,6 +26,7 @@ from identification.regression.integrals import (
     twice_integrated,
 )
 from identification.regression.rudder import rebuild, straight
+from shipgym.arrays import integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
@@ -52,7 +53,7 @@ class Samples:
     features : dict of str to array of shape (n_rows, n_terms)
         Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
     targets : dict of str to array of shape (n_rows,)
-        Change of the velocity over the window.
+        Change of the velocity over the window, less that by measured wind.
     start : array of shape (n_rows,)
         Time at which the window begins, s.
     duration : array of shape (n_rows,)
@@ -182,6 +183,9 @@ class _Sampling:
             summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
             features[q] = steps if window == 1 else summed[last] - summed[first]
             targets[q] = channels[q][last] - channels[q][first]
+            if f"wind_{q}dot" in trial:
+                by_wind = integral(t, trial[f"wind_{q}dot"])
+                targets[q] = targets[q] - (by_wind[last] - by_wind[first])
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
 

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from identification.fit import Fit
+from identification.report.sea import sea_sentences
 from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
 from shipgym.ships.particulars import ADDED_MASSES
 
@@ -37,7 +38,7 @@ def summary_table(fit: Fit) -> str:
         console.print(
             f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']})."
         )
-    for line in undetermined(fit) + exactly_collinear(fit):
+    for line in sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit):
         console.print(line, highlight=False)
     if "reference" in fit.metrics:
         console.print(_against_reference(fit))

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
+from identification.report.sea import sea_sentences, track_figure
 from identification.validation.warnings import EQUATIONS, model_warnings
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
@@ -46,6 +47,7 @@ def fit_view(fit: Fit) -> dict[str, Any]:
         "model": fit.model,
         "provenance": fit.model.provenance or {},
         "warnings": model_warnings(fit),
+        "sea": sea_sentences(fit.model.provenance or {}),
         "equations": {EQUATIONS.get(name, name): found for name, found in fit.diagnostics.items()},
         "trials": [_trial(trial, short[trial.name]) for trial in fit.trials],
         "uses": [trial.use for trial in fit.trials],
@@ -67,6 +69,7 @@ def trial_figures(fit: Fit) -> dict[str, Any]:
     """Figures of the trials: those fitted in one, and each of those that had no part in the fit."""
     short = short_names(fit.trials)
     return {
+        "tracks": track_figure(fit),
         "overview": overview_figure([t for t in fit.trials if t.use == "fit"], fit.predictions),
         "predictions": [
             (short[t.name], "x" in t, prediction_figure(t, fit.predictions.get(t.name)))

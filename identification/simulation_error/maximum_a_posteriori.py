@@ -155,7 +155,6 @@ class _Problem:
         self.blank, self.prior = replace(blank, coefficients=prior.mean), prior
         self.mean = np.array([prior.mean[name] for name in IDENTIFIED])
         self.numbers = self.blank.ship_numbers()
-        self.loop = ship_loop(self.blank.vessel, "segments")
         self.channels = compared_channels(blank, trials)
         self.columns = [blank.state_names.index(name) for name in self.channels]
         ship = blank.particulars
@@ -198,7 +197,8 @@ class _Problem:
         """Errors of the ships of all lanes in a segment, shape (n_samples - 1, n_channels, 42)."""
         state = np.repeat(segment.start, LANES)
         out = np.empty((len(segment.measured), len(state)))
-        self.loop(state, ships, np.zeros(LANES), segment.inputs, segment.samples, out)
+        loop = ship_loop(self.blank.vessel, "segments", segment.windy)
+        loop(state, ships, np.zeros(LANES), segment.inputs, segment.samples, out)
         lanes = out.reshape(len(out), -1, LANES)[1:, self.columns, : len(IDENTIFIED) + 1]
         share = np.sqrt(self._weight(segment) / len(lanes))
         found: Floats = (lanes - segment.measured[1:, :, None]) * share

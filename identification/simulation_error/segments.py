@@ -14,7 +14,7 @@ from identification.regression.samples import between_gaps
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
 from shipgym.ships import ShipModel, Structure
-from shipgym.ships.simulate import LONGEST_STEP
+from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,8 @@ class Segment:
     """A stretch of a trial."""
 
     trial: int  # index of the trial
-    #: time, s, rudder, rad, and shaft speed, 1/s, on the grid of the integration, shape (n_points, 3)
+    #: time, s, rudder, rad, shaft speed, 1/s, and the accelerations in surge, sway and yaw by wind, on the
+    #: grid of the integration, shape (n_points, 6)
     inputs: Floats
     samples: Integers  # sample at each point of the grid, -1 for none, shape (n_points,)
     measured: Floats  # what is compared with, shape (n_samples, n_channels)
@@ -38,6 +39,11 @@ class Segment:
     times: Floats  # when the blocks begin, s, shape (n_blocks,)
     start: Floats  # state at the first sample, in the order of the model's `state_names`, shape (n_state,)
     weight: float = 1.0  # of its squared residuals
+
+    @property
+    def windy(self) -> bool:
+        """Whether there is wind in it."""
+        return bool(self.inputs[:, 3:].any())
 
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
@@ -77,7 +83,7 @@ def cut(
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
                 segments += [
-                    _segment(piece, index, rows, states, channels, rudder, travel)
+                    _segment(piece, index, rows, states, channels, rudder, model)
                     for rows in map(slice, edges[:-1], edges[1:] + 1, [every] * len(edges))
                 ]
     return segments
@@ -117,9 +123,9 @@ def _segment(
     states: Floats,
     channels: Sequence[str],
     rudder: Rudder,
-    travel: float,
+    model: ShipModel,
 ) -> Segment:
-    t = trial.t[rows]
+    t, travel = trial.t[rows], model.particulars["length"] / model.particulars["speed"]
     steps = np.maximum(np.ceil(np.diff(t) / (LONGEST_STEP * travel) - 1e-9), 1).astype(int)
     parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], steps, strict=True)]
     inside = rudder.corners[(rudder.corners > t[0]) & (rudder.corners < t[-1])]
@@ -127,11 +133,12 @@ def _segment(
     samples = np.full(len(times), -1)
     samples[np.searchsorted(times, t)] = np.arange(len(t))
     n = np.interp(times, trial.t, trial["n"]) if "n" in trial else np.zeros(len(times))
+    wind = [np.interp(times, trial.t, row) for row in wind_accelerations(model, trial).T]
     block = max(int(BLOCK * travel / np.median(np.diff(t))), 1)
     first = np.arange(0, len(t), block)
     return Segment(
         trial=index,
-        inputs=np.column_stack([times, rudder(times), n]),
+        inputs=np.column_stack([times, rudder(times), n, *wind]),
         samples=samples,
         measured=np.column_stack([trial[name][rows] for name in channels]),
         blocks=first,
@@ -176,7 +183,6 @@ class Shooter:
         self.columns = [model.state_names.index(name) for name in channels]
         self.free = self.columns if free else []
         self.offsets = offsets
-        self.sail = ship_loop(model.vessel, "segments")
         self.numbers = model.ship_numbers()
         ship = model.particulars
         units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
@@ -253,7 +259,8 @@ class Shooter:
                 else:
                     state[self.free[move - n_terms - 1], lane] += STEP * self.units[move - n_terms - 1]
             out = np.empty((len(segment.measured), n_state * LANES))
-            self.sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
+            sail = ship_loop(self.model.vessel, "segments", segment.windy)
+            sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
             found = out.reshape(len(out), n_state, LANES)[:, self.columns]
             nominal = found[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away

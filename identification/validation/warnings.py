@@ -55,7 +55,11 @@ def model_warnings(fit: Fit) -> list[str]:
             "held back; predictions far from the recorded manoeuvres are doubtful"
         )
     found += _not_corrected(fit) + _not_refined(provenance) + _shaft_ignored(fit)
-    remarks = [*provenance.get("prior_remarks", []), *provenance.get("kernel", {}).get("remarks", [])]
+    remarks = [
+        *provenance.get("sea_remarks", []),
+        *provenance.get("prior_remarks", []),
+        *provenance.get("kernel", {}).get("remarks", []),
+    ]
     found += [*remarks, *exactly_collinear(fit), *_lost_headings(fit)]
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
     if derived:

@@ -54,7 +54,8 @@ LOOPS = {
     ),
     "open_loop": Loop(
         trajectories.open_loop,
-        "int64(float64[:, ::1], float64[::1], float64[::1], float64[::1], float64, float64[::1])",
+        "int64(float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], float64,"
+        " float64[::1])",
         parts=MEASURED_GEAR,
     ),
     "zigzag": Loop(

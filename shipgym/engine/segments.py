@@ -25,8 +25,9 @@ def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any
         A tile of ships.
     offsets : float64 array of shape (64,)
         Added to the measured rudder, rad.
-    inputs : float64 array of shape (n_points, 3)
-        Time, s, rudder, rad, shaft speed, 1/s.
+    inputs : float64 array of shape (n_points, 6)
+        Time, s, rudder, rad, shaft speed, 1/s, and the accelerations by wind in surge, sway and yaw, of
+        which a loop for calm water knows nothing.
     samples : int64 array of shape (n_points,)
         Row of `out` that takes the state at a point, -1 for none.
     out : float64 array of shape (n_samples, n_state * 64)
@@ -41,14 +42,17 @@ def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any
         rate = fabs(inputs[i + 1, 1] - inputs[i, 1]) / h
         order = inputs[i + 1, 1]
         shaft = 0.5 * (inputs[i, 2] + inputs[i + 1, 2])
+        ahead = 0.5 * (inputs[i, 3] + inputs[i + 1, 3])
+        aside = 0.5 * (inputs[i, 4] + inputs[i + 1, 4])
+        about = 0.5 * (inputs[i, 5] + inputs[i + 1, 5])
         for lane in range(LANES):
             ship, coefficients = (
                 with_gear(load_ship(ships, lane), NO_LIMIT, rate),
                 load_coefficients(ships, lane),
             )
             delta = order + offsets[lane]
-            calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            motion = sail(load_motion(state, lane), delta, shaft, h, calm, coefficients, ship)
+            wind = Push(ahead, aside, about, 0.0, 0.0, 0.0)
+            motion = sail(load_motion(state, lane), delta, shaft, h, wind, coefficients, ship)
             store_motion(state, lane, replaced(motion, motion.psi, delta, motion.n))
         keep(state, samples[i + 1], out)
 

@@ -44,11 +44,12 @@ def simulate(out: Any, commands: Any, h: float, sea: Any, words: Any, parameters
     return len(commands)
 
 
-def open_loop(out: Any, t: Any, delta: Any, n: Any, longest_step: float, numbers: Any) -> int:
+def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: float, numbers: Any) -> int:
     """From the state in row 0 with the rudder measured at times t, straight between the samples.
 
     A measured rudder is a steering gear without limit or lag that moves at the measured rate. The water is
-    calm.
+    calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a
+    loop for calm water knows nothing.
     """
     own, coefficients = ship_of(numbers)
     motion = load_motion(out[0], 0)
@@ -58,8 +59,8 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, longest_step: float, numbers
         ship = with_gear(own, NO_LIMIT, fabs(delta[i + 1] - delta[i]) / interval)
         for k in range(steps):
             shaft = n[i] + (n[i + 1] - n[i]) * (k + 0.5) / steps
-            calm = Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-            motion = sail(motion, delta[i + 1], shaft, interval / steps, calm, coefficients, ship)
+            pushed = Push(wind[i, 0], wind[i, 1], wind[i, 2], 0.0, 0.0, 0.0)
+            motion = sail(motion, delta[i + 1], shaft, interval / steps, pushed, coefficients, ship)
         if lost(motion, ship):
             return i
         motion = replaced(motion, motion.psi, delta[i + 1], motion.n)

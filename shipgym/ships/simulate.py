@@ -10,6 +10,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.manoeuvring_model import ManoeuvringModel, checked_orders, two_commands
+from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -43,9 +44,9 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
 
     The rudder is taken straight between the samples, as measured: no steering gear stands between. The trial
-    has u, v, r, psi, delta (x and y where recorded; n where the model has a shaft); the result is the
-    simulated state at its times. Raises InputError if a channel is missing, UnstableModelError where the
-    simulated ship leaves every physical range.
+    has u, v, r, psi, delta (x and y where recorded; n where the model has a shaft), and where it has them
+    accelerations by wind; the result is the simulated state at its times. Raises InputError if a channel is
+    missing, UnstableModelError where the simulated ship leaves every physical range.
     """
     needed = ["psi", "u", "v", "r", "delta", *model.command_names[1:]]
     missing = [name for name in needed if name not in trial.channels]
@@ -59,8 +60,10 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     states[0] = _settled(model, np.array([first]), n[:1])[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
-    loop = ship_loop(model.vessel, "open_loop")
-    reached = loop(states, t, np.array(trial["delta"]), n, longest_step, model.ship_numbers())
+    wind = wind_accelerations(model, trial)
+    wind = 0.5 * (wind[1:] + wind[:-1])
+    loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
+    reached = loop(states, t, np.array(trial["delta"]), n, wind, longest_step, model.ship_numbers())
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
     return Trial(
@@ -71,6 +74,13 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
         use=trial.use,
         length=model.particulars["length"],
     )
+
+
+def wind_accelerations(model: ManoeuvringModel, trial: Trial) -> Floats:
+    """Those in surge, sway and yaw that a trial has, of the equations of a model; shape (n_samples, 3)."""
+    own = model.dynamics.equations if isinstance(model.dynamics, Structure) else "uvr"
+    axes = [f"wind_{axis}dot" if axis in own else "" for axis in "uvr"]
+    return np.column_stack([trial[name] if name in trial else np.zeros(len(trial)) for name in axes])
 
 
 def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:

@@ -100,6 +100,25 @@ class Options:
         NUMBER, "weight of their squared residuals; by default 1", setting=True, above=0.0
     )
 
+    current: Any = _trials(
+        TEXT_OR_TABLE, "steady current in velocities over ground, or a known one as a table of m/s, such as "
+        "`{ north = 0.2, east = -0.1 }`; columns current_north and current_east come first",
+        "auto", common=True, choices={
+            "auto": "estimated, one of all trials unless these contradict it, and taken out where it differs "
+            "from zero",
+            "shared": "one of all trials, taken out", "trial": "one of each trial, taken out",
+            "none": "left in the velocities",
+        },
+    )  # fmt: skip
+    wind: Any = _trials(
+        TEXT_OR_TABLE, "force of the wind in columns wind_speed and wind_from, by `shipgym.sea`'s names of "
+        "coefficients, or a table such as `{ coefficients = \"isherwood\", relative = true }`, relative for "
+        "a wind felt on board, from the bow", "auto", common=True, choices={
+            "auto": "by Blendermann's coefficients, where wind was logged", "none": "not taken out",
+            "constant": "a constant sway and yaw acceleration of each trial fitted",
+        },
+    )  # fmt: skip
+
     samples: str = _samples(
         TEXT, "how a trial becomes a regression", "spline", common=True, choices={
             "spline": "Gauss quadrature on splines through the samples, broken at corners of the rudder",

@@ -22,6 +22,7 @@ LIMITS: dict[str, float] = {
     "r_wave": 60.0 * _DEGREE, "phi_wave": 180.0 * _DEGREE, "p_wave": 360.0 * _DEGREE,
     "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
     "lat": 90.0, "lon": 360.0, "sog": 50.0, "cog": 100.0, "stw": 50.0,
+    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * _DEGREE,
 }  # fmt: skip
 
 _FASTEST_TURN = 60.0 * _DEGREE

@@ -18,6 +18,8 @@ UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "kN": 1000.0},
     "moment": {"N m": 1.0, "kN m": 1000.0},
     "latitude or longitude": {"deg": 1.0, "ddmm.mm": 1.0},  # the second, as in NMEA 0183, by `read_angles`
+    "acceleration": {"m/s^2": 1.0},
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
 }
 
 #: The quantity that each channel measures.
@@ -29,6 +31,7 @@ QUANTITIES: dict[str, str] = {
     "current_north": "speed", "current_east": "speed", "wind_speed": "speed", "wind_from": "angle",
     "lat": "latitude or longitude", "lon": "latitude or longitude", "sog": "speed", "cog": "angle",
     "stw": "speed",
+    "wind_udot": "acceleration", "wind_vdot": "acceleration", "wind_rdot": "angular acceleration",
 }  # fmt: skip
 
 #: What a file may hold and a trial does not: position, speed and course over ground, speed through the water.

@@ -1,0 +1,303 @@
+"""Logs as ships make them: currents, models and autopilots identified from them in current and wind.
+
+    python scripts/bridge_logs.py [--seeds 8] [--models 2] [--ships kcs,tanker]
+    python scripts/bridge_logs.py --wind
+
+prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md.
+
+Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), sails zigzags 10/10 and
+20/20, a 35 degree turn to starboard and a 25 degree turn to port, each begun on another heading, in a current
+of 0.5 m/s and a gusty wind of 9 m/s of random directions. The log holds GNSS positions at 1 Hz with noise of
+0.3 m and drift of 0.8 m, the antenna 25 m forward of midship, heading at 2 Hz with noise of 0.1 degrees, the
+rudder in half degrees, the shaft speed, and wind with noise of 0.5 m/s and 5 degrees: no velocity and no yaw
+rate. The turn to port has no part in the fit. The ship is identified by structures that are not hers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+import shipgym  # noqa: E402 - the folder above has to be found first
+from agents.controllers.lq import LQ  # noqa: E402
+from agents.controllers.pid import PID  # noqa: E402
+from agents.rollouts.course_keeping import sail  # noqa: E402
+from agents.verification.refusal import lost_control, why_refused  # noqa: E402
+from identification import IdentificationResult, identify  # noqa: E402
+from identification.regression.still_water import in_still_water  # noqa: E402
+from identification.validation.warnings import why_unstable  # noqa: E402
+from shipgym import ShipModel, Trial  # noqa: E402
+from shipgym.errors import InputError  # noqa: E402
+from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
+from shipgym.sea.conditions import Current, Weather, Wind  # noqa: E402
+from shipgym.tasks.task import course_keeping_task  # noqa: E402
+from shipgym.trials.identify_table import Options  # noqa: E402
+from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
+from shipgym.trials.ship_file import ShipFile  # noqa: E402
+from shipgym.trials.trial_import import Conventions, to_project_conventions  # noqa: E402
+from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
+
+CURRENT, WIND = 0.5, 9.0  # m/s
+UNSEEN = "turn 25 port"
+RECIPES: dict[str, dict[str, Any]] = {
+    "cubic, output-error": {"structure": "cubic", "method": "output-error"},
+    "mmg": {"structure": "mmg"},
+}
+LEFT_IN: dict[str, Any] = {"current": "none", "wind": "none"}
+SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
+ANTENNA = 25.0  # m forward of midship
+DEGREE = np.pi / 180.0
+LOG = Sensors(
+    {"x": GNSS, "y": GNSS, "psi": Sensor(noise=0.1 * DEGREE), "delta": Sensor(resolution=0.5 * DEGREE),
+     "n": Sensor(resolution=0.1 / 60.0)},
+)  # fmt: skip
+
+
+def ship_of(name: str) -> ShipModel:
+    """A ship by name, the truth behind the logs."""
+    return mmg_ship(name) if name in MMG_SHIPS else shipgym.load_model(name)
+
+
+def turned(run: Trial, angle: float) -> Trial:
+    """A run as it would have been with north `angle` further to port, rad."""
+    c, s = np.cos(angle), np.sin(angle)
+    channels = dict(run.channels)
+    channels["x"], channels["y"] = c * run["x"] - s * run["y"], s * run["x"] + c * run["y"]
+    for name in {"psi", "wind_from"} & channels.keys():
+        channels[name] = run[name] + angle
+    if "current_north" in run:
+        north, east = run["current_north"], run["current_east"]
+        channels |= {"current_north": c * north - s * east, "current_east": s * north + c * east}
+    return Trial(run.t, channels, name=run.name, kind=run.kind, use=run.use, length=run.length)
+
+
+def sailed(
+    ship: ShipModel, current: float, towards: float, wind: float, wind_from: float, seed: int
+) -> list[Trial]:
+    """Zigzags and a turn of a ship, each begun on another heading, and a turn to the other side."""
+    travel = ship.particulars["length"] / ship.particulars["speed"]
+    rng = np.random.default_rng(seed)
+    runs = []
+    for k, (kind, angle, side) in enumerate(
+        [("zigzag", 10.0, 1.0), ("zigzag", 20.0, -1.0), ("turn", 35.0, 1.0), ("turn", 25.0, -1.0)]
+    ):
+        heading = rng.uniform(0.0, 360.0)
+        weather = Weather(
+            Current(current, (towards - heading) % 360.0),
+            Wind(wind, (wind_from - heading) % 360.0) if wind else None,
+        )
+        if kind == "zigzag":
+            run = zigzag(ship, angle, angle, side < 0, 35.0 * travel, 0.5, weather=weather, seed=seed + k)
+        else:
+            run = turning_circle(ship, side * angle, 25.0 * travel, 0.5, weather=weather, seed=seed + k)
+        name = f"{kind} {angle:.0f} {'starboard' if side > 0 else 'port'}"
+        use = "validate" if k == 3 else "fit"
+        runs.append(turned(run.with_(name=name, use=use), heading * DEGREE))
+    return runs
+
+
+def logged(run: Trial, seed: int) -> Trial:
+    """What a bridge log holds of a run: GNSS positions at 1 Hz, gyro at 2 Hz, rudder in half degrees."""
+    antenna = run.with_channels(
+        {"x": run["x"] + ANTENNA * np.cos(run["psi"]), "y": run["y"] + ANTENNA * np.sin(run["psi"])}
+    )
+    read = LOG.measure(antenna, seed)
+    rng = np.random.default_rng([seed, 7])
+    channels = {name: read[name] for name in ("x", "y", "psi", "delta", "n") if name in read}
+    if "wind_speed" in run and np.ptp(run["wind_speed"]) > 0.0:
+        channels["wind_speed"] = np.maximum(run["wind_speed"] + rng.normal(0.0, 0.5, len(run)), 0.0)
+        channels["wind_from"] = run["wind_from"] + rng.normal(0.0, 5.0 * DEGREE, len(run))
+    for name in ("x", "y"):  # at 1 Hz, between which the reader interpolates
+        channels[name] = np.interp(read.t, read.t[::2], channels[name][::2])
+    channels["x"] = channels["x"] - ANTENNA * np.cos(channels["psi"])
+    channels["y"] = channels["y"] - ANTENNA * np.sin(channels["psi"])
+    every = slice(None, None, 2)
+    channels = {name: values[every] for name, values in channels.items()}
+    t = read.t[every]
+    made, derived = to_project_conventions(t, channels, Conventions(), run.name)
+    return Trial(t, made, name=run.name, kind=run.kind, use=run.use, derived=derived, length=run.length)
+
+
+def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
+    """The logs of a ship and the weather that they were made in; a ship without a shaft logs a steady one."""
+    towards, wind_from = np.random.default_rng(seed).uniform(0.0, 360.0, 2)
+    runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
+    logs = [logged(run, 1000 * seed + k) for k, run in enumerate(runs)]
+    weather = Weather(Current(CURRENT, towards), Wind(WIND, wind_from))
+    return [log if "n" in log else log.with_channels({"n": np.ones(len(log))}) for log in logs], weather
+
+
+def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Error of the current, north and east, its standard errors, and whether it was found to be one."""
+    logs, weather = logs_of(ship, seed)
+    towards = np.radians(weather.current.towards_deg)
+    _, found = in_still_water(logs, Options(), ship.particulars)
+    row = found["currents"][logs[0].name]
+    truth = CURRENT * np.array([np.cos(towards), np.sin(towards)])
+    error = np.array([row["north"], row["east"]]) - truth
+    return error, np.array(row["standard_errors"]), row["taken_out"]
+
+
+def heading_error(result: IdentificationResult) -> float:
+    """Of the turn that was held out, open loop, deg rms; infinite where the model runs away."""
+    error = result.metrics["trials"][UNSEEN]["rmse"]["psi"]
+    return float("inf") if error is None else float(np.degrees(error))
+
+
+def autopilots(result: IdentificationResult, ship: ShipModel, weather: Weather) -> dict[str, float | str]:
+    """Heading error, deg rms, of the autopilots that are written, on the ship herself in the same weather."""
+    refused = why_unstable(result) or why_refused(result)
+    if refused:
+        return {"PID": "refused", "LQ": "refused"}
+    found: dict[str, float | str] = {}
+    draws = result.model.sample(40, 0)
+    for design in (PID, LQ):
+        try:
+            pilot = design.from_model(result.model)
+        except InputError:
+            found[design.__name__] = "refused"
+            continue
+        if lost_control(sail(pilot, draws, seeds=np.arange(40), allow_unstable=True).terminated):
+            found[design.__name__] = "refused"
+            continue
+        episodes = sail(pilot, ship, course_keeping_task(sea=weather), seeds=np.arange(4))
+        found[design.__name__] = (
+            "LOST" if episodes.terminated.any() else float(episodes.heading_rmse_deg.mean())
+        )
+    return found
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def current_table(names: Sequence[str], seeds: range) -> str:
+    """How well the current is found."""
+    rows, every = [], []
+    for name in names:
+        found = [current_case(ship_of(name), seed) for seed in seeds]
+        errors, deviations = (np.array([case[k] for case in found]) for k in (0, 1))
+        every.append((errors, deviations))
+        rows.append(
+            [name, *_current_cells(errors, deviations), f"{sum(case[2] for case in found)} of {len(found)}"]
+        )
+    together = [np.concatenate(part) for part in zip(*every, strict=True)]
+    rows.append(["all", *_current_cells(*together), ""])
+    head = ["ship", "error, m/s rms", "largest", "below 0.05 m/s", "inside the 95 % interval", "taken out"]
+    return markdown(head, rows)
+
+
+def _current_cells(errors: np.ndarray, deviations: np.ndarray) -> list[str]:
+    sizes = np.hypot(*errors.T)
+    inside = np.mean(np.abs(errors) < 1.96 * deviations)
+    return [
+        f"{np.sqrt(np.mean(sizes**2)):.3f}", f"{sizes.max():.3f}", f"{100.0 * np.mean(sizes < 0.05):.0f} %",
+        f"{100.0 * inside:.0f} %",
+    ]  # fmt: skip
+
+
+def model_table(names: Sequence[str], seeds: range) -> str:
+    """Heading of the unseen turn, and autopilots on the ship."""
+    rows = []
+    for name in names:
+        ship = ship_of(name)
+        for title, recipe in RECIPES.items():
+            for seed in seeds:
+                logs, weather = logs_of(ship, seed)
+                known = {"particulars": ship.particulars, "steering": ship.steering, **recipe}
+                result = identify(logs, **known)
+                with_both = heading_error(identify(logs, **known, **LEFT_IN))
+                pilots = autopilots(result, ship, weather)
+                cells = [one if isinstance(one, str) else f"{one:.1f}" for one in pilots.values()]
+                rows.append(
+                    [name, title, str(seed), f"{heading_error(result):.1f}", f"{with_both:.1f}", *cells]
+                )
+                print("|", " | ".join(rows[-1]), "|", file=sys.stderr, flush=True)
+    head = [
+        "ship",
+        "recipe",
+        "seed",
+        "heading, deg rms",
+        "current and wind left in",
+        "PID, deg rms",
+        "LQ, deg rms",
+    ]
+    return markdown(head, rows)
+
+
+def wind_table() -> str:
+    """Esso Osaka's zigzags, each predicted from the five others, without and with her wind."""
+    ship = ShipFile.load(ROOT / "tests/ships/esso_osaka_3m.toml")
+    particulars = replace(ship.particulars, frontal_area=0.135, lateral_area=0.520)
+    names = ("t", "u", "v", "r", "psi", "n", "delta")
+    columns = dict(zip(names, names, strict=True)) | {
+        "x": "x0", "y": "y0", "wind_speed": "wind_true_speed", "wind_from": "wind_true_dir"
+    }  # fmt: skip
+    paths = [entry.path for entry in ship.entries if "zigzag" in entry.file]
+    runs = [under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag")) for path in paths]
+    rows = []
+    for title, recipe in ESSO_OSAKA.items():
+        for wind in ("none", "auto", "constant")[: 2 if title == "mmg" else 3]:
+            errors = []
+            for held in runs:
+                trials = [run.with_(use="validate" if run is held else "fit") for run in runs]
+                result = identify(
+                    trials, particulars=particulars, steering=ship.steering, repair=True, wind=wind, **recipe
+                )
+                error = result.metrics["trials"][held.name]["rmse"]["psi"]
+                errors.append(float("nan") if error is None else float(np.degrees(error)))
+            told = {"none": "left in", "auto": "of columns", "constant": "constant"}[wind]
+            rows.append([title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"])
+    return markdown(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
+
+
+def under_way(trial: Trial) -> Trial:
+    """Every other sample of a trial from where the ship has way on her."""
+    first = int(np.argmax(np.hypot(trial["u"], trial["v"]) > 0.1))
+    rows = slice(first, None, 2)
+    return Trial(
+        trial.t[rows], {name: v[rows] for name, v in trial.channels.items()}, name=trial.name, kind=trial.kind
+    )
+
+
+ESSO_OSAKA: dict[str, dict[str, Any]] = {
+    "mmg": {"structure": "mmg"},
+    "cubic": {"structure": "cubic"},
+    "cubic, pulled to the tanker": {"structure": "cubic", "prior": "tanker"},
+}
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=8, help="for the current")
+    parser.add_argument("--models", type=int, default=2, help="seeds of models and autopilots")
+    parser.add_argument("--first", type=int, default=100, help="first seed; below 10 the recipes were chosen")
+    parser.add_argument("--ships", default=",".join(SHIPS))
+    parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
+    given = parser.parse_args()
+    warnings.simplefilter("ignore")
+    if given.wind:
+        print(wind_table())
+        return
+    names = given.ships.split(",")
+    if given.seeds:
+        print(current_table(names, range(given.first, given.first + given.seeds)), end="\n\n", flush=True)
+    print(model_table(names, range(given.first, given.first + given.models)))
+
+
+if __name__ == "__main__":
+    main()

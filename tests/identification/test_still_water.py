@@ -1,0 +1,176 @@
+"""Currents are told from velocities over ground and taken out, wind by the ship's coefficients."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification import identify
+from identification.regression.still_water import in_still_water, through_water
+from identification.report.sea import sea_sentences
+from shipgym import ShipModel, Trial
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle, zigzag
+from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea.mobility import mobility_matrix
+from shipgym.sea.wind import AIR_DENSITY, wind_curves
+from shipgym.ships.simulate import open_loop
+from shipgym.trials.identify_table import Options
+from shipgym.trials.trial_import import Conventions, to_project_conventions
+
+NORTH, EAST = 0.3, -0.4  # m/s
+CURRENT = Weather(Current(0.5, np.degrees(np.arctan2(EAST, NORTH))))
+
+
+def log(run: Trial, seed: int = 0) -> Trial:
+    """GNSS positions, gyro and rudder of a run at 1 Hz; u, v and r are derived from them."""
+    rng, every = np.random.default_rng(seed), slice(None, None, 2)
+    noise = {"x": 0.3, "y": 0.3, "psi": np.radians(0.1), "delta": np.radians(0.1)}
+    channels = {
+        name: run[name][every] + size * rng.standard_normal(len(run.t[every])) for name, size in noise.items()
+    }
+    made, derived = to_project_conventions(run.t[every], channels, Conventions(), "log")
+    return Trial(run.t[every], made, name=run.name, kind=run.kind, use=run.use, derived=derived)
+
+
+@pytest.fixture(scope="module")
+def logs(mariner: ShipModel) -> list[Trial]:
+    """A turn to fit, a zigzag to fit and one held out, in a current."""
+    runs = [turning_circle(mariner, 35.0, 700.0, 0.5, weather=CURRENT)]
+    runs += [zigzag(mariner, 20, 20, port, 500.0, 0.5, weather=CURRENT) for port in (False, True)]
+    names, uses = ("turn", "zigzag", "held out"), ("fit", "fit", "validate")
+    return [
+        log(run.with_(name=name, use=use), k)
+        for k, (run, name, use) in enumerate(zip(runs, names, uses, strict=True))
+    ]
+
+
+def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial]) -> None:
+    """To centimetres per second, of the trial held out too; velocities and track follow."""
+    found, report = in_still_water(logs, Options(), mariner.particulars)
+    row = report["currents"]["held out"]
+    errors = np.array([row["north"] - NORTH, row["east"] - EAST])
+    assert np.hypot(*errors) < 0.03
+    assert np.all(np.abs(errors) < 3.0 * np.array(row["standard_errors"]))
+    assert row["taken_out"]
+    assert not found[0].over_ground
+    drift = (
+        (logs[0]["x"] - found[0]["x"])[-1] / found[0].duration,
+        (logs[0]["y"] - found[0]["y"])[-1] / found[0].duration,
+    )
+    np.testing.assert_allclose(drift, (row["north"], row["east"]))
+    assert found[0].raw.sha256 == logs[0].sha256
+    told = sea_sentences(report)[0]
+    assert told.startswith("turn, zigzag, held out: current of 0.5")
+    assert told.endswith("which differs from zero; taken out")
+
+
+def test_still_water_stays_still(mariner: ShipModel) -> None:
+    """A current that does not differ from zero is reported and left in, so that the velocities stay."""
+    calm = log(turning_circle(mariner, 35.0, 700.0, 0.5))
+    (found,), report = in_still_water([calm], Options(), mariner.particulars)
+    assert found is calm
+    assert report["currents"][calm.name]["speed"] < 0.05
+
+
+def test_velocities_through_the_water_keep_theirs(mariner: ShipModel) -> None:
+    """A logged speed is through the water: a known current is taken out of the track alone."""
+    run = zigzag(mariner, 20, 20, duration=300.0, dt=1.0, weather=CURRENT)
+    (found,), report = in_still_water([run], Options(), mariner.particulars)
+    assert report["currents"][run.name]["source"] == "columns"
+    np.testing.assert_array_equal(found["u"], run["u"])
+    still = zigzag(mariner, 20, 20, duration=300.0, dt=1.0)
+    np.testing.assert_allclose(found["x"], still["x"], atol=1e-6)
+
+
+def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
+    """Of a trial with a speed log and positions only the sway that was derived changes."""
+    run = zigzag(mariner, 20, 20, duration=300.0, dt=0.5, weather=CURRENT)
+    channels = {name: run[name] for name in ("x", "y", "psi", "r", "delta", "u")}
+    made, derived = to_project_conventions(run.t, channels, Conventions(), "log")
+    mixed = Trial(run.t, made, derived=derived)
+    assert mixed.over_ground
+    found = through_water(mixed, NORTH, EAST)
+    np.testing.assert_array_equal(found["u"], run["u"])
+    np.testing.assert_allclose(found["v"], run["v"], atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("option", "which", "said"),
+    [
+        ("slack", [0], "expected one of 'auto', 'shared', 'trial', 'none'"),
+        ({"north": 1.0}, [0], "east"),
+        ({"north": 9.0, "east": 0.0}, [0], "a current of 9 m/s found, expected less than the ship's speed"),
+        ("shared", [1], "the trials keep to one heading; add a turn of a whole circle"),
+    ],
+)
+def test_currents_that_cannot_be(mariner: ShipModel, logs: list[Trial], option, which, said) -> None:
+    with pytest.raises(InputError, match=said):
+        in_still_water([logs[k] for k in which], Options(current=option), mariner.particulars)
+
+
+def test_columns_that_contradict_a_given_current(mariner: ShipModel, logs: list[Trial]) -> None:
+    columns = {name: np.full(len(logs[0]), 0.5) for name in ("current_north", "current_east")}
+    with pytest.raises(InputError, match=r"have means of 0\.50 and 0\.50 m/s, current = { north = 0\.1"):
+        in_still_water(
+            [logs[0].with_channels(columns)],
+            Options(current={"north": 0.1, "east": 0.0}),
+            mariner.particulars,
+        )
+
+
+def test_one_heading_is_left_as_it_is_with_a_word(mariner: ShipModel, logs: list[Trial]) -> None:
+    (found,), report = in_still_water([logs[1]], Options(), mariner.particulars)
+    assert found is logs[1]
+    assert "zigzag: the current cannot be told and is not taken out" in report["sea_remarks"][0]
+
+
+def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
+    """The run in wind is the run of her equations with that force: predicted with it, not without."""
+    run = zigzag(mariner, 10, 10, duration=300.0, dt=0.5, weather=Weather(wind=Wind(12.0, 60.0, gust=False)))
+    (windy,), report = in_still_water([run], Options(), mariner.particulars)
+    assert report["wind"]["mean_speeds"][run.name] == pytest.approx(12.0)
+    ahead = windy["u"] + 12.0 * np.cos(run["wind_from"] - run["psi"])
+    aside = windy["v"] + 12.0 * np.sin(run["wind_from"] - run["psi"])
+    curves = wind_curves(mariner.particulars)
+    pressure, angle = 0.5 * AIR_DENSITY * (ahead**2 + aside**2), np.arctan2(aside, ahead)
+    surge = pressure * np.interp(angle, curves.angle, curves.X, period=2.0 * np.pi)
+    surge -= 0.5 * AIR_DENSITY * curves.X[0] * windy["u"] ** 2
+    np.testing.assert_allclose(windy["wind_udot"], mobility_matrix(mariner)[0, 0] * surge, rtol=1e-9)
+    with_wind = open_loop(mariner, windy)["psi"] - run["psi"]
+    without = open_loop(mariner, run)["psi"] - run["psi"]
+    assert np.abs(with_wind).max() < 0.1 * np.abs(without).max()
+    fit = {"particulars": mariner.particulars, "steering": mariner.steering, "model_error": False}
+    found, left_in = (identify([run], wind=wind, **fit).coefficients for wind in ("auto", "none"))
+    names = ("Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d")
+    far, near = (
+        sum(abs(one[name] / mariner.coefficients[name] - 1.0) for name in names) for one in (left_in, found)
+    )
+    assert near < 0.2 * far
+
+
+def test_a_constant_wind_of_each_trial(mariner: ShipModel) -> None:
+    """A yaw acceleration of one of two trials is what the fit finds between them."""
+    runs = [zigzag(mariner, 15, 15, port, 300.0, 0.5).with_(name=str(port)) for port in (False, True)]
+    pushed = open_loop(mariner, runs[0].with_channels({"wind_rdot": np.full(len(runs[0]), 2e-6)}))
+    fit = identify(
+        [pushed, runs[1]], wind="constant", particulars=mariner.particulars, steering=mariner.steering,
+        model_error=False,
+    )  # fmt: skip
+    found = fit.model.provenance["wind"]["accelerations"]
+    assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(2e-6, rel=0.1)
+    assert "False: constant acceleration taken out, sway" in " ".join(sea_sentences(fit.model.provenance))
+
+
+def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
+    run = zigzag(mariner, 10, 10, duration=200.0, dt=1.0, weather=Weather(wind=Wind(9.0, 60.0)))
+    bare = replace(mariner.particulars, beam=None)
+    with pytest.raises(InputError, match="weather without the particulars it needs: beam"):
+        in_still_water([run], Options(wind="isherwood"), bare)
+    (found,), report = in_still_water([run], Options(), bare)
+    assert "wind_udot" not in found
+    assert report["sea_remarks"][0].startswith("the wind that was logged is not taken out: weather without")
+    with pytest.raises(InputError, match="no trial has the columns wind_speed and wind_from"):
+        in_still_water([zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], Options(wind="isherwood"), bare)
