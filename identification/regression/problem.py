@@ -67,7 +67,9 @@ def pose(
         )
     used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
-    used, everything = ([_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything))
+    used, everything = (
+        [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
+    )
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
@@ -93,7 +95,7 @@ def pose(
 def _at_constant_speed(
     trial: Trial, table: Structure, particulars: Particulars | Mapping[str, Any] | None
 ) -> Trial:
-    """A trial of heading and rudder alone at the ship's service speed, for a structure of the yaw rate alone."""
+    """A trial of heading and rudder at the service speed, for a structure of the yaw rate alone."""
     speed = (particulars or {}).get("speed")
     if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
         return trial

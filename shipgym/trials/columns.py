@@ -45,8 +45,8 @@ class Source:
 def parse_columns(columns: Mapping[str, Any], where: str = "columns") -> dict[str, Column]:
     """Check a table of columns by channel and fill in the SI units.
 
-    Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the time also with ``"date"``,
-    the column of the date, and ``"zone"``; `where` begins the messages. An unknown channel, key or unit, or a
+    Each entry is the name of a column or ``{"column": name, "unit": unit}``, of the time also ``"date"``, the
+    column of the date, and ``"zone"``; `where` begins the messages. An unknown channel, key or unit, or a
     unit of another quantity, is an InputError.
     """
     parsed: dict[str, Column] = {}

@@ -16,7 +16,7 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_text
 
 #: Cells that stand for "no value".
-MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "nat", "<na>"})
 
 #: Most lines of a file, columns, and characters of a line.
 MOST_LINES, MOST_COLUMNS, LONGEST_LINE = 1_000_000, 1000, 100_000
@@ -52,7 +52,7 @@ class Table:
 
     def texts(self, name: str) -> list[str]:
         """The cells of a column as texts without blanks around them, empty where there is no value."""
-        texts = ["" if v is None or v != v else str(v).strip() for v in self.column(name)]
+        texts = ["" if value is None else str(value).strip() for value in self.column(name)]
         return ["" if text.lower() in MISSING_WORDS else text for text in texts]
 
     def numbers(self, name: str) -> npt.NDArray[np.float64]:
@@ -68,17 +68,17 @@ class Table:
         except ValueError:
             row = next(k for k, text in enumerate(texts) if text and not is_number(text))
             raise InputError(
-                f"{self.path}: {self.place(row)}, column '{name}': '{str(cells[row]).strip()}' found, expected a "
-                "number; correct the cell, or leave it empty where the value is missing and import with "
-                'repair = "interpolate"'
+                f"{self.path}: {self.place(row)}, column '{name}': '{str(cells[row]).strip()}' found, "
+                "expected a number; correct the cell, or leave it empty where the value is missing and "
+                'import with repair = "interpolate"'
             ) from None
 
 
 def read_table(path: str | Path) -> Table:
     """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
 
-    Raises InputError for a missing file, a folder, an empty or binary file, a header with no names or repeated
-    ones, and a row with more or fewer cells than the header.
+    Raises InputError for a missing file, a folder, an empty or binary file, repeated or no
+    names in the header, and a row with more or fewer cells than the header.
     """
     path = Path(path)
     lines = _read_lines(path)
@@ -102,8 +102,8 @@ def read_table(path: str | Path) -> Table:
     for k, row in enumerate(rows):
         if (found := len(_cells(row, delimiter))) != len(header):
             raise InputError(
-                f"{path}: {table.place(k)} has {found} cells, expected {len(header)} as in the header; complete "
-                "or remove the row"
+                f"{path}: {table.place(k)} has {found} cells, expected {len(header)} as in the header; "
+                "complete or remove the row"
             )
     return table
 

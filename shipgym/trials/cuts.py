@@ -78,7 +78,6 @@ def _active_stretches(log: Imported, where: str) -> list[tuple[float, float]]:
     if not found:
         raise InputError(
             f'{where} cut: "rudder" found, but no rudder that is more than 3 deg from its usual place for '
-            "over "
-            f"{_SHORTEST_S:g} s, expected manoeuvres; give the stretches, or read another log"
+            f"over {_SHORTEST_S:g} s, expected manoeuvres; give the stretches, or read another log"
         )
     return found

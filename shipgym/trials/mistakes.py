@@ -25,8 +25,7 @@ _SAME, _COMPASS, _CONTRADICTION, _TURNED = 0.3 * DEGREE, 2.0 * DEGREE, 25.0 * DE
 _HALF_HOUR, _LONGEST_ZONE = 1800.0, 14.0 * 3600.0
 NO_RUDDER = (
     "no rudder angle in this log: without rudder nothing can be identified from it, it can only be looked "
-    "at; "
-    "log the rudder too (in NMEA 0183 the sentence RSA)"
+    "at; log the rudder too (in NMEA 0183 the sentence RSA)"
 )
 
 
@@ -46,8 +45,7 @@ def find_outliers(
         raise InputError(
             f"{source.at(int(rows[k + 1]), 'lat')}: the position jumps {steps[k] / 1000.0:.4g} km within "
             f"{t[k + 1] - t[k]:g} s, as in {int(fast.sum())} of {fast.size} steps, expected the track of one "
-            "ship; "
-            "likely two ships are in one log: keep the rows of one, or declare the unit of lat and lon"
+            "ship; likely two ships are in one log: keep the rows of one, or declare the unit of lat and lon"
         )
     return rows[np.r_[fast, True] & np.r_[True, fast]]
 
@@ -69,8 +67,7 @@ def check_overlap(series: Series, other: Series, path: Path, column: str) -> Non
     )
     raise InputError(
         f"{path}: begins {begin - first:.6g} s after the other file of this log and does not overlap with "
-        "it, "
-        f"expected one time; {remedy}"
+        f"it, expected one time; {remedy}"
     )
 
 
@@ -93,8 +90,7 @@ def check_log(
     if fastest < SLOWEST:
         raise InputError(
             f"{source.table.path}: the ship makes at most {fastest:.2g} m/s over ground, she lies at berth "
-            "or at "
-            "anchor, expected a manoeuvre; read another log"
+            "or at anchor, expected a manoeuvre; read another log"
         )
     moving = np.abs(velocity) > 0.3 * fastest
     if "psi" not in values or np.count_nonzero(moving) < 3:
@@ -106,8 +102,7 @@ def check_log(
         told = f"{offset[0] / DEGREE:.1f}"
         notes.append(
             f"the heading shows {told} deg too much on every course, as a magnetic compass or a gyro that is "
-            "not "
-            f"aligned does; to take it out write heading_offset_deg = {told} in [sensors]"
+            f"not aligned does; to take it out write heading_offset_deg = {told} in [sensors]"
         )
     elif magnetic and not tools.heading_offset:
         notes.append(
@@ -130,8 +125,7 @@ def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Sourc
     if turned > _TURNED and abs(mirrored.mean()) > max(0.95, abs(apart.mean()) + 0.02):
         raise InputError(
             f"{head}contradicts the course over ground: it turns the other way, expected it clockwise from "
-            "north; "
-            "change the sign of its column"
+            "north; change the sign of its column"
         )
     if abs(mean) > _CONTRADICTION and abs(apart.mean()) > 0.7 and not tools.heading_offset:
         raise InputError(

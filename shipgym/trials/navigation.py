@@ -1,6 +1,4 @@
-"""From what a bridge logs to midship: local metres, antenna, offsets of instruments, speed through the "
-"water.
-"""
+"""From what a bridge logs to midship: local metres, antenna, offsets, speed through the water."""
 
 from __future__ import annotations
 
@@ -26,14 +24,13 @@ STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
 #: Courses this far apart tell an offset of the heading, and a current across, from each other.
 APART = 60.0 * DEGREE
 _EQUATOR, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3  # WGS 84
+_ESTIMATE = "estimate"
 _OFFSETS = {"heading_offset_deg": "psi", "rudder_offset_deg": "delta"}
 
 
 @dataclass(frozen=True)
 class Instruments:
-    """Where the GNSS antenna stands, what heading and rudder show too much, and whether clocks are "
-    "corrected.
-    """
+    """Where the antenna stands, what heading and rudder show too much, whether clocks are corrected."""
 
     forward: float = 0.0  # of the antenna from midship, m
     starboard: float = 0.0
@@ -48,22 +45,20 @@ class Instruments:
         antenna = check_table(table.get("gnss_antenna", {}), place := f"{where} gnss_antenna")
         check_keys(antenna, ("forward", "starboard"), place)
         at = {key: check_number(antenna.get(key, 0.0), f"{place}.{key}") for key in ("forward", "starboard")}
-        limits = {} if ship is None else {"forward": 0.55 * (ship.length_overall or ship.length), "starboard": (
-            0.6 * (ship.beam or ship.length)
-        )}  # fmt: skip
-        for key, limit in limits.items():
+        for key, size in (("forward", "length"), ("starboard", "beam")):
+            limit = 0.6 * float((ship and (ship.get(size) or ship.length)) or np.inf)
             if ship is not None and abs(at[key]) > limit:
                 raise InputError(
                     f"{place}.{key}: {at[key]:g} m found, outside the ship of {ship.length:g} m, expected at "
-                    "most "
-                    f"{limit:.4g} m from midship; measured from the aft perpendicular take off "
+                    f"most {limit:.4g} m from midship; measured from the aft perpendicular take off "
                     f"{ship.length / 2:g}"
                 )
         offsets = [
-            value if (value := table.get(key, 0.0)) == "estimate"
-            else DEGREE * check_number(value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint='or "estimate"')
+            value
+            if (value := table.get(key, 0.0)) == _ESTIMATE
+            else DEGREE * check_number(value, f"{where} {key}", at_least=-180.0, hint=f'or "{_ESTIMATE}"')
             for key in _OFFSETS
-        ]  # fmt: skip
+        ]
         if (clocks := table.get("clock_offsets")) is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
         return cls(*at.values(), *offsets, clocks)
@@ -120,8 +115,7 @@ def correct_offsets(t: Floats, channels: dict[str, Floats], tools: Instruments, 
                 needed = "with sog and cog on courses over 60 deg apart" if name == "psi" else "and a heading"
                 raise InputError(
                     f'{where}: {key} = "estimate" found, expected straight parts of {STRAIGHT_S:g} s '
-                    f"{needed}; "
-                    f"give {key} in degrees, or leave it out"
+                    f"{needed}; give {key} in degrees, or leave it out"
                 )
             offset = found[0]
             notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and taken out")

@@ -1,12 +1,14 @@
-"""NMEA 0183 logs: position, speeds, heading, rate of turn, rudder, shaft and wind, of whatever talkers there are.
+"""NMEA 0183 logs: position, speeds, heading, rate of turn, rudder, shaft and wind, of whatever talkers.
 
 pynmea2 parses the sentences; those that hold no channel (AIS, depth, satellites) are passed over.
 """
 
 import re
+import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime, time
+from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,46 +17,26 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, check_readable, read_text
+from shipgym.files import LARGEST_CSV, read_bytes, read_text
 from shipgym.trials.clock_texts import DAY
 from shipgym.trials.csv_reader import MOST_LINES
+from shipgym.trials.units import si_factor
 
-KNOT, DEGREE = 1852.0 / 3600.0, np.pi / 180.0
 #: Share of damaged sentences from which a log is refused.
 MOST_DAMAGED = 0.1
 
-_POSITION = {"lat": ("latitude", 1.0), "lon": ("longitude", 1.0)}
-#: Of each sentence what it must say to be valid, and channel by field and factor to SI.
-SENTENCES: dict[str, tuple[tuple[str, str], dict[str, tuple[str, float]]]] = {
-    "RMC": (("status", "A"), _POSITION | {"sog": ("spd_over_grnd", KNOT), "cog": ("true_course", DEGREE)}),
-    "GGA": (("gps_qual", "123456"), _POSITION),
-    "GLL": (("status", "A"), _POSITION),
-    "VTG": (("", ""), {"sog": ("spd_over_grnd_kts", KNOT), "cog": ("true_track", DEGREE)}),
-    "HDT": (("", ""), {"psi": ("heading", DEGREE)}),
-    "THS": (("mode", "AEM"), {"psi": ("heading", DEGREE)}),
-    "HDG": (("", ""), {"psi": ("heading", DEGREE)}),
-    "VHW": (("", ""), {"stw": ("water_speed_knots", KNOT), "psi": ("heading_true", DEGREE)}),
-    "VBW": (("data_validity_water_spd", "A"), {"stw": ("lon_water_spd", KNOT), "v": ("trans_water_spd", KNOT)}),
-    "ROT": (("status", "A"), {"r": ("rate_of_turn", DEGREE / 60.0)}),
-    "RSA": (("rsa_starboard_status", "A"), {"delta": ("rsa_starboard", DEGREE)}),
-    "RPM": (("source", "S"), {"n": ("speed", 1.0 / 60.0)}),
-    "MWV": (("status", "A"), {"wind_from": ("wind_angle", DEGREE), "wind_speed": ("wind_speed", 1.0)}),
-    "ZDA": (("", ""), {}),
-}  # fmt: skip
-_SPEEDS = {"N": KNOT, "K": 1.0 / 3.6, "M": 1.0, "S": 1609.344 / 3600.0}
+SENTENCES: dict[str, dict[str, list[str]]] = tomllib.loads(
+    files("shipgym.trials").joinpath("sentences.toml").read_text("utf-8")
+)
+_SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: The better sources: of heading true ones, of the speed through the water the log with two axes.
 _BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}
-_SENTENCE = re.compile(rf"^(.*?)(\$[A-Z]{{2}}(?:{'|'.join(SENTENCES)}),.*)$")
+_SENTENCE = re.compile(rf"\$[A-Z]{{2}}(?:{'|'.join(SENTENCES)}),.*")
 _ANY = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
-_STAMP = re.compile(
-    r"\\[^\\]*c:(\d{9,13})|(\d{9,13}(?:\.\d+)?)\b|(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?)"
-)
 
 
 class Reading(NamedTuple):
-    """One value of a channel, or a time: the line, its time (s since 1970 or of the day, or nan), the "
-    "value.
-    """
+    """One value of a channel: the line, its time (s since 1970 or of the day, or nan), the value."""
 
     line: int
     time: float
@@ -75,9 +57,8 @@ Readings = dict[str, dict[str, list[Reading]]]  # by channel and source, the tal
 
 def is_nmea(path: Path) -> bool:
     """Whether a file begins with sentences of NMEA 0183."""
-    check_readable(path, "CSV file")
-    with path.open("rb") as file:
-        return len(_ANY.findall(file.read(4096).decode("latin-1").replace("\r", "\n"))) >= 2
+    head = read_bytes(path, "CSV file", LARGEST_CSV)[:4096].decode("latin-1")
+    return len(_ANY.findall(head.replace("\r", "\n"))) >= 2
 
 
 def parse_log(path: Path) -> Log:
@@ -93,19 +74,17 @@ def parse_log(path: Path) -> Log:
     readings: Readings = defaultdict(lambda: defaultdict(list))
     damaged, total = [], 0
     for number, line in enumerate(lines, start=1):
-        found = _SENTENCE.match(line)
+        found = _SENTENCE.search(line)
         if found is None:
             continue
         total += 1
         try:
-            message = pynmea2.parse(found[2], check=True)
+            message = pynmea2.parse(found[0], check=True)
             time, values = _time_of(message), list(_values_of(message))
         except (pynmea2.ParseError, ValueError, TypeError, AttributeError, IndexError, OverflowError):
             damaged.append(number)
             continue
         source = f"{message.talker}{message.sentence_type}"
-        if (logged := _stamp(found[1])) is not None:
-            readings["t"]["logger"].append(Reading(number, logged, logged))
         if np.isfinite(time):
             readings["t"][source].append(Reading(number, time, time))
         for channel, value in values:
@@ -113,8 +92,7 @@ def parse_log(path: Path) -> Log:
     if len(damaged) > MOST_DAMAGED * total:
         raise InputError(
             f"{path}: {len(damaged)} of {total} sentences have a wrong checksum or broken fields (the first "
-            "in "
-            f"line {damaged[0]}), expected hardly any; the log was damaged on the way: take the original"
+            f"in line {damaged[0]}), expected hardly any; the log was damaged on the way: take the original"
         )
     notes = [f"{len(damaged)} of {total} sentences with a wrong checksum left out"] if damaged else []
     return _assembled(path, readings, notes)
@@ -123,34 +101,25 @@ def parse_log(path: Path) -> Log:
 def _values_of(message: Any) -> Iterator[tuple[str, float]]:
     """The channels of a sentence that is valid."""
     kind = message.sentence_type
-    (flag, valid), fields = SENTENCES[kind]
+    fields = dict(SENTENCES[kind])
+    flag, valid = fields.pop("valid", ("", ""))
     if flag and str(getattr(message, flag) or " ") not in valid:
         return
-    for channel, (field, factor) in fields.items():
+    for channel, (field, unit) in fields.items():
         told = (
             getattr(message, field) if getattr(message, field[:3], " ") else None
         )  # latitude of an empty lat
         if told is None or told == "":
             continue
-        value = factor * float(told)
+        value = si_factor(channel, unit) * float(told)
         if kind == "HDG":
             for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
-                value += DEGREE * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
+                value += si_factor("psi", "deg") * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
         elif kind == "MWV":
-            value *= _SPEEDS[message.wind_speed_units] if channel == "wind_speed" else 1.0
+            if channel == "wind_speed":
+                value *= si_factor(channel, _SPEEDS[message.wind_speed_units])
             channel += "" if message.reference == "T" else "_relative"
         yield channel, value
-
-
-def _stamp(text: str) -> float | None:
-    """The time that a logger put before a sentence: Unix, ISO 8601, or a TAG block's c:."""
-    found = _STAMP.search(text) if text else None
-    if found is None:
-        return None
-    if found[3]:
-        return datetime.fromisoformat(found[3]).replace(tzinfo=UTC).timestamp()
-    seconds = float(found[1] or found[2])
-    return seconds / 1000.0 if seconds > 1e11 else seconds
 
 
 def _time_of(message: Any) -> float:
@@ -159,8 +128,6 @@ def _time_of(message: Any) -> float:
     if not isinstance(clock, time):
         return np.nan
     date = getattr(message, "datestamp", None) or datetime(1970, 1, 1)
-    if message.sentence_type == "ZDA":
-        date = datetime(int(message.year), int(message.month), int(message.day))
     day = datetime(date.year, date.month, date.day, tzinfo=UTC).timestamp()
     return day + 3600 * clock.hour + 60 * clock.minute + clock.second + 1e-6 * clock.microsecond
 
@@ -169,7 +136,7 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
     clocks = readings.pop("t", {})
     if not readings or not clocks:
         found = "sentence of a ship's motion" if clocks else "time that can be read"
-        wanted = quoted(SENTENCES) if clocks else "RMC, GGA, GLL or ZDA, or a logger's time before sentences"
+        wanted = quoted(SENTENCES) if clocks else "RMC, GGA or GLL"
         raise InputError(f"{path}: no {found} in this log, expected some of {wanted}; log these too")
     main = max(clocks, key=lambda name: _rank(name, clocks[name]))
     stamps = np.array([(stamp.line, stamp.time) for stamp in clocks[main]])
@@ -179,7 +146,7 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
         source = max(sorted(sources), key=lambda s: (_BETTER.get(s[2:], 0), *_rank(s, sources[s])))
         line, clock, value = np.array(sources[source]).T
         at = np.interp(line, stamps[first, 0], times)
-        told = np.isfinite(clock) & (main != "logger")
+        told = np.isfinite(clock)
         clock = np.where(told, clock + DAY * np.round((at - clock) / DAY), at)
         clock, kept = np.unique(np.round(clock, 3), return_index=True)
         chosen[channel] = clock, line[kept], value[kept]
@@ -195,10 +162,10 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
     return Log(columns, lines.tolist(), notes)
 
 
-def _rank(source: str, readings: list[Reading]) -> tuple[bool, bool, bool, int]:
-    """What is preferred: a logger, dates, no display that passes others' sentences on (II), many times."""
+def _rank(source: str, readings: list[Reading]) -> tuple[bool, bool, int]:
+    """What is preferred: dates, no display that passes others' sentences on (II), many times."""
     times = {one.line if np.isnan(one.time) else one.time for one in readings}
-    return source == "logger", readings[0].time > 2.0 * DAY, not source.startswith("II"), len(times)
+    return readings[0].time > 2.0 * DAY, not source.startswith("II"), len(times)
 
 
 def _absolute_wind(chosen: dict[str, Series]) -> None:

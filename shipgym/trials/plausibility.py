@@ -39,8 +39,8 @@ def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
     for channel, limit in LIMITS.items():
         if channel not in channels:
             continue
-        size = np.abs(channels[channel])
-        if np.nanmax(size) <= limit * (1.0 + 1e-9):
+        size = np.nan_to_num(np.abs(channels[channel]))
+        if size.max(initial=0.0) <= limit * (1.0 + 1e-9):
             continue
         first = int(np.argmax(size > limit * (1.0 + 1e-9)))
         unit = source.columns[channel].unit
@@ -49,7 +49,7 @@ def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
         raise InputError(
             f"{source.at(first, channel)}: {channel} = {found} found, "
             f"expected at most {_spelled(limit / factor, channel, unit)}; "
-            f"{_unit_remedy(channel, float(np.nanmax(size)) / limit, source)}"
+            f"{_unit_remedy(channel, float(size.max()) / limit, source)}"
         )
 
 

@@ -41,10 +41,8 @@ def own_clock(channel: str, t: Floats, values: Floats, source: Source) -> tuple[
         k = int(np.argmax(back))
         raise InputError(
             f"{source.at(int(rows[k + 1]), 't')}: time goes from {clock[k]:.10g} to {clock[k + 1]:.10g} s "
-            "between "
-            f"values of '{name}', expected it to increase; sort the rows, or, where two ships or receivers "
-            "are in "
-            "the file, keep those of one"
+            f"between values of '{name}', expected it to increase; sort the rows, or, where two ships or "
+            "receivers are in the file, keep those of one"
         )
     return clock, values[rows]
 
@@ -80,7 +78,6 @@ def on_one_clock(series: Series, where: str) -> tuple[Floats, dict[str, Floats],
     if t.size < _FEWEST:
         raise InputError(
             f"{where}: {', '.join(motion)} have {t.size} moments in common, expected channels of one time; "
-            "check "
-            "their clocks"
+            "check their clocks"
         )
     return t, {name: np.interp(t, *pair) for name, pair in series.items()}, notes

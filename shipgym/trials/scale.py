@@ -26,9 +26,9 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
     """
     if ship.beam is not None and ship.length < _LEAST_SLENDERNESS * ship.beam:
         raise InputError(
-            f"{where}: a ship of {ship.length:g} m by {ship.beam:g} m found, expected at least {_LEAST_SLENDERNESS:g} "
-            "times as long as broad; likely [ship] length is something else, such as an antenna's height: write the "
-            "length between perpendiculars"
+            f"{where}: a ship of {ship.length:g} m by {ship.beam:g} m found, expected at least "
+            f"{_LEAST_SLENDERNESS:g} times as long as broad; likely [ship] length is something else, such as "
+            "an antenna's height: write the length between perpendiculars"
         )
     speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
     if speeds is not None and "r" in trial:
@@ -39,8 +39,8 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
         knots = ship.speed * KNOT
         if ship.speed > _FASTEST_FROUDE * math.sqrt(9.81 * ship.length) and abs(fastest / knots - 1.0) < 0.1:
             raise InputError(
-                f"{where}: {ship.speed:g} is {knots:.4g} m/s in knots, as fast as she sails here, expected [ship] "
-                f"speed in m/s; write speed = {knots:.4g}"
+                f"{where}: {ship.speed:g} is {knots:.4g} m/s in knots, as fast as she sails here, expected "
+                f"[ship] speed in m/s; write speed = {knots:.4g}"
             )
         if not low <= fastest <= high:
             raise InputError(

@@ -94,9 +94,7 @@ class ShipFile:
         return [trial for entry in wanted for trial in self._read(entry)]
 
     def trial(self, file: str) -> Trial:
-        """Read one trial by its ``file`` (of a log that is cut, the first), whatever its use; as "
-        ":meth:`trials`.
-        """
+        """Read one trial by its ``file`` (of a log that is cut, the first), whatever its use."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
         return self._read(self.entries[files.index(file)])[0]

@@ -22,7 +22,9 @@ from shipgym.trials.nmea import is_nmea, parse_log
 
 #: Most bytes of an Excel or MATLAB file, most of what any is unpacked, and most values.
 LARGEST_PACKED, LARGEST_UNPACKED, MOST_CELLS = 32 * MIB, 256 * MIB, 5_000_000
-_COMPRESSED = 15  # kind of an element of a MATLAB file
+_MATRIX, _COMPRESSED = 14, 15  # kinds of elements of a MATLAB file, and those of numbers
+_NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+_FIRST_NUMERIC = 6  # class of a matrix
 
 
 def read_log(path: str | Path) -> Table:
@@ -106,8 +108,7 @@ def _read_excel(path: Path) -> Table:
             cells = after.partition(b'"')[0].decode("ascii", "replace")
             raise InputError(
                 f"{path}: merged cells {cells} found in sheet {sheet.title!r}, expected a cell for each "
-                "value; "
-                "unmerge them (Home, Merge & Center, Unmerge Cells), or save the table as CSV"
+                "value; unmerge them (Home, Merge & Center, Unmerge Cells), or save the table as CSV"
             )
         frame = import_module("pandas").DataFrame(sheet.iter_rows(values_only=True), dtype=object)
         frame = frame.dropna(how="all").dropna(axis=1, how="all")
@@ -128,47 +129,56 @@ def _read_parquet(path: Path) -> Table:
         about = file.metadata
         _check_unpacked(path, sum(about.row_group(k).total_byte_size for k in range(about.num_row_groups)))
         _check_unpacked(path, 8 * about.num_rows * about.num_columns)
-        return from_frame(file.read().to_pandas(), path, 1)
+        table = file.read()
+        table.validate(full=True)  # offsets beyond the data
+        return from_frame(table.to_pandas(), path, 1)
 
 
 def _read_matlab(path: Path) -> Table:
-    from scipy import io as matlab
-
+    """The numeric vectors of a MATLAB file of version 5 to 7, read here: SciPy dies of damaged files."""
     data = read_bytes(path, "MATLAB file", LARGEST_PACKED)
     if data[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in data[:128]:
         raise InputError(f"{path}: MATLAB 7.3 (HDF5) found, expected an older format: save(..., '-v7')")
     with _damage_told(path, "MATLAB (.mat)", "save the vectors anew with save(..., '-v7')"):
-        _check_matlab_size(path, data)
-        told = matlab.whosmat(io.BytesIO(data))
-        sizes = {
-            name: max(shape)
-            for name, shape, kind in told
-            if kind.startswith(("double", "single", "int", "uint")) and sum(n != 1 for n in shape) == 1
-        }
-        if not sizes:
+        order, total, found = "<" if data[126:128] == b"IM" else ">", 0, {}
+        for kind, packed in _elements(data[128:], order):
+            content = packed
+            if kind == _COMPRESSED:
+                content = zlib.decompressobj().decompress(packed, LARGEST_UNPACKED + 1 - total)
+                _check_unpacked(path, total := total + len(content))
+                kind, content = next(_elements(content, order))
+            parts = [part for _, part in zip(range(4), _elements(content, order), strict=False)]
+            if kind != _MATRIX or len(parts) < 4 or parts[3][0] not in _NUMBERS:
+                continue
+            (_, flags), (_, shape), (_, name), (number, values) = parts
+            array = np.frombuffer(values, np.dtype(_NUMBERS[number]).newbyteorder(order))
+            sizes = np.frombuffer(shape, f"{order}i4")
+            numeric = struct.unpack(f"{order}I", flags[:4])[0] & 0xFF >= _FIRST_NUMERIC
+            if numeric and np.count_nonzero(sizes != 1) == 1 and sizes.max() == array.size:
+                found[name.decode("ascii")] = array.astype(np.float64)
+        length = max(
+            (one.size for one in found.values()), key=[v.size for v in found.values()].count, default=0
+        )
+        if not length:
             raise InputError(
-                f"{path}: no numeric vectors found among {quoted(name for name, *_ in told)}, expected one "
-                "for "
-                "each channel; a struct is not read: save('run.mat', '-struct', 'data')"
+                f"{path}: no numeric vectors found, expected one for each channel; a struct is not read: "
+                "save('run.mat', '-struct', 'data', '-v7')"
             )
-        length = max(sizes.values(), key=list(sizes.values()).count)
-        names = [name for name, size in sizes.items() if size == length]
-        _check_unpacked(path, 8 * length * len(names))
-        loaded = matlab.loadmat(io.BytesIO(data), variable_names=names)
-        columns = {name: np.real(loaded[name]).reshape(length).astype(np.float64) for name in names}
+    columns = {name: values for name, values in found.items() if values.size == length}
     return _table(path, columns, range(1, length + 1))
 
 
-def _check_matlab_size(path: Path, data: bytes) -> None:
-    """Refuse what is larger unpacked than allowed, before it is."""
-    order, at, total = "<" if data[126:128] == b"IM" else ">", 128, 0
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Kind and content of the elements of a MATLAB file."""
+    at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack(f"{order}II", data[at : at + 8])
-        if kind == _COMPRESSED:
-            packed = data[at + 8 : at + 8 + size]
-            total += len(zlib.decompressobj().decompress(packed, LARGEST_UNPACKED + 1 - total))
-            _check_unpacked(path, total)
-        at += 8 + size
+        if kind >> 16:  # a small one, within its tag
+            yield kind & 0xFFFF, data[at + 4 : at + 4 + min(kind >> 16, 4)]
+            at += 8
+        else:
+            yield kind, data[at + 8 : at + 8 + size]
+            at += 8 + size + (-size % 8 if kind != _COMPRESSED else 0)
 
 
 _READERS: dict[str, Callable[[Path], Table]] = {

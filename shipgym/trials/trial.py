@@ -304,7 +304,7 @@ def read_trials(
 ) -> list[Trial]:
     """The trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cuts.cut_log`).
 
-    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named with its first and last second.
+    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its seconds.
     """
     found = import_tables(tables, columns, conventions)
     trials = []

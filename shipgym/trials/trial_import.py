@@ -143,9 +143,8 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
     values = np.column_stack([t, *numbers.values()])
     source = Source(table, {name: chosen[name] for name in ("t", *numbers)}, np.arange(len(values)))
     present, filled = np.isfinite(values), {}
-    if own_clocks := have_own_clocks(present[:, 1:]):
-        values, source = values[present[:, 0]], replace(source, rows=np.flatnonzero(present[:, 0]))
-    else:
+    own_clocks = bool(present[:, 0].all()) and have_own_clocks(present[:, 1:])
+    if not own_clocks:
         values, source = _repaired(values, source, repair)
         filled = dict(zip(source.columns, (~present)[source.rows].sum(axis=0).tolist(), strict=True))
     recorded = {
@@ -199,8 +198,7 @@ def _read_times(table: Table, chosen: dict[str, Column]) -> tuple[Floats, float 
             raise InputError(
                 f"{table.path}: {table.place(row)}, column '{column.name}': no time that can be read: "
                 f"{cells[row][:40]!r} found, expected a number, ISO 8601 (2024-05-31T09:30:00), or a time of "
-                "day "
-                f'with its date beside it: t = {{ column = "{column.name}", date = "..." }}'
+                f'day with its date beside it: t = {{ column = "{column.name}", date = "..." }}'
             ) from None
     chosen["t"] = replace(column, unit="s")
     zero = float(next(iter(values[np.isfinite(values)]), 0.0))
@@ -218,8 +216,7 @@ def _read_position(table: Table, column: Column) -> Floats:
         row = cells.index(str(error)) if str(error) in cells else 0
         raise InputError(
             f"{table.path}: {table.place(row)}, column '{column.name}': {str(error)!r} found, expected "
-            "degrees "
-            "(57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N)"
+            "degrees (57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N)"
         ) from None
 
 
@@ -240,8 +237,7 @@ def _local_positions(
             raise InputError(
                 f"{source.at(k, 'lat')}: position {lat[k]:.5f}, {lon[k]:.5f} found, an outlier that no ship "
                 f"reaches from those beside it ({far.size} of {here.size} are); empty its cells, or leave "
-                "such "
-                'rows to be filled with repair = "interpolate"'
+                'such rows to be filled with repair = "interpolate"'
             )
         local[:, far] = np.nan
     return dict(zip(("x", "y"), local, strict=True))
@@ -255,14 +251,12 @@ def _joined(recorded: Sequence[_Recorded]) -> Series:
         if (base.start is None) != (other.start is None):
             raise InputError(
                 f"{path}: one of the files of this log has a clock and the other has not, expected times "
-                "that "
-                "count from one moment in both"
+                "that count from one moment in both"
             )
         if twice := series.keys() & other.series.keys():
             raise InputError(
                 f"{path}: {quoted(sorted(twice))} stands in another file of this log too, expected each in "
-                "one; "
-                "rename the column that is not to be read"
+                "one; rename the column that is not to be read"
             )
         shift = (other.start or 0.0) - (base.start or 0.0)
         moved = {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
@@ -276,10 +270,11 @@ def to_project_conventions(
 ) -> tuple[dict[str, Floats], frozenset[str], bool | None, list[str]]:
     """Convert frame and origin, and derive the channels that follow from others.
 
-    The recorded channels are in SI units in the file's frame, the heading without jumps, the rudder positive to
-    starboard, of shape (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
-    heading, the heading (relative to the start) from the yaw rate where no position is recorded. Returns the
-    channels, the names of the derived ones, whether surge and sway are over ground, and remarks.
+    The recorded channels are in SI units in the file's frame, the heading without jumps, the rudder positive
+    to starboard, of shape (n_samples,); time is in s. The yaw rate is derived from the heading, surge and
+    sway from velocity over ground or position, the heading (relative to the start) from the yaw rate where no
+    position is recorded. Returns the channels, the names of the derived ones, whether surge and sway are over
+    ground, and remarks.
     """
     channels = dict(recorded)
     derived: set[str] = set()
