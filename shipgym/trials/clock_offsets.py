@@ -19,7 +19,7 @@ from shipgym.trials.resampling import Series
 #: Delays that are looked for, s, and the significance, in standard errors, from which one is corrected.
 LONGEST_S, SIGNIFICANT = 10.0, 2.5
 #: By how much ships of other dynamics seem late, s, which the standard errors contain.
-DYNAMICS_S = {"r": 0.1, "delta": 1.0}
+DYNAMICS_S = {"r": 0.15, "delta": 1.0}
 #: Delays of channels on one clock that are refused, s.
 REFUSED_S = {"r": 1.0, "delta": 2.0}
 _WORDS = {"r": ("the yaw rate", "the heading"), "delta": ("the rudder", "the yaw acceleration")}
@@ -44,7 +44,7 @@ def clock_offset(t: Floats, target: Floats, late: Floats, others: Mapping[str, F
 
     `target` is differentiated over windows of time, s; `others` are what explains it beside the channel.
     """
-    step = max(float(np.median(np.diff(t))), 0.05)
+    step = max(float(np.median(np.diff(t))), 0.5)
     first, last = float(t[0]) + LONGEST_S + _WINDOW_S, float(t[-1]) - LONGEST_S - _WINDOW_S
     if not _FEWEST < (last - first) / step < _MOST:
         return None
@@ -110,7 +110,7 @@ def corrected_clocks(
     if {"psi", "r"} <= values.keys():
         found["r"] = clock_offset(t, values["psi"], values["r"], {})
     if "delta" in values and {"psi", "r"} & values.keys() and np.ptp(values["delta"]) > _LEAST_RUDDER:
-        late = found["r"].late if found.get("r") else 0.0
+        late = rate.late if (rate := found.get("r")) else 0.0
         r = np.interp(t + late, t, values["r"]) if "r" in values else time_derivative(t, values["psi"])
         found["delta"] = rudder_offset(t, r, values["delta"])
         plain = clock_offset(t, r, values["delta"], {"r": r})

@@ -30,7 +30,7 @@ class Table:
 
     path: Path  # the file, for messages
     header: tuple[str, ...]  # names of the columns, stripped of blanks
-    cells: Callable[[str], Sequence[Any]]  # of a column: texts or other objects, or an array of numbers
+    cells: Callable[[str], Any]  # of a column: texts or other objects, or an array of numbers
     lines: Sequence[int]  # line of the file on which each row stands; the file begins with line 1
     place_words: str = "line {line} (data row {row})"
     decimal_comma: bool = False
@@ -41,7 +41,7 @@ class Table:
         """Return the place of a row for a message: ``line 12 (data row 11)``."""
         return self.place_words.format(line=self.lines[row], row=row + 1)
 
-    def column(self, name: str) -> Sequence[Any]:
+    def column(self, name: str) -> Any:
         """The cells of a column; InputError if there is none of this name."""
         if name not in self.header:
             raise InputError(

@@ -59,7 +59,7 @@ def _guess(table: Table, channel: str, name: str) -> Guess:
         values = np.zeros(0)
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
     large = {"t": (1e8, "unix")} | WORDS["large"]
-    limit, unit = large.get(channel, large.get(quantity, (np.inf, "")))
+    limit, unit = large.get(channel) or large.get(quantity) or (np.inf, "")
     if largest <= limit:
         unit = next(iter(UNITS[quantity]))
     return Guess(

@@ -47,7 +47,7 @@ def find_outliers(
             f"{t[k + 1] - t[k]:g} s, as in {int(fast.sum())} of {fast.size} steps, expected the track of one "
             "ship; likely two ships are in one log: keep the rows of one, or declare the unit of lat and lon"
         )
-    return rows[np.r_[fast, True] & np.r_[True, fast]]
+    return np.asarray(rows[np.r_[fast, True] & np.r_[True, fast]])
 
 
 def check_overlap(series: Series, other: Series, path: Path, column: str) -> None:

@@ -61,7 +61,7 @@ class Instruments:
         ]
         if (clocks := table.get("clock_offsets")) is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
-        return cls(*at.values(), *offsets, clocks)
+        return cls(at["forward"], at["starboard"], offsets[0], offsets[1], clocks)
 
 
 NO_OFFSETS = Instruments()

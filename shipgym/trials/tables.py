@@ -27,13 +27,15 @@ _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f
 _FIRST_NUMERIC = 6  # class of a matrix
 
 
-def read_log(path: str | Path) -> Table:
+def read_log(path: str | Path | Table) -> Table:
     """The table in a file, whose kind its ending says; without one of these it is CSV, or NMEA 0183.
 
     Excel: the first sheet, names of columns in its first row; MATLAB: its numeric vectors of one length.
     Raises InputError for a file that is missing, too large, damaged or of no such kind, and where the library
     for it is not installed.
     """
+    if isinstance(path, Table):
+        return path
     path = Path(path)
     read = _READERS.get(path.suffix.lower())
     if read is not None:
@@ -54,7 +56,7 @@ def _table(
     return Table(path, tuple(columns), columns.__getitem__, rows, words, **more)
 
 
-def from_frame(frame: Any, name: str | Path, first: int = 0) -> Table:
+def from_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> Table:
     """The table in a pandas frame; an index that is no plain count of rows is a column."""
     if not hasattr(frame, "columns") or not hasattr(frame, "index"):
         raise InputError(f"{name}: a {type(frame).__name__} found, expected a pandas DataFrame")
@@ -151,7 +153,7 @@ def _read_matlab(path: Path) -> Table:
             if kind != _MATRIX or len(parts) < 4 or parts[3][0] not in _NUMBERS:
                 continue
             (_, flags), (_, shape), (_, name), (number, values) = parts
-            array = np.frombuffer(values, np.dtype(_NUMBERS[number]).newbyteorder(order))
+            array = np.frombuffer(values, f"{order}{_NUMBERS[number]}")
             sizes = np.frombuffer(shape, f"{order}i4")
             numeric = struct.unpack(f"{order}I", flags[:4])[0] & 0xFF >= _FIRST_NUMERIC
             if numeric and np.count_nonzero(sizes != 1) == 1 and sizes.max() == array.size:

@@ -206,7 +206,7 @@ class Trial:
     @classmethod
     def from_csv(
         cls,
-        path: str | Path,
+        path: str | Path | Table,
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         rudder_positive: str = "starboard",
         velocity_frame: str = "body",
@@ -222,19 +222,17 @@ class Trial:
     ) -> Trial:
         """Read a trial from a log and convert it to SI units and the project's signs.
 
-        The file is CSV, NMEA 0183, Excel (.xlsx), Parquet or MATLAB (.mat). Channels that follow from others
-        are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from ``sog`` and ``cog``, else from
-        position, and ``psi``; ``x`` and ``y`` from ``lat`` and ``lon``; ``psi`` from ``r`` where there is no
-        position (relative to the start). ``stw``, speed through the water, is taken for ``u``.
+        Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
+        ``sog`` and ``cog``, else from position; ``psi`` from ``r`` where there is no position (relative to
+        the start). ``lat`` and ``lon`` become ``x`` and ``y``; ``stw``, speed through the water, is ``u``.
 
         Parameters
         ----------
         path : str or Path
-            The file: one header line; CSV with comma, semicolon or tab, in UTF-8 or Latin-1.
+            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB (.mat).
         columns : mapping of str to str or mapping, optional
             For each channel (``t`` included) its column, or ``{"column": name, "unit": unit}``. By default
-            every column that is named like a channel, in SI units, ``lat`` and ``lon`` in degrees. Of ``t``
-            also ``"date"``, the column of the date, and ``"zone"``, such as "+02:00".
+            every column that is named like a channel, in SI units. Of ``t`` also ``"date"`` and ``"zone"``.
         rudder_positive : {"starboard", "port"}
             Side to which a positive rudder angle of the file steers.
         velocity_frame : {"body", "earth"}
@@ -249,23 +247,20 @@ class Trial:
         name, kind, use, length : optional
             As in :class:`Trial`; the name is the file's by default.
         sensors : mapping, optional
-            The table ``[sensors]`` of a ship file: ``gnss_antenna``, ``heading_offset_deg``,
-            ``rudder_offset_deg``, ``clock_offsets``.
+            The table ``[sensors]`` of a ship file.
 
         Raises
         ------
         InputError
             For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
-        tools = Instruments.from_mapping(sensors or {}, f"{path}: sensors")
-        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, f"{path}:", tools)
-        facts = {
-            "name": Path(path).name if name is None else name,
-            "kind": kind,
-            "use": use,
-            "length": length,
-        }
-        return read_trials([read_log(path)], columns, conventions, **facts)[0]
+        table = read_log(path)
+        tools = Instruments.from_mapping(sensors or {}, f"{table.path}: sensors")
+        conventions = Conventions(
+            rudder_positive, velocity_frame, origin, xg, repair, f"{table.path}:", tools
+        )
+        name = table.path.name if name is None else name
+        return read_trials([table], columns, conventions, name=name, kind=kind, use=use, length=length)[0]
 
     @classmethod
     def from_frame(
@@ -275,11 +270,7 @@ class Trial:
 
         `columns` and the other keywords are those of :meth:`from_csv`. Raises InputError as that does.
         """
-        name = settings.pop("name", None) or "frame"
-        facts = {key: settings.pop(key) for key in ("kind", "use", "length") if key in settings}
-        tools = Instruments.from_mapping(settings.pop("sensors", None) or {}, f"{name}: sensors")
-        conventions = Conventions(**settings, where=f"{name}:", instruments=tools)
-        return read_trials([from_frame(frame, name)], columns, conventions, name=name, **facts)[0]
+        return cls.from_csv(from_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.

@@ -16,14 +16,8 @@ from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
-from shipgym.trials.navigation import (
-    NO_OFFSETS,
-    Instruments,
-    correct_offsets,
-    local_metres,
-    rotate_to_body,
-    to_midship,
-)
+from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
+from shipgym.trials.navigation import rotate_to_body as rotate_to_body
 from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
 from shipgym.trials.resampling import Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
