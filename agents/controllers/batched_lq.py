@@ -8,12 +8,10 @@ chapter 3 (cross terms).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.linear_loop import ERROR, INTEGRAL, RUDDER
+from shipgym.arrays import Floats
 from shipgym.tasks.steering import RUDDER_WEIGHT
-
-Floats = NDArray[np.float64]
 
 DOUBLINGS = 40  # each doubles the horizon
 ACCURACY = 1e-13

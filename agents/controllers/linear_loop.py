@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise, nomoto_of, straight_running
 from shipgym.tasks.steering import RATE_WEIGHT
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 SIGNALS = ("sway", "yaw_rate", "heading_error", "rudder", "heading_error_integral")

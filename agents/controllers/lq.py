@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import (
@@ -24,12 +23,11 @@ from agents.controllers.linear_loop import (
     rate_weight,
     sample_ship,
 )
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.ships import ShipModel
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import Margins
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,14 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import Policy
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, course_keeping_task, observation_scales
-
-Floats = NDArray[np.float64]
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory

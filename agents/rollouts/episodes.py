@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
+from shipgym.arrays import Floats
 from shipgym.envs.episode import Episode
 from shipgym.envs.recording import SUCCESS, plain
-
-Floats = NDArray[np.float64]
 
 SAMPLES = 300  # of a history at most
 

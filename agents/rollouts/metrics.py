@@ -19,12 +19,12 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
+from shipgym.arrays import Floats
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 #: Physical states that `metrics` needs, beside all of `info`.

@@ -6,11 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.envs.episode import Episode
-
-Floats = NDArray[np.float64]
 
 DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known

@@ -12,12 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
 from agents.policies.shield import ShieldState, interventions
+from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 

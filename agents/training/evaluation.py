@@ -14,8 +14,6 @@ from agents.suites.suite import BenchmarkTask
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class HeldOut:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
@@ -37,7 +36,6 @@ from shipgym.trials.ship_file import ShipFile
 if TYPE_CHECKING:
     from agents.agent_file import Agent
 
-Floats = NDArray[np.float64]
 
 FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
 LARGEST_SEED = 2**32

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from identification.report.predictions import RUDDER
+from shipgym.arrays import Floats
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.intervals import LEVELS
 from shipgym.plots import (
@@ -30,7 +30,6 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-Floats = NDArray[np.float64]
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import Criterion, turning_circle, zigzag
 from shipgym.manoeuvres.imo import imo_criteria, imo_manoeuvres
@@ -16,8 +17,6 @@ from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of
 from shipgym.manoeuvres.turning import TURN_DEG
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 ZIGZAG_DEG = (20.0, 20.0)
 ZIGZAG_LENGTHS, TURN_LENGTHS = 25.0, 30.0  # duration of the runs kept, in times to travel one ship length

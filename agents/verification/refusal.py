@@ -14,8 +14,6 @@ from shipgym.ships import ShipModel
 from shipgym.ships.linear import steering_state_space
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 DRAWS = 60  # models drawn that a sign has to have to be significant,
 SIGNIFICANT = 0.975  # in this share of them
 MOST_LOST = 0.05  # share of the models drawn that an autopilot may lose control of

@@ -20,7 +20,6 @@ from shipgym.trials.trial import Trial
 if TYPE_CHECKING:
     from agents.agent_file import Agent
 
-Floats = NDArray[np.float64]
 
 STEP_DEG = 20.0
 

@@ -15,19 +15,18 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.table import Table
 
 from identification.regression.samples import Samples, build_samples
 from identification.text import as_text
 from identification.validation.guard import hard_turn_features
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
 from shipgym.ships import ShipModel, Structure
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Manoeuvre = Callable[[ShipModel], Trial]
 
 CRITERIA = ("c", "D", "E")

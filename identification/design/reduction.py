@@ -12,18 +12,17 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from rich.table import Table
 
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
 from identification.text import as_text
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships import ShipModel, Structure
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 FOLDS = 5
 COLLINEAR = 0.98  # correlation of a pair, and multiple correlation of a group

@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import clone
 
 from identification.estimators.estimator import Estimator
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 class Adapted:

@@ -13,12 +13,11 @@ from sklearn.base import clone
 from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
 from identification.regression.samples import Samples, build_samples
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships import Structure, get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,15 +6,14 @@ import warnings
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.estimators.decomposition import centre_and_scale
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import MAD
+from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 ITERATIONS = 20_000
 

@@ -13,13 +13,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from identification.estimators.threads import single_threaded
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 CONSTANT = 100 * np.finfo(float).eps  # of its size; a feature that varies less is constant but for rounding
 BLOCK = 32  # columns that LAPACK handles at once

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Protocol, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.regression.samples import Samples
+from shipgym.arrays import Floats
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 
 class Estimator(Protocol):

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.estimators.decomposition import decompose
 from identification.estimators.estimator import FitTask
@@ -14,10 +13,9 @@ from identification.estimators.tuned import TunedLSSVM
 from identification.regression.coefficients import with_accelerations
 from identification.search import get_optimiser
 from identification.validation.prediction import predict
+from shipgym.arrays import Floats
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 COMPARED = ("u", "v", "r")
 RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away

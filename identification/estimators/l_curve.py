@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtri
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 #: A rank is not taken if its residuals exceed those of full rank by more than chance does at this level.
 SIGNIFICANCE = 0.1

@@ -8,13 +8,12 @@ from numbers import Real
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 #: A dataclass is an estimator of scikit-learn's: its fields are the settings, which `__init__` only stores.
 settings = partial(dataclass, eq=False, repr=False)

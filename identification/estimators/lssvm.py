@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 from sklearn.metrics.pairwise import pairwise_kernels
 from sklearn.utils.validation import check_is_fitted, validate_data
@@ -20,10 +20,9 @@ from identification.estimators.decomposition import Decomposition, centre_and_sc
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import reweighted
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")

@@ -8,7 +8,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.base import clone
 
 from identification.estimators.adapter import without_constant
@@ -24,10 +23,9 @@ from identification.estimators.recursive import (
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:

@@ -16,15 +16,14 @@ from abc import abstractmethod
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.estimators.linear import LinearRegressor, settings
 from identification.estimators.lssvm import LSSVM
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 @settings()

@@ -26,12 +26,11 @@ from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
 from identification.validation.prediction import predict
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 INNER, OUTER = 2.5, 3.0  # of the scale of the residuals; full weight up to the first, least from the second
 LEAST_WEIGHT = 1e-4

@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.lssvm import LSSVM
 from identification.search import get_optimiser
 from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
 from identification.search.search import Optimiser
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 OBJECTIVES = ("k-fold", "training", "free-running")
 LINEAR = (

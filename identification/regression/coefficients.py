@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.ships import ShipModel
-
-Floats = NDArray[np.float64]
 
 
 def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) -> ShipModel:

@@ -9,13 +9,13 @@ estimates with each trial, or each third of one, left out (jackknife): it holds 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from identification.regression.wind import accelerations
 from shipgym.arrays import Floats
+from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.trial import Trial
 from shipgym.trials.trial_import import rotate_to_body
@@ -34,8 +34,7 @@ ROUNDS, ENOUGH, DIFFERENCE = 20, 1e-3, 1e-4  # of Levenberg-Marquardt; its end; 
 SMALLEST = 0.003  # standard deviation of a residual, by U0
 
 
-@dataclass(frozen=True, eq=False)
-class CurrentEstimate:
+class CurrentEstimate(NamedTuple):
     """The currents of some trials, north and east after each other, and how certain they are."""
 
     mean: Floats  # m/s, shape (2 n_trials,); alike where shared
@@ -48,26 +47,22 @@ def estimate_current(
 ) -> CurrentEstimate:
     """The current of each trial, or of all.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        With psi, r, delta and velocities over ground; n, accelerations by wind and a speed u through the
-        water are used where they are there.
-    length, speed : float
-        Of the ship, m, and in service, m/s.
-    shared : bool
-        Whether all trials have one current.
-    known : array of shape (18,), optional
-        Coefficients of another estimate, which are then not fitted.
+    The trials have psi, r, delta and velocities over ground; n, accelerations by wind and a speed u through
+    the water are used where they are there. `length`, m, and `speed` in service, m/s, are the ship's;
+    `known`, shape (18,), are coefficients of another estimate, which are then not fitted.
     """
     runs = _Runs(trials, length, speed, shared, known)
     x, slopes, residuals = runs.fitted()
     J = slopes.reshape(-1, len(x))
     information = J.T @ J + np.diag(runs.weights**2)
-    blocks = list(runs.blocks(slopes, residuals, by_trial=shared and len(trials) > 2))
-    changes = [np.linalg.solve(information - own.T @ own, own.T @ left) for own, left in blocks]
+    parts = 1 if shared and len(trials) > 2 else 3
+    changes = []
+    for k in range(len(trials)):
+        for rows in np.array_split(np.flatnonzero(np.isfinite(runs.seen[:, 0, k])), parts):
+            own, left = slopes[rows, :, k].reshape(-1, len(x)), residuals[rows, :, k].ravel()
+            changes.append(np.linalg.solve(information - own.T @ own, own.T @ left))
     left_out = np.cov(np.transpose(changes)) * (len(changes) - 1) ** 2 / len(changes)
-    columns = np.array([runs.current_column(k, i) for k in range(len(trials)) for i in (0, 1)])
+    columns = runs.columns.ravel()
     joint = (left_out + np.linalg.inv(information))[np.ix_(columns, columns)]
     return CurrentEstimate(speed * x[columns], speed**2 * joint, x[:COEFFICIENTS])
 
@@ -100,16 +95,15 @@ class _Runs:
         self, trials: Sequence[Trial], length: float, speed: float, shared: bool, known: Floats | None
     ) -> None:
         travel = length / speed
-        self.count, self.shared = len(trials), shared
         shafts = [trial["n"][0] for trial in trials if "n" in trial and trial["n"][0] > 0.0]
         shaft = float(np.median(shafts)) if len(shafts) == len(trials) else None
         self.windows = max(int(trial.duration / (STEP * STEPS * travel)) for trial in trials)
         grid = np.arange(self.windows * STEPS + 1) * STEP
         self.measured = np.empty((len(grid), 5, 1, len(trials)))
-        self.psi, self.valid = np.empty((2, len(grid), len(trials)))
+        self.psi = np.empty((len(grid), len(trials)))
         seen = np.full((len(grid), 3, len(trials)), np.nan)
         for k, trial in enumerate(trials):
-            wind = accelerations(trial)[:2] * travel / speed
+            wind = wind_accelerations(trial).T[:2] * travel / speed
             n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
             ahead, aside = over_ground(trial)
             c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
@@ -122,8 +116,11 @@ class _Runs:
             self.measured[:, :, 0, k], self.psi[:, k] = on_grid[:5].T, on_grid[5]
             seen[:, :, k] = np.where(grid <= times[-1], on_grid[6:], np.nan).T
         self.seen = self.averaged(seen)
-        self.n_currents = 2 if shared else 2 * len(trials)
-        deviations = [np.ones(COEFFICIENTS), np.tile(START, len(trials)), np.full(self.n_currents, CURRENT)]
+        # where the currents of the trials stand among the unknowns, shape (n_trials, 2)
+        self.columns = COEFFICIENTS + 2 * len(trials) + np.arange(2 * len(trials)).reshape(-1, 2)
+        self.columns = np.repeat(self.columns[:1], len(trials), axis=0) if shared else self.columns
+        of_current = np.full(2 if shared else 2 * len(trials), CURRENT)
+        deviations = [np.ones(COEFFICIENTS), np.tile(START, len(trials)), of_current]
         self.weights = 1.0 / np.concatenate(deviations)
         self.centre = np.zeros(len(self.weights))
         if known is not None:
@@ -134,10 +131,6 @@ class _Runs:
         means: Floats = values[:-1].reshape(self.windows, STEPS, *values.shape[1:]).mean(axis=1)
         return means
 
-    def current_column(self, trial: int, component: int) -> int:
-        """Place of a component of a trial's current among the unknowns."""
-        return int(COEFFICIENTS + 2 * self.count + component + (0 if self.shared else 2 * trial))
-
     def at(self, x: Floats) -> tuple[Floats, Floats]:
         """What is measured less what is simulated, and the slopes of the latter by the unknowns.
 
@@ -147,7 +140,7 @@ class _Runs:
         moves, lanes = np.arange(COEFFICIENTS), COEFFICIENTS + 3
         c = np.repeat((PRIOR[0] + x[:COEFFICIENTS] * PRIOR[1])[:, None, None], lanes, axis=1)
         c[moves, moves + 1] += DIFFERENCE * PRIOR[1][:, None]
-        start = x[COEFFICIENTS : COEFFICIENTS + 2 * self.count].reshape(-1, 2).T[:, None]
+        start = x[COEFFICIENTS : self.columns[0, 0]].reshape(-1, 2).T[:, None]
         u, v = np.repeat(start, lanes, axis=1)
         u, v = u + self.measured[0, 2], v.copy()
         u[-2] += DIFFERENCE
@@ -167,12 +160,10 @@ class _Runs:
         steps = np.moveaxis(simulated[:, :, 1:] - simulated[:, :, :1], 2, 3) / DIFFERENCE
         slopes[..., :COEFFICIENTS] = steps[..., :COEFFICIENTS]
         found = simulated[:, :, 0]
-        for k in range(self.count):
-            for i in (0, 1):
-                slopes[:, :, k, COEFFICIENTS + 2 * k + i] = steps[:, :, k, COEFFICIENTS + i]
-                column = self.current_column(k, i)
-                slopes[:, i, k, column] = 1.0
-                found[:, i, k] += x[column]
+        found[:, :2] += x[self.columns].T
+        for k, own in enumerate(self.columns):
+            slopes[:, :, k, COEFFICIENTS + 2 * k : COEFFICIENTS + 2 * k + 2] = steps[:, :, k, COEFFICIENTS:]
+            slopes[:, [0, 1], k, own] = 1.0
         missing = ~np.isfinite(self.seen)
         slopes[missing] = 0.0
         return np.where(missing, 0.0, self.seen - found), slopes
@@ -200,10 +191,3 @@ class _Runs:
             if abs(before - after) < ENOUGH * before:
                 break
         return x, slopes / scale, residuals / scale
-
-    def blocks(self, slopes: Floats, residuals: Floats, by_trial: bool) -> Iterator[tuple[Floats, Floats]]:
-        """Slopes and residuals of each trial, or of each third of each."""
-        for k in range(self.count):
-            rows = np.flatnonzero(np.isfinite(self.seen[:, 0, k]))
-            for part in [rows] if by_trial else np.array_split(rows, 3):
-                yield slopes[part, :, k].reshape(-1, slopes.shape[-1]), residuals[part, :, k].ravel()

@@ -18,6 +18,7 @@ from scipy.interpolate import CubicSpline
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import on_one_thread
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, get_structure
@@ -25,8 +26,6 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)

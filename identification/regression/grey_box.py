@@ -7,19 +7,17 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import AUTO, check_alike, select_reference
 from identification.validation.prediction import predict, trial_metrics
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel, Structure, grey_box
 from shipgym.ships.particulars import Particulars
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 
 class _Widened:

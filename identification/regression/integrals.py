@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 
 from identification.regression.rudder import Rudder
+from shipgym.arrays import Floats
 
-Floats = NDArray[np.float64]
 Channels = Mapping[str, Floats]
 #: The terms of an equation, an array of shape (n_samples, n_terms), from the channels at some times.
 Terms = Callable[[str, Channels], Floats]

@@ -16,10 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
 
 from identification.regression.preprocess import is_noisy
+from shipgym.arrays import Floats
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order

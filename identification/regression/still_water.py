@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from identification.regression.current import CurrentEstimate, estimate_current, over_ground
-from identification.regression.wind import ACCELERATIONS, measured_wind
+from identification.regression.current import estimate_current, over_ground
+from identification.regression.wind import measured_wind
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_choice, check_keys, check_number
 from shipgym.errors import InputError
@@ -45,37 +45,35 @@ def in_still_water(
     if isinstance(options.current, str):
         check_choice(options.current, OPTIONS["current"].choices, "current")
     ship = Particulars.from_mapping(particulars) if isinstance(particulars, Mapping) else particulars
-    used = [trial for trial in trials if trial.use != "skip" and trial.kind != "captive"]
     if ship is None:
         return list(trials), {}
+    used = {trial.name: trial for trial in trials if trial.use != "skip" and trial.kind != "captive"}
     remarks: list[str] = []
     found = _with_wind(used, ship, options.wind, remarks)
-    windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if ACCELERATIONS[0] in t}
+    windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if "wind_udot" in t}
     report: dict[str, Any] = {"wind": {"option": options.wind, "mean_speeds": windy}} if windy else {}
     starts = [np.hypot(*over_ground(t))[0] for t in found.values() if {"u", "v"} <= t.channels.keys()]
     speed = ship.speed or float(np.median(starts or [0.0]))
     if options.current != "none" and speed > 0.0:
-        currents = _take_out_known(found, speed, options.current)
-        currents |= _take_out_estimated(found, ship.length, speed, options.current, remarks)
-        report |= {"currents": currents} if currents else {}
-    report |= {"sea_remarks": remarks} if remarks else {}
-    return [found.get(trial.name, trial) for trial in trials], report
+        report["currents"] = _take_out_current(found, ship.length, speed, options.current, remarks)
+    report["sea_remarks"] = remarks
+    return [found.get(t.name, t) for t in trials], {name: part for name, part in report.items() if part}
 
 
 def _with_wind(
-    trials: Sequence[Trial], ship: Particulars, option: Any, remarks: list[str]
+    trials: dict[str, Trial], ship: Particulars, option: Any, remarks: list[str]
 ) -> dict[str, Trial]:
     """The trials by name, with the accelerations by their wind."""
-    found = {trial.name: trial for trial in trials}
     if option in ("none", "constant"):
-        return found
+        return dict(trials)
     try:
-        found = {trial.name: measured_wind(trial, ship, option) for trial in trials}
+        found = {name: measured_wind(trial, ship, option) for name, trial in trials.items()}
     except InputError as error:
         if option != "auto":
             raise
         remarks.append(f"the wind that was logged is not taken out: {error}")
-    if option != "auto" and not any(ACCELERATIONS[0] in trial for trial in found.values()):
+        return dict(trials)
+    if option != "auto" and not any("wind_udot" in trial for trial in found.values()):
         raise InputError(
             f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u "
             'and v; name them in [columns], or take wind = "constant"'
@@ -83,55 +81,78 @@ def _with_wind(
     return found
 
 
-def _take_out_known(found: dict[str, Trial], speed: float, option: Any) -> dict[str, Any]:
-    """Take currents in columns, and one that is given, out of trials by name; each in words and numbers."""
-    currents = {}
-    for trial in found.values():
-        known = _known(trial, option)
-        if known is None:
-            continue
-        mean = np.array([np.mean(part) for part in known])
-        if np.hypot(*mean) > speed:
-            raise InputError(
-                f"trial {trial.name!r}: a current of {np.hypot(*mean):.2g} m/s found, expected less than the "
-                f"ship's speed of {speed:.3g} m/s; give it in m/s, towards north and east"
-            )
-        found[trial.name] = through_water(trial, *known)
-        source = "columns" if COLUMNS[0] in trial else "given"
-        currents[trial.name] = _row(mean, None) | {"source": source}
-    return currents
-
-
-def _take_out_estimated(
+def _take_out_current(
     found: dict[str, Trial], length: float, speed: float, option: Any, remarks: list[str]
 ) -> dict[str, Any]:
-    """Take estimated currents out of the trials whose velocities are still over ground."""
-    shortest = SHORTEST * length / speed
-    unknown = [
-        trial
-        for trial in found.values()
-        if trial.over_ground and trial.channels.keys() >= NEEDED and trial.duration > shortest
-    ]
-    headings = [trial["psi"] for trial in unknown if trial.use == "fit"]
-    one_heading = bool(headings) and abs(np.exp(1j * np.concatenate(headings)).mean()) > ONE_HEADING
-    currents: dict[str, Any] = {}
+    """Take the current out of trials, by name, where it is known or asked for; what is known of each."""
+    open_ = [t for t in found.values() if t.over_ground and t.use == "fit" and "psi" in t]
+    one_heading = open_ and abs(np.exp(1j * np.concatenate([t["psi"] for t in open_])).mean()) > ONE_HEADING
+    rows: dict[str, Any] = {}
     doubts: dict[str, list[str]] = {}
-    for trial, mean, covariance, source in _estimates(unknown, length, speed, option):
-        row = _row(mean, covariance) | {"source": source}
-        doubt = "the trials keep to one heading" if one_heading else _doubt(mean, covariance, speed)
-        if doubt and option != "auto":
-            raise InputError(f"trial {trial.name!r}: its current cannot be told: {doubt}; {REMEDY}")
-        row["taken_out"] = not doubt and (option != "auto" or row["probability"] < SIGNIFICANT)
+    for trial, current, covariance, source in _currents(list(found.values()), length, speed, option):
+        mean = np.reshape(current, (2, -1)).mean(axis=1)
+        row: dict[str, Any] = {
+            "north": float(mean[0]),
+            "east": float(mean[1]),
+            "source": source,
+            "taken_out": True,
+        }
+        doubt = ""
+        if covariance is not None:
+            errors = np.sqrt(np.diag(covariance))
+            row |= {"standard_errors": errors.tolist(), "probability": _probability(mean, covariance)}
+            if one_heading or errors.max() > UNCERTAIN * speed:
+                keep = "the trials keep to one heading"
+                doubt = keep if one_heading else f"its standard error is {errors.max():.2g} m/s"
+        if not doubt and np.hypot(*mean) > speed:
+            doubt = f"{np.hypot(*mean):.2g} m/s found, expected less than the ship's speed of {speed:.3g} m/s"
+        if doubt and (option != "auto" or covariance is None):
+            remedy = "give it in m/s, towards north and east" if covariance is None else REMEDY
+            raise InputError(f"trial {trial.name!r}: no current can be taken out: {doubt}; {remedy}")
         if doubt:
             doubts.setdefault(doubt, []).append(PurePath(trial.name).name)
-        if row["taken_out"]:
-            found[trial.name] = through_water(trial, *mean)
-        currents[trial.name] = row
+        if doubt or (option == "auto" and row.get("probability", 0.0) > SIGNIFICANT):
+            row["taken_out"] = False
+        else:
+            found[trial.name] = through_water(trial, *current)
+        rows[trial.name] = row
     remarks += [
-        f"{', '.join(names)}: the current cannot be told and is not taken out: {doubt}; {REMEDY}"
-        for doubt, names in doubts.items()
+        f"{', '.join(names)}: no current is taken out: {text}; {REMEDY}" for text, names in doubts.items()
     ]
-    return currents
+    return rows
+
+
+def _currents(
+    trials: Sequence[Trial], length: float, speed: float, option: Any
+) -> Iterator[tuple[Trial, Floats, Floats | None, str]]:
+    """Each trial whose current is known or can be estimated, with it, its covariance and its source.
+
+    The trials to fit have one current unless they contradict it or are asked one by one. That of a trial held
+    out is theirs, or is found by their coefficients.
+    """
+    unknown = []
+    for trial in trials:
+        known = _known(trial, option)
+        if known is not None:
+            yield trial, known, None, "columns" if COLUMNS[0] in trial else "given"
+        elif trial.over_ground and trial.channels.keys() >= NEEDED:
+            unknown += [trial] * (trial.duration > SHORTEST * length / speed)
+    fitted = [trial for trial in unknown if trial.use == "fit"]
+    if not fitted:
+        return
+    shared = option != "trial"
+    found = estimate_current(fitted, length, speed, shared)
+    if option == "auto" and len(fitted) > 1:
+        each = estimate_current(fitted, length, speed, False)
+        apart = np.kron(np.eye(len(fitted))[1:] - np.eye(len(fitted))[0], np.eye(2))
+        if _probability(apart @ each.mean, apart @ each.covariance @ apart.T) < APART:
+            found, shared = each, False
+    for trial in unknown:
+        own, k = found, 0 if shared or trial.use != "fit" else 2 * fitted.index(trial)
+        if not shared and trial.use != "fit":
+            own = estimate_current([trial], length, speed, True, found.coefficients)
+        part = slice(k, k + 2)
+        yield trial, own.mean[part], own.covariance[part, part], "all trials" if shared else "trial"
 
 
 def _known(trial: Trial, option: Any) -> Floats | None:
@@ -139,13 +160,12 @@ def _known(trial: Trial, option: Any) -> Floats | None:
     given = None
     if isinstance(option, Mapping):
         check_keys(option, ("north", "east"), "current", ("north", "east"))
-        parts = (check_number(option[name], f"current {name}", hint="in m/s") for name in ("north", "east"))
-        given = np.array([*parts])
+        given = np.array([check_number(option[k], f"current {k}", hint="in m/s") for k in ("north", "east")])
     if not trial.channels.keys() >= set(COLUMNS):
         return given if trial.over_ground else None
     columns = np.array([trial[name] for name in COLUMNS])
-    if given is not None and np.hypot(*(columns.mean(axis=1) - given)) > CONTRADICTION:
-        north, east = columns.mean(axis=1)
+    north, east = columns.mean(axis=1)
+    if given is not None and np.hypot(north - given[0], east - given[1]) > CONTRADICTION:
         raise InputError(
             f"trial {trial.name!r}: columns current_north and current_east have means of {north:.2f} and "
             f"{east:.2f} m/s, current = {{ north = {given[0]:g}, east = {given[1]:g} }} was given, expected "
@@ -154,68 +174,9 @@ def _known(trial: Trial, option: Any) -> Floats | None:
     return columns
 
 
-def _estimates(
-    trials: Sequence[Trial], length: float, speed: float, option: str
-) -> Iterator[tuple[Trial, Floats, Floats, str]]:
-    """Each trial with its current, the covariance of it and whose it is.
-
-    The trials to fit have one current unless they contradict it or are asked one by one. That of a trial held
-    out is theirs, or is found by their coefficients.
-    """
-    fitted = [trial for trial in trials if trial.use == "fit"]
-    if not fitted:
-        return
-    found = estimate_current(fitted, length, speed, shared=option != "trial")
-    shared = option != "trial"
-    if option == "auto" and len(fitted) > 1:
-        each = estimate_current(fitted, length, speed, shared=False)
-        if _probability_of_one(each) < APART:
-            found, shared = each, False
-    held_out = [trial for trial in trials if trial.use != "fit"]
-    for k, trial in enumerate(fitted):
-        own = slice(2 * k, 2 * k + 2)
-        yield trial, found.mean[own], found.covariance[own, own], "all trials" if shared else "trial"
-    for trial in held_out:
-        last = found if shared else estimate_current([trial], length, speed, True, found.coefficients)
-        yield trial, last.mean[:2], last.covariance[:2, :2], "all trials" if shared else "trial"
-
-
-def _probability_of_one(each: CurrentEstimate) -> float:
-    """Probability that currents of trials differ so much though they are one (Wald's test)."""
-    count = len(each.mean) // 2
-    differences = np.kron(np.eye(count)[1:] - np.eye(count)[0], np.eye(2))
-    return _probability(differences @ each.mean, differences @ each.covariance @ differences.T)
-
-
 def _probability(mean: Floats, covariance: Floats) -> float:
-    """Probability of values as far from zero by chance."""
+    """Probability of values as far from zero by chance (Wald's test)."""
     return float(chi2.sf(mean @ np.linalg.solve(covariance, mean), len(mean)))
-
-
-def _row(mean: Floats, covariance: Floats | None) -> dict[str, Any]:
-    """What the provenance tells of a current; towards in degrees."""
-    row = {
-        "north": float(mean[0]),
-        "east": float(mean[1]),
-        "speed": float(np.hypot(*mean)),
-        "towards": float(np.degrees(np.arctan2(mean[1], mean[0])) % 360.0),
-        "taken_out": True,
-    }
-    if covariance is None:
-        return row
-    errors = np.sqrt(np.diag(covariance)).tolist()
-    return row | {"standard_errors": errors, "probability": _probability(mean, covariance)}
-
-
-def _doubt(mean: Floats, covariance: Floats, speed: float) -> str:
-    """Why an estimated current cannot be trusted; empty where it can."""
-    variances, axes = np.linalg.eigh(covariance)
-    if np.sqrt(variances[-1]) > UNCERTAIN * speed:
-        axis = float(np.degrees(np.arctan2(axes[1, -1], axes[0, -1])) % 180.0)
-        return f"its standard error along {axis:03.0f} deg is {np.sqrt(variances[-1]):.2g} m/s"
-    if np.hypot(*mean) > speed:
-        return f"{np.hypot(*mean):.2g} m/s is found, more than the ship's speed of {speed:.3g} m/s"
-    return ""
 
 
 def through_water(trial: Trial, north: Any, east: Any) -> Trial:

@@ -8,83 +8,51 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
-from shipgym.arrays import Floats
 from shipgym.checks import check_flag, check_keys
 from shipgym.errors import InputError
-from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.sea.wind_tables import WindTable
-from shipgym.ships import ShipModel, get_structure
+from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.simulate import WIND
 from shipgym.trials.trial import Trial
 from shipgym.trials.trial_import import rotate_to_body
 
-ACCELERATIONS = ("wind_udot", "wind_vdot", "wind_rdot")
 COLLINEAR = 1e-6  # share of a constant that no term explains, below which the structure has one itself
 
 
 def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[str, Any]) -> Trial:
     """The trial with the accelerations by the wind of its columns; itself where it has none.
 
-    Parameters
-    ----------
-    trial : Trial
-        With wind_speed and wind_from, psi, u and v; those through the water with a current in columns, if
-        known.
-    particulars : Particulars
-        From which areas and inertia are estimated where they do not tell them.
-    option : str or mapping
-        Coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or as a table of them,
-        and ``relative``: whether speed and direction are those felt on board, the latter from the bow.
-
-    Raises
-    ------
-    InputError
-        For particulars from which no areas follow, and for an option that is not known.
+    `option`: coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or a table
+    themselves, and ``relative``: whether speed and direction are those felt on board, the latter from the
+    bow. Velocities through the water are completed by a current in columns. Raises InputError for particulars
+    from which no areas follow, and for an option that is not known.
     """
     table = dict(option) if isinstance(option, Mapping) else {"coefficients": option}
     check_keys(table, ("coefficients", "relative"), "wind")
     if not {"wind_speed", "wind_from", "psi", "u", "v"} <= trial.channels.keys():
         return trial
-    coefficients = table.get("coefficients", "auto")
-    if isinstance(coefficients, Mapping):
-        coefficients = WindTable.from_dict(coefficients, "wind coefficients")
-    curves = wind_curves(particulars, "blendermann" if coefficients == "auto" else coefficients)
+    named = table.get("coefficients", "auto")
+    named = WindTable.from_dict(named, "wind coefficients") if isinstance(named, Mapping) else named
+    curves = wind_curves(particulars, "blendermann" if named == "auto" else named)
     speed, angle = trial["wind_speed"], trial["wind_from"]
-    ahead, aside = speed * np.cos(angle), speed * np.sin(angle)
+    air = (
+        speed * np.cos(angle),
+        speed * np.sin(angle),
+    )  # where it comes from, north and east, or ahead and aside
     if not check_flag(table.get("relative", False), "wind relative"):
-        ahead, aside = rotate_to_body(ahead, aside, trial["psi"])
-        ahead, aside = ahead + trial["u"], aside + trial["v"]
         if not trial.over_ground and {"current_north", "current_east"} <= trial.channels.keys():
-            drift = rotate_to_body(trial["current_north"], trial["current_east"], trial["psi"])
-            ahead, aside = ahead + drift[0], aside + drift[1]
-    pressure, angle = 0.5 * AIR_DENSITY * (ahead**2 + aside**2), np.arctan2(aside, ahead)
-    forces = [
-        pressure * np.interp(angle, curves.angle, row, period=2.0 * np.pi)
-        for row in (curves.X, curves.Y, curves.N)
-    ]
-    forces[0] = forces[0] - 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2  # hers in still air
-    return trial.with_channels(dict(zip(ACCELERATIONS, _mobility(particulars) @ forces, strict=True)))
-
-
-def accelerations(trial: Trial) -> Floats:
-    """Those in surge, sway and yaw by the wind of a trial, shape (3, n_samples)."""
-    return np.array([trial[name] if name in trial else np.zeros(len(trial)) for name in ACCELERATIONS])
-
-
-def _mobility(particulars: Particulars) -> Floats:
-    """Inverse inertia in surge, sway and yaw, shape (3, 3)."""
-    names = get_structure("abkowitz").coefficient_names
-    ship = ShipModel(
-        name=particulars.name,
-        structure="abkowitz",
-        particulars=particulars.completed(),
-        steering=SteeringGear(),
-        coefficients=dict.fromkeys(names, 0.0),
-    )
-    return mobility_matrix(ship)[:3, :3]
+            air = air[0] + trial["current_north"], air[1] + trial["current_east"]
+        ahead, aside = rotate_to_body(*air, trial["psi"])
+        air = ahead + trial["u"], aside + trial["v"]
+    pressure, angle = 0.5 * AIR_DENSITY * (air[0] ** 2 + air[1] ** 2), np.arctan2(air[1], air[0])
+    rows = (np.interp(angle, curves.angle, row, period=2.0 * np.pi) for row in (curves.X, curves.Y, curves.N))
+    forces = pressure * np.array([*rows])
+    forces[0] -= 0.5 * AIR_DENSITY * curves.X[0] * trial["u"] ** 2  # hers in still air
+    found = np.linalg.solve(particulars_inertia(particulars.completed())[:, :3], forces)
+    return trial.with_channels(dict(zip(WIND.values(), found, strict=True)))
 
 
 def constant_wind(trials: Sequence[Trial], samples: Samples, structure: str) -> dict[str, dict[str, float]]:
@@ -107,13 +75,11 @@ def constant_wind(trials: Sequence[Trial], samples: Samples, structure: str) -> 
         if np.linalg.norm(left) < COLLINEAR * np.linalg.norm(samples.duration):
             values = values - values.mean()
         for trial, value in zip(trials, values.tolist(), strict=True):
-            found[trial.name][f"wind_{q}dot"] = value
+            found[trial.name][WIND[q]] = value
     return found
 
 
 def with_constant_wind(trial: Trial, constants: Mapping[str, Mapping[str, float]]) -> Trial:
     """The trial with its constants of all, by name; itself where it has none."""
-    own = constants.get(trial.name)
-    if own is None:
-        return trial
-    return trial.with_channels({name: np.full(len(trial), value) for name, value in own.items()})
+    own = {name: np.full(len(trial), value) for name, value in constants.get(trial.name, {}).items()}
+    return trial.with_channels(own) if own else trial

@@ -13,6 +13,7 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
 from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
+from shipgym.arrays import Floats
 from shipgym.plots import (
     LIMIT,
     MEASURED,
@@ -32,8 +33,6 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-
-Floats = NDArray[np.float64]
 
 EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}

@@ -17,12 +17,7 @@ if TYPE_CHECKING:
 
 KNOT = 1852.0 / 3600.0
 NORMAL_95 = 1.96
-SOURCES = {
-    "all trials": "one of all trials",
-    "trial": "its own",
-    "given": "as given",
-    "columns": "of its columns",
-}
+SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
@@ -34,35 +29,30 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
     wind = provenance.get("wind", {})
     if "mean_speeds" in wind:
         speeds = wind["mean_speeds"].values()
-        name = "blendermann" if wind["option"] == "auto" else wind["option"]
-        name = name.get("coefficients", "blendermann") if isinstance(name, Mapping) else name
-        name = "a table of coefficients" if isinstance(name, Mapping) else f"{name} coefficients"
         found.append(
-            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces by {name} taken out"
+            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces are taken out"
         )
     for name, row in wind.get("accelerations", {}).items():
         parts = [
-            f"{'sway' if 'v' in axis else 'yaw'} {value:.2g} {'m/s²' if 'v' in axis else 'rad/s²'}"
-            for axis, value in row.items()
+            f"{axis[5]}dot {value:.2g} {'m' if axis[5] == 'v' else 'rad'}/s²" for axis, value in row.items()
         ]
         found.append(f"{PurePath(name).name}: constant acceleration taken out, {', '.join(parts)}")
     return found
 
 
 def _current(row: Mapping[str, Any]) -> str:
-    """One current in words."""
-    knots, towards = row["speed"] / KNOT, f"{row['towards']:03.0f} deg"
-    text = f"current of {row['speed']:.2f} m/s ({knots:.2f} knots) towards {towards}"
+    """One current in words: set and drift, interval, and whether there is one."""
+    text = f"current of {_set_and_drift(row)}, {SOURCES[row['source']]}"
     if "standard_errors" in row:
         north, east = (NORMAL_95 * error for error in row["standard_errors"])
-        text += (
-            f" (north {row['north']:.3f} ± {north:.3f}, east {row['east']:.3f} ± {east:.3f} m/s, 95 %), "
-            f"{SOURCES[row['source']]}, which "
-            + ("differs from zero" if row["probability"] < SIGNIFICANT else "does not differ from zero")
-        )
-    else:
-        text += f", {SOURCES[row['source']]}"
+        text += f", north {row['north']:.3f} ± {north:.3f}, east {row['east']:.3f} ± {east:.3f} m/s (95 %)"
+        text += f", which {'differs' if row['probability'] < SIGNIFICANT else 'does not differ'} from zero"
     return text + ("; taken out" if row["taken_out"] else "; left in")
+
+
+def _set_and_drift(row: Mapping[str, Any]) -> str:
+    speed, towards = np.hypot(row["north"], row["east"]), np.degrees(np.arctan2(row["east"], row["north"]))
+    return f"{speed:.2f} m/s ({speed / KNOT:.2f} knots) towards {towards % 360.0:03.0f} deg"
 
 
 def track_figure(fit: Fit) -> Figure | None:
@@ -71,22 +61,18 @@ def track_figure(fit: Fit) -> Figure | None:
     trials = [trial for trial in fit.trials if trial.name in rows and {"x", "y"} <= trial.channels.keys()]
     if not trials:
         return None
-    titles = [
-        f"{PurePath(t.name).name}: {rows[t.name]['speed']:.2f} m/s towards {rows[t.name]['towards']:03.0f}°"
-        for t in trials
-    ]
+    titles = [f"{PurePath(t.name).name}: {_set_and_drift(rows[t.name])}" for t in trials]
     lines, columns = -(-len(trials) // 2), min(len(trials), 2)
     figure = subplots(lines, columns, titles=titles, vertical_spacing=0.36 / max(lines, 2))
     for k, trial in enumerate(trials):
         place, row = {"row": k // 2 + 1, "col": k % 2 + 1}, rows[trial.name]
-        x, y = trial["x"] - trial["x"][0], trial["y"] - trial["y"][0]
-        drift = np.array([row["north"], row["east"]]) * trial.duration
-        over = trial.raw
-        tracks = (
-            (over["y"] - over["y"][0], over["x"] - over["x"][0], "over ground", MEASURED),
-            (y, x, "through the water", MODEL),
-            ([y[-1], y[-1] + drift[1]], [x[-1], x[-1] + drift[0]], "the water meanwhile", LIMIT),
-        )
+        drift = np.array([row["east"], row["north"]]) * trial.duration
+        end = np.array([trial["y"][-1], trial["x"][-1]])
+        tracks: list[tuple[Any, Any, str, str]] = [
+            (trial.raw["y"], trial.raw["x"], "over ground", MEASURED),
+            (trial["y"], trial["x"], "through the water", MODEL),
+            (*np.array([end, end + drift]).T, "the water meanwhile", LIMIT),
+        ]
         for east, north, name, colour in tracks:
             figure.add_trace(line(east, north, name, colour, 1.7, showlegend=k == 0), **place)
         label(

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
+from shipgym.arrays import Floats
 from shipgym.checks import check_whole
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

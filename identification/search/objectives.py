@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

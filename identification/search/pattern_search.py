@@ -9,11 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.search.search import SearchResult
-
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 
 def pattern_search(

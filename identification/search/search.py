@@ -7,11 +7,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
 MOST = 100_000  # particles, rounds and the like of a search

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.simulation_error.formulas import FORMULAS
 from identification.simulation_error.similarity import (
@@ -27,14 +26,13 @@ from identification.simulation_error.similarity import (
     select_reference,
     similarity_vector,
 )
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 from shipgym.ships.mmg import IDENTIFIED, MMG, SHIP, dimensions, standard_form
 from shipgym.ships.particulars import ADDED_MASSES, Particulars
-
-Floats = NDArray[np.float64]
 
 YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)

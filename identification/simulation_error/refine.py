@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from identification.estimators.estimator import FitTask
@@ -31,12 +30,11 @@ from identification.simulation_error.segments import (
 from identification.uncertainty.covariance import newey_west
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 STARTS = ("free", "measured")
 ROUNDS = 3  # of fits, between which scales of the residuals and starts of the segments are renewed

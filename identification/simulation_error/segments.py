@@ -133,7 +133,7 @@ def _segment(
     samples = np.full(len(times), -1)
     samples[np.searchsorted(times, t)] = np.arange(len(t))
     n = np.interp(times, trial.t, trial["n"]) if "n" in trial else np.zeros(len(times))
-    wind = [np.interp(times, trial.t, row) for row in wind_accelerations(model, trial).T]
+    wind = [np.interp(times, trial.t, row) for row in wind_accelerations(trial, model.dynamics).T]
     block = max(int(BLOCK * travel / np.median(np.diff(t))), 1)
     first = np.arange(0, len(t), block)
     return Segment(

@@ -6,15 +6,14 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 from shipgym.ships.particulars import Particulars
-
-Floats = NDArray[np.float64]
 
 GRAVITY = 9.81
 AUTO = "auto"

@@ -14,8 +14,8 @@ from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import on_one_thread
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
+from shipgym.arrays import Floats
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 DRAWS = 200

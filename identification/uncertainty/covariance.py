@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.estimators.estimator import Estimator, weights
 from identification.estimators.threads import on_one_thread
 from identification.regression.samples import Samples
+from shipgym.arrays import Floats
 
-Floats = NDArray[np.float64]
 Estimators = Mapping[str, Estimator]
 
 

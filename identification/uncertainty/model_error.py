@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
@@ -30,7 +29,6 @@ from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indic
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Estimators = dict[str, Estimator]
 Error = tuple[float, float, float]  # squared error, variance over the draws, variance of the measurement
 

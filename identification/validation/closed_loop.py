@@ -9,14 +9,12 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres.execution import reversals, rudder
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 STEP = 0.02  # of the time to sail one ship length
 LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by then is never reached

@@ -13,11 +13,10 @@ from identification.estimators.estimator import Estimator
 from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.structures import Structure
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
 RUDDER_NOISE = 6.0  # neither does one that moves less than this many times its noise,

@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle
 from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
@@ -18,8 +18,6 @@ from shipgym.ships import ShipModel, Structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 #: Rudder angles of the trial manoeuvres, degrees; the first is cut to the rudder's limit.
 RUDDERS_DEG = (35.0, 10.0)

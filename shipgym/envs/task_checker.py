@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
@@ -17,8 +18,6 @@ from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 STEPS, PLAIN_STEPS = 400, 40
 LANES, PLAIN_LANES = 70, 3  # more than a tile

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES, leaves
@@ -17,8 +18,6 @@ from shipgym.envs.randomisation import Pool
 from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
-
-Floats = NDArray[np.float64]
 
 
 def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:

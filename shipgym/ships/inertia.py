@@ -4,6 +4,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
+from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import SharedStructure
 
 
@@ -44,11 +45,16 @@ def _prime_mass(model: ManoeuvringModel) -> float:
 
 def _particulars(model: ManoeuvringModel) -> Floats:
     p = model.particulars.completed()
-    unit, L = _prime_mass(model), p.length
     if isinstance(model.dynamics, SharedStructure):
-        arms = np.array([1.0, 1.0, L])
+        arms = np.array([1.0, 1.0, p.length])
         added = model.dynamics.inertia(model.coefficients, p) * np.outer(arms, arms)
-        return unit * np.hstack([added, np.zeros((3, 1))])
+        return _prime_mass(model) * np.hstack([added, np.zeros((3, 1))])
+    return particulars_inertia(p)
+
+
+def particulars_inertia(p: Particulars) -> Floats:
+    """The same, by the particulars of a ship, which are complete; nothing in roll."""
+    unit, L = 0.5 * p.require("water_density") * p.length**3, p.length
     m, static = p.mass_prime, p.mass_prime * p.xg_prime
     prime = np.zeros((3, 4))
     prime[0, 0] = m - p.require("X_udot")

@@ -1,5 +1,7 @@
 """Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -15,6 +17,7 @@ from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
 LONGEST_STEP = 0.025  # of the time to travel one ship length
+WIND = {"u": "wind_udot", "v": "wind_vdot", "r": "wind_rdot"}  # channels, by equation
 
 
 def simulate(
@@ -60,7 +63,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     states[0] = _settled(model, np.array([first]), n[:1])[0]
     longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
-    wind = wind_accelerations(model, trial)
+    wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
     loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
     reached = loop(states, t, np.array(trial["delta"]), n, wind, longest_step, model.ship_numbers())
@@ -76,11 +79,11 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     )
 
 
-def wind_accelerations(model: ManoeuvringModel, trial: Trial) -> Floats:
-    """Those in surge, sway and yaw that a trial has, of the equations of a model; shape (n_samples, 3)."""
-    own = model.dynamics.equations if isinstance(model.dynamics, Structure) else "uvr"
-    axes = [f"wind_{axis}dot" if axis in own else "" for axis in "uvr"]
-    return np.column_stack([trial[name] if name in trial else np.zeros(len(trial)) for name in axes])
+def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
+    """Those in surge, sway and yaw that a trial has, of a structure's equations; shape (n_samples, 3)."""
+    own = dynamics.equations if isinstance(dynamics, Structure) else "uvr"
+    rows = [trial[name] if axis in own and name in trial else 0.0 * trial.t for axis, name in WIND.items()]
+    return np.column_stack(rows)
 
 
 def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:

@@ -22,7 +22,7 @@ from shipgym.trials.tables import read_log
 from shipgym.trials.trial import KINDS, USES, Trial, read_trials
 from shipgym.trials.trial_import import Conventions
 
-_SECTIONS = ("ship", "steering", "columns", "conventions", "sensors", "identify", "trials")
+_SECTIONS = ("ship", "steering", "columns", "conventions", "sensors", "identify", "wind", "trials")
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
 _TRIAL = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
@@ -74,7 +74,9 @@ class ShipFile:
         steering = (
             SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
         )
-        identify = check_options(data.get("identify", {}), f"{path}: [identify]")
+        given = check_table(data.get("identify", {}), f"{path}: [identify]")
+        given = {**given, "wind": data["wind"]} if "wind" in data else given
+        identify = check_options(given, f"{path}: [identify]")
         data_only(identify, f"{path}: [identify]")
         return cls(path, particulars, steering, identify, _entries(path, data, particulars))
 

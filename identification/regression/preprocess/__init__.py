@@ -4,18 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.regression.preprocess.filters import median, savitzky_golay
 from identification.regression.preprocess.kinematics import smooth_kinematics
 from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
 from identification.regression.preprocess.repair import outliers, repaired
 from identification.regression.preprocess.spline import smooth
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.ndimage import median_filter
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from identification.regression.preprocess.noise import NOISY, noise_ratio
-
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 MEDIAN_WIDTH = 5  # samples
 ORDER = 3  # of the local polynomials

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from identification.regression.preprocess.kalman import Smoothed, smooth_linear
 from identification.regression.preprocess.noise import NOISY, noise_level, noise_ratio
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")

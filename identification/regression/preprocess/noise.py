@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-Floats = NDArray[np.float64]
+from numpy.typing import ArrayLike
 
 #: Noise beyond this part of what a channel changes by from one sample to the next makes it noisy.
 NOISY = 0.02

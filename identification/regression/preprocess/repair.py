@@ -8,11 +8,11 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
 from identification.regression.preprocess.noise import noise_level
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 WIDTH = 7  # samples of the running median

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import solveh_banded
 
 from identification.regression.preprocess.noise import NOISY, noise_ratio
-
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats
 
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
