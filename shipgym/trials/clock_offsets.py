@@ -19,7 +19,7 @@ from shipgym.trials.resampling import Series
 #: Delays that are looked for, s, and the significance, in standard errors, from which one is corrected.
 LONGEST_S, SIGNIFICANT = 10.0, 2.5
 #: By how much ships of other dynamics seem late, s, which the standard errors contain.
-DYNAMICS_S = {"r": 0.15, "delta": 1.0}
+DYNAMICS_S = {"r": 0.25, "delta": 1.0}
 #: Delays of channels on one clock that are refused, s.
 REFUSED_S = {"r": 1.0, "delta": 2.0}
 _WORDS = {"r": ("the yaw rate", "the heading"), "delta": ("the rudder", "the yaw acceleration")}
@@ -98,6 +98,14 @@ def rudder_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
     return clock_offset(t, r, delta, others)
 
 
+def _reverses(values: Floats, least: float = 0.0) -> bool:
+    """Whether a channel goes there and back as in zigzags, three times or more: one step tells no delay."""
+    low, high = np.quantile(values, [0.02, 0.98])
+    far = values - 0.5 * (low + high)
+    far = far[np.abs(far) > 0.25 * (high - low)]
+    return bool(high - low > least and np.count_nonzero(np.diff(np.sign(far))) >= 3)
+
+
 def corrected_clocks(
     t: Floats, values: Mapping[str, Floats], series: Series, choice: str | None, where: str
 ) -> tuple[Series, list[str]]:
@@ -107,9 +115,9 @@ def corrected_clocks(
     left, and more than `REFUSED_S` between them is an InputError. So is a rudder of the wrong sign.
     """
     found: dict[str, ClockOffset | None] = {}
-    if {"psi", "r"} <= values.keys():
+    if {"psi", "r"} <= values.keys() and _reverses(values["r"]):
         found["r"] = clock_offset(t, values["psi"], values["r"], {})
-    if "delta" in values and {"psi", "r"} & values.keys() and np.ptp(values["delta"]) > _LEAST_RUDDER:
+    if "delta" in values and {"psi", "r"} & values.keys() and _reverses(values["delta"], _LEAST_RUDDER):
         late = rate.late if (rate := found.get("r")) else 0.0
         r = np.interp(t + late, t, values["r"]) if "r" in values else time_derivative(t, values["psi"])
         found["delta"] = rudder_offset(t, r, values["delta"])
