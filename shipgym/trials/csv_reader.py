@@ -4,6 +4,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,8 @@ class Table:
         cells = self.column(name)
         if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
             return cells.astype(np.float64)
+        with suppress(ValueError, TypeError):  # as in most files, in a third of the time
+            return np.array([float("nan" if cell == "" else cell) for cell in cells])
         texts = self.texts(name)
         if self.decimal_comma:
             texts = [text.replace(",", ".") if "." not in text else text for text in texts]
@@ -96,11 +99,12 @@ def read_table(path: str | Path) -> Table:
 
     def cells(name: str) -> list[str]:
         index = header.index(name)
-        return [_cells(row, delimiter)[index] for row in rows]
+        return [_cells(row, delimiter, index + 1)[index] for row in rows]
 
     table = Table(path, header, cells, [k + 1 for k in kept], decimal_comma=delimiter != ",")
     for k, row in enumerate(rows):
-        if (found := len(_cells(row, delimiter))) != len(header):
+        found = len(_cells(row, delimiter)) if '"' in row else row.count(delimiter) + 1
+        if found != len(header):
             raise InputError(
                 f"{path}: {table.place(k)} has {found} cells, expected {len(header)} as in the header; "
                 "complete or remove the row"
@@ -108,8 +112,8 @@ def read_table(path: str | Path) -> Table:
     return table
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return next(csv.reader([line], delimiter=delimiter)) if '"' in line else line.split(delimiter)
+def _cells(line: str, delimiter: str, most: int = -1) -> list[str]:
+    return next(csv.reader([line], delimiter=delimiter)) if '"' in line else line.split(delimiter, most)
 
 
 def _read_lines(path: Path) -> list[str]:
