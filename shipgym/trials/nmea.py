@@ -106,10 +106,8 @@ def _values_of(message: Any) -> Iterator[tuple[str, float]]:
     if flag and str(getattr(message, flag) or " ") not in valid:
         return
     for channel, (field, unit) in fields.items():
-        told = (
-            getattr(message, field) if getattr(message, field[:3], " ") else None
-        )  # latitude of an empty lat
-        if told is None or told == "":
+        told = getattr(message, field)
+        if told in (None, "") or not getattr(message, field[:3], " "):  # the latitude of an empty lat
             continue
         value = si_factor(channel, unit) * float(told)
         if kind == "HDG":
@@ -140,7 +138,8 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
         raise InputError(f"{path}: no {found} in this log, expected some of {wanted}; log these too")
     main = max(clocks, key=lambda name: _rank(name, clocks[name]))
     stamps = np.array([(stamp.line, stamp.time) for stamp in clocks[main]])
-    times, first = np.unique(np.maximum.accumulate(stamps[:, 1]), return_index=True)
+    counted = stamps[:, 1] if stamps[0, 1] > 2.0 * DAY else np.unwrap(stamps[:, 1], period=DAY)
+    times, first = np.unique(np.maximum.accumulate(counted), return_index=True)
     chosen: dict[str, Series] = {}
     for channel, sources in readings.items():
         source = max(sorted(sources), key=lambda s: (_BETTER.get(s[2:], 0), *_rank(s, sources[s])))

@@ -278,6 +278,17 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
         read_log(tmp_path / "dark.nmea")
 
 
+def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
+    texts = ("235958", "235959", "000000", "000001", "000002")
+    lines = [
+        sentence(one)
+        for clock in texts
+        for one in (f"GPGGA,{clock},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,", "HEHDT,30.0,T")
+    ]
+    (tmp_path / "log.nmea").write_text("\n".join(lines))
+    assert np.ptp(read_log(tmp_path / "log.nmea").numbers("t")) == 4.0
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real log lies beside the checkout and is absent here")
 def test_the_real_log_is_read_and_says_that_it_has_no_rudder():
     trial = Trial.from_csv(DATA / "nmea0183" / "hakefjord.txt")
