@@ -38,6 +38,7 @@ _LONG_KEY = re.compile(rf"""(?:\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*){{{D
 _AT_ONCE = getattr(os, "O_NONBLOCK", 0)  # without waiting, should a file have become a pipe
 #: What cannot be written in UTF-8, or ends a text for the operating system.
 _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
+_NOT_LATIN = re.compile(rb"[\x80-\x9f\xfe\xff\0]")
 #: Names of `draft_name`.
 DRAFT = re.compile(r"\..+\.([0-9a-f]{8})-(\d+)\.draft", re.DOTALL)
 ABANDONED_S = 7 * 86400.0
@@ -193,12 +194,18 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
         raise InputError(f"{path}: cannot be read ({reason}), expected a {what}") from None
 
 
-def read_text(path: Path, what: str, largest: int) -> str:
-    """A text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text."""
+def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
+    """A text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text.
+
+    With `latin`, other bytes are read as Latin-1, as instruments write the sign of degrees, unless they are
+    control characters there, or those of UTF-16 and of memory that was never written.
+    """
     data = read_bytes(path, what, largest)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
+        if latin and not _NOT_LATIN.search(data):
+            return data.decode("latin-1")
         line = data[: error.start].count(b"\n") + 1
         found = f"line {line} holds byte 0x{data[error.start]:02x}, which is not UTF-8 text (binary content)"
         if data.startswith((b"\xff\xfe", b"\xfe\xff")):

@@ -32,6 +32,7 @@ from agents.cli.command import (
 )
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
+from agents.cli.logs import look_command, new_ship_command
 from agents.cli.reproduction import reproduce_command
 from agents.cli.steer import simulate_command, steer_command
 from agents.cli.training import train_command
@@ -70,6 +71,8 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
+app.command("new-ship")(new_ship_command)
+app.command("look")(look_command)
 app.command("identify", cls=IdentifyCommand)(identify_command)
 app.command("advise", cls=IdentifyCommand)(advise_command)
 app.command("reduce", cls=IdentifyCommand)(reduce_command)

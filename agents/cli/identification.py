@@ -93,7 +93,8 @@ def _check_stable(result: IdentificationResult) -> None:
     instability = why_unstable(result)
     if instability is not None:
         fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
-    for warning in model_warnings(result):
+    notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
+    for warning in [*notes, *model_warnings(result)]:
         warn(warning)
 
 

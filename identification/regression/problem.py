@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -65,6 +65,9 @@ def pose(
         )
     used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
+    used, everything = (
+        [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
+    )
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
@@ -85,6 +88,17 @@ def pose(
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
+
+
+def _at_constant_speed(
+    trial: Trial, table: Structure, particulars: Particulars | Mapping[str, Any] | None
+) -> Trial:
+    """A trial of heading and rudder at the service speed, for a structure of the yaw rate alone."""
+    speed = (particulars or {}).get("speed")
+    if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
+        return trial
+    still = {"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))}
+    return trial.with_channels(still)
 
 
 def _blank(

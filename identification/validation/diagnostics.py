@@ -72,6 +72,7 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
                     f"trial {trial.name!r}: channel {channel!r} is missing, structure {structure.name!r} "
                     f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
                     'out (use = "skip")'
+                    + ("; nomoto, norrbin and nomoto2 take the speed of [ship]" if channel == "u" else "")
                 )
         _check_steps(trial)
     if not structure.has_rudder:

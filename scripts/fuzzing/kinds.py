@@ -33,6 +33,7 @@ from fuzzing.reading import CORPUS, Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
+from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
 JOBS: list[dict[str, Any]] = [{"number": 1}, {"number": 2}]
@@ -227,6 +228,7 @@ KINDS = (
     Kind("bridge", read_bridge, use_helm, slow=2),
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
+    Kind("log", lambda path: [guess_trial(path)[2]], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
     Kind("policy", load_agent, use_agent, main="agent.json"),

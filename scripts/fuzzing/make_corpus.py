@@ -53,6 +53,41 @@ def trials(folder: Path) -> None:
     (folder / "trial" / "semicolons.csv").write_text("\n".join(["t;psi;r;delta", *rows]))
 
 
+def logs(folder: Path) -> None:
+    """A log of each kind: ISO time, positions and rudder; NMEA 0183 with its checksums."""
+    import pandas as pd
+    import pynmea2
+    from scipy.io import savemat
+
+    folder.joinpath("log").mkdir()
+    t = np.arange(ROWS)
+    psi = 30.0 + 10.0 * np.sin(0.1 * t)
+    frame = pd.DataFrame({
+        "time": [f"2024-05-31T09:30:{k:02d}Z" for k in t], "lat": [f"57°{41.0 + 0.003 * k:.4f}'N" for k in t],
+        "lon": [f"011°{44.0 + 0.003 * k:.4f}'E" for k in t], "psi [deg]": psi.round(1),
+        "sog [kn]": np.where(t % 2, np.nan, 13.1), "cog [deg]": np.where(t % 2, np.nan, psi.round(1) + 2.0),
+        "rudder [deg]": (10.0 * np.cos(0.1 * t)).round(1),
+    })  # fmt: skip
+    frame.to_csv(folder / "log" / "bridge.csv", index=False)
+    frame.to_excel(folder / "log" / "bridge.xlsx", index=False)
+    frame.to_parquet(folder / "log" / "bridge.parquet")
+    savemat(
+        folder / "log" / "bridge.mat", {"t": t, "psi": np.radians(psi), "r": np.gradient(np.radians(psi))}
+    )
+    places = [f"57{41.0 + 0.003 * k:07.4f},N,01144.0000,E,13.1,{psi[k] + 2.0:.1f},310524" for k in t]
+    fields = [
+        sentence
+        for k in t
+        for sentence in (
+            ("GP", "RMC", f"0930{k:02d},A,{places[k]},,,A"),
+            ("HE", "HDT", f"{psi[k]:.1f},T"), ("TI", "ROT", "3.0,A"), ("RI", "RSA", f"{k % 7:.1f},A,,"),
+            ("WI", "MWV", "030.0,R,10.0,M,A"), ("VW", "VHW", ",T,,M,13.6,N,,K"),
+        )
+    ]  # fmt: skip
+    lines = [str(pynmea2.GGA(talker, kind, tuple(text.split(",")))) for talker, kind, text in fields]
+    (folder / "log" / "bridge.nmea").write_text("\r\n".join(lines) + "\r\n")
+
+
 def models(folder: Path) -> None:
     """Tables of terms with a covariance and without, own equations, a grey box, captive tests."""
     folder.joinpath("model").mkdir()
@@ -166,7 +201,7 @@ def texts(folder: Path) -> None:
 
 
 MAKERS: tuple[Callable[[Path], None], ...] = (
-    trials, models, controllers, policies, episode, results, run, texts,
+    trials, logs, models, controllers, policies, episode, results, run, texts,
 )  # fmt: skip
 SHIP: ShipModel = shipgym.load_model("mariner")
 

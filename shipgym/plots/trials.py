@@ -22,7 +22,7 @@ AXES: dict[str, tuple[str, float]] = {
     "p": ("roll rate, deg/s", 180.0 / np.pi), "phi": ("heel, deg", 180.0 / np.pi),
     "delta": ("rudder, deg", 180.0 / np.pi), "delta_command": ("rudder order, deg", 180.0 / np.pi),
     "n": ("shaft, rev/s", 1.0), "n_command": ("shaft order, rev/s", 1.0), "speed": ("speed, m/s", 1.0),
-    "drift": ("drift angle, deg", 180.0 / np.pi),
+    "drift": ("drift angle, deg", 180.0 / np.pi), "wind_speed": ("wind, m/s", 1.0),
 }  # fmt: skip
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels

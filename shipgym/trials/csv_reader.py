@@ -1,12 +1,13 @@
-"""Reading numbers from CSV files: fast where the file is sound, exact about the place where it is not."""
+"""Logs as tables of cells, and those in CSV files; exact about the place of what is no number."""
 
 import csv
-import math
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_text
 
 #: Cells that stand for "no value".
-MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none"})
+MISSING_WORDS = frozenset({"", "nan", "na", "n/a", "#n/a", "null", "none", "nat", "<na>"})
 
 #: Most lines of a file, columns, and characters of a line.
 MOST_LINES, MOST_COLUMNS, LONGEST_LINE = 1_000_000, 1000, 100_000
@@ -25,85 +26,62 @@ _REMEDY_TEXT = "save the table as comma-separated text in UTF-8"
 
 
 @dataclass(frozen=True)
-class CsvTable:
-    """A CSV file, split into header and rows whose cells are not parsed yet."""
+class Table:
+    """A log as columns of cells, whatever the kind of its file."""
 
     path: Path  # the file, for messages
     header: tuple[str, ...]  # names of the columns, stripped of blanks
-    rows: list[str]  # the rows that are not blank
-    line_numbers: list[int]  # line of the file on which each row stands; the file begins with line 1
-    delimiter: str  # comma, semicolon or tab
+    cells: Callable[[str], Any]  # of a column: texts or other objects, or an array of numbers
+    lines: Sequence[int]  # line of the file on which each row stands; the file begins with line 1
+    place_words: str = "line {line} (data row {row})"
+    decimal_comma: bool = False
+    time_unit: str = "s"  # of the column t, where nobody says more
+    notes: tuple[str, ...] = ()  # what the reader left out
 
     def place(self, row: int) -> str:
         """Return the place of a row for a message: ``line 12 (data row 11)``."""
-        return f"line {self.line_numbers[row]} (data row {row + 1})"
+        return self.place_words.format(line=self.lines[row], row=row + 1)
 
-    def numbers(self, names: Sequence[str]) -> npt.NDArray[np.float64]:
-        """Some columns as numbers, shape (n_rows, n_names); nan where a cell is empty or says nan or NA.
-
-        InputError for a missing column, a row with more or fewer cells than the header, or text in a number.
-        """
-        for name in names:
-            if name not in self.header:
-                raise InputError(
-                    f"{self.path}: column '{name}' not found.{did_you_mean(name, self.header)} "
-                    f"Columns present: {quoted(self.header)}. Name the column in [columns] (or columns=...)"
-                )
-        self._check_ragged()
-        if not self.rows:
-            return np.empty((0, len(names)))
-        indices = [self.header.index(name) for name in names]
-        rows = self._with_decimal_points()
-        try:
-            values = np.loadtxt(
-                rows, delimiter=self.delimiter, usecols=indices, comments=None, quotechar='"', ndmin=2
+    def column(self, name: str) -> Any:
+        """The cells of a column; InputError if there is none of this name."""
+        if name not in self.header:
+            raise InputError(
+                f"{self.path}: column '{name}' not found.{did_you_mean(name, self.header)} "
+                f"Columns present: {quoted(self.header)}. Name the column in [columns] (or columns=...)"
             )
+        return self.cells(name)
+
+    def texts(self, name: str) -> list[str]:
+        """The cells of a column as texts without blanks around them, empty where there is no value."""
+        texts = ["" if value is None else str(value).strip() for value in self.column(name)]
+        return ["" if text.lower() in MISSING_WORDS else text for text in texts]
+
+    def numbers(self, name: str) -> npt.NDArray[np.float64]:
+        """A column as numbers; nan where a cell is empty or says nan or NA. InputError for other text."""
+        cells = self.column(name)
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
+            return cells.astype(np.float64)
+        with suppress(ValueError, TypeError):  # as in most files, in a third of the time
+            return np.array([float("nan" if cell == "" else cell) for cell in cells])
+        texts = self.texts(name)
+        if self.decimal_comma:
+            texts = [text.replace(",", ".") if "." not in text else text for text in texts]
+        try:
+            return np.array([float(text or "nan") for text in texts])
         except ValueError:
-            values = np.empty((0, 0))
-        if len(values) != len(rows):  # a cell that is no number, or a quote that is not closed
-            values = self._cell_by_cell(rows, indices)
-        return np.asarray(values, dtype=np.float64)
-
-    def _check_ragged(self) -> None:
-        expected = len(self.header)
-        for row, text in enumerate(self.rows):
-            if text.count(self.delimiter) + 1 == expected and '"' not in text:
-                continue
-            found = len(_cells(text, self.delimiter))
-            if found != expected:
-                raise InputError(
-                    f"{self.path}: {self.place(row)} has {found} cells, expected {expected} as in the "
-                    "header; complete or remove the row"
-                )
-
-    def _with_decimal_points(self) -> list[str]:
-        """Read decimal commas as points, where the delimiter leaves no doubt."""
-        if self.delimiter == "," or not any("," in row for row in self.rows):
-            return self.rows
-        return [row if "." in row else row.replace(",", ".") for row in self.rows]
-
-    def _cell_by_cell(self, rows: list[str], indices: list[int]) -> npt.NDArray[np.float64]:
-        values = np.empty((len(rows), len(indices)))
-        for row, text in enumerate(rows):
-            cells = _cells(text, self.delimiter)
-            for k, index in enumerate(indices):
-                cell = cells[index].strip()
-                try:
-                    values[row, k] = math.nan if cell.lower() in MISSING_WORDS else float(cell)
-                except ValueError:
-                    raise InputError(
-                        f"{self.path}: {self.place(row)}, column '{self.header[index]}': "
-                        f"'{cell}' found, expected a number; correct the cell, or leave it empty where the "
-                        'value is missing and import with repair = "interpolate"'
-                    ) from None
-        return values
+            row = next(k for k, text in enumerate(texts) if text and not is_number(text))
+            raise InputError(
+                f"{self.path}: {self.place(row)}, column '{name}': '{str(cells[row]).strip()}' found, "
+                "expected a number; correct the cell, or leave it empty where the value is missing and "
+                'import with repair = "interpolate"'
+            ) from None
 
 
-def read_table(path: str | Path) -> CsvTable:
-    """Read a CSV file in UTF-8 with one header line; delimiter comma, semicolon or tab.
+def read_table(path: str | Path) -> Table:
+    """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
 
-    Raises InputError for a missing file, a folder, an empty or binary file, and a header with no names or
-    repeated ones.
+    Raises InputError for a missing file, a folder, an empty or binary file, repeated or no
+    names in the header, and a row with more or fewer cells than the header.
     """
     path = Path(path)
     lines = _read_lines(path)
@@ -112,27 +90,34 @@ def read_table(path: str | Path) -> CsvTable:
         raise InputError(
             f"{path}: the file is empty, expected a header line with column names and rows below"
         )
-    header_line = lines[first]
-    delimiter = max(",;\t", key=re.sub('"[^"]*"', "", header_line).count)
-    header = tuple(name.strip() for name in _cells(header_line, delimiter))
+    delimiter = max(",;\t", key=re.sub('"[^"]*"', "", lines[first]).count)
+    header = tuple(name.strip() for name in _cells(lines[first], delimiter))
     _check_header(path, header, first + 1)
     blank = delimiter + " \t"
-    kept = [(k + 1, line) for k, line in enumerate(lines) if k > first and line.strip(blank)]
-    return CsvTable(
-        path=path,
-        header=header,
-        rows=[line for _, line in kept],
-        line_numbers=[number for number, _ in kept],
-        delimiter=delimiter,
-    )
+    kept = [k for k, line in enumerate(lines) if k > first and line.strip(blank)]
+    rows = [lines[k] for k in kept]
+
+    def cells(name: str) -> list[str]:
+        index = header.index(name)
+        return [_cells(row, delimiter, index + 1)[index] for row in rows]
+
+    table = Table(path, header, cells, [k + 1 for k in kept], decimal_comma=delimiter != ",")
+    for k, row in enumerate(rows):
+        found = len(_cells(row, delimiter)) if '"' in row else row.count(delimiter) + 1
+        if found != len(header):
+            raise InputError(
+                f"{path}: {table.place(k)} has {found} cells, expected {len(header)} as in the header; "
+                "complete or remove the row"
+            )
+    return table
 
 
-def _cells(line: str, delimiter: str) -> list[str]:
-    return next(csv.reader([line], delimiter=delimiter))
+def _cells(line: str, delimiter: str, most: int = -1) -> list[str]:
+    return next(csv.reader([line], delimiter=delimiter)) if '"' in line else line.split(delimiter, most)
 
 
 def _read_lines(path: Path) -> list[str]:
-    text = read_text(path, "CSV file", LARGEST_CSV)
+    text = read_text(path, "CSV file", LARGEST_CSV, latin=True)
     if "\0" in text:
         raise InputError(
             f"{path}: binary content (a zero byte at byte {text.index(chr(0))}), expected CSV text; "
@@ -166,14 +151,15 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
         raise InputError(
             f"{path}: line {line}: column '{twice[0]}' stands twice in the header; rename or remove one"
         )
-    if all(_is_number(name) for name in header):
+    if all(is_number(name) for name in header):
         raise InputError(
             f"{path}: line {line} holds only numbers, expected a header with column names "
             "such as t,psi,u,v,r,delta"
         )
 
 
-def _is_number(text: str) -> bool:
+def is_number(text: str) -> bool:
+    """Whether a text is a number as Python reads it."""
     try:
         float(text)
     except ValueError:

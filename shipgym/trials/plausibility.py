@@ -21,6 +21,7 @@ LIMITS: dict[str, float] = {
     "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
     "r_wave": 60.0 * _DEGREE, "phi_wave": 180.0 * _DEGREE, "p_wave": 360.0 * _DEGREE,
     "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
+    "lat": 90.0, "lon": 360.0, "sog": 50.0, "cog": 100.0, "stw": 50.0,
     "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * _DEGREE,
 }  # fmt: skip
 
@@ -32,13 +33,14 @@ _WINDOWS = 30
 def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
     """Refuse values beyond :data:`LIMITS`, and name the unit that would make them plausible.
 
-    The channels are in SI units, of shape (n_samples,); the source is the file, for messages.
+    The channels are in SI units, of shape (n_samples,), nan where there is no value; the source is the file,
+    for messages.
     """
     for channel, limit in LIMITS.items():
         if channel not in channels:
             continue
-        size = np.abs(channels[channel])
-        if size.max() <= limit * (1.0 + 1e-9):
+        size = np.nan_to_num(np.abs(channels[channel]))
+        if size.max(initial=0.0) <= limit * (1.0 + 1e-9):
             continue
         first = int(np.argmax(size > limit * (1.0 + 1e-9)))
         unit = source.columns[channel].unit

@@ -16,22 +16,28 @@ from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import own_structure
 from shipgym.ships.term_table import Structure
 from shipgym.trials.columns import parse_columns
+from shipgym.trials.cuts import check_cut
 from shipgym.trials.identify_table import check_options
+from shipgym.trials.navigation import Instruments
 from shipgym.trials.scale import check_scale
-from shipgym.trials.trial import KINDS, USES, Trial
+from shipgym.trials.tables import read_log
+from shipgym.trials.trial import KINDS, USES, Trial, read_trials
 from shipgym.trials.trial_import import Conventions
 
-_SECTIONS = ("ship", "steering", "columns", "conventions", "structure", "identify", "wind", "trials")
+_SECTIONS = (
+    "ship", "steering", "columns", "conventions", "sensors", "structure", "identify", "wind", "trials",
+)  # fmt: skip
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
-_TRIAL = ("file", "kind", "use", "columns", *_CONVENTIONS)
+_TRIAL = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
 
 @dataclass(frozen=True)
 class TrialEntry:
     """One ``[[trials]]`` table, checked, with what it takes over from the file's own tables."""
 
-    file: str  # as written; the trial's name
-    path: Path  # of the CSV file
+    file: str  # as written, of several joined by " + "; the trial's name
+    paths: tuple[Path, ...]  # of the file, or of the files that were logged at the same time
+    cut: Any  # "rudder", or stretches that are trials each; None: the whole log
     kind: str | None
     use: str
     columns: Mapping[str, Any] | None  # by channel as written; None: those named like channels
@@ -93,24 +99,23 @@ class ShipFile:
         if use is not None:
             check_choice(use, USES, f"{self.path}: trials(use)")
         wanted = [e for e in self.entries if (e.use == use if use is not None else e.use != "skip")]
-        return [self._read(entry) for entry in wanted]
+        return [trial for entry in wanted for trial in self._read(entry)]
 
     def trial(self, file: str) -> Trial:
-        """Read one trial by its ``file``, whatever its use; as :meth:`trials`."""
+        """Read one trial by its ``file`` (of a log that is cut, the first), whatever its use."""
         files = [entry.file for entry in self.entries]
         check_choice(file, files, f"{self.path}: trial")
-        return self._read(self.entries[files.index(file)])
+        return self._read(self.entries[files.index(file)])[0]
 
-    def _read(self, entry: TrialEntry) -> Trial:
-        c = entry.conventions
+    def _read(self, entry: TrialEntry) -> list[Trial]:
         with placed(entry.where):
-            trial = Trial.from_csv(
-                entry.path, entry.columns, c.rudder_positive, c.velocity_frame, origin=c.origin, xg=c.xg,
-                repair=c.repair, name=entry.file, kind=entry.kind, use=entry.use,
-                length=self.particulars.length,
+            trials = read_trials(
+                [read_log(path) for path in entry.paths], entry.columns, entry.conventions, entry.cut,
+                name=entry.file, kind=entry.kind, use=entry.use, length=self.particulars.length,
             )  # fmt: skip
-        check_scale(trial, self.particulars, f"{entry.where}: {entry.path}")
-        return trial
+        for trial in trials:
+            check_scale(trial, self.particulars, f"{entry.where}: {entry.paths[0]}")
+        return trials
 
 
 def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> tuple[TrialEntry, ...]:
@@ -126,19 +131,28 @@ def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> t
     _conventions(conventions, particulars, f"{path}: [conventions]")
     columns = check_table(data.get("columns", {}), f"{path}: [columns]")
     parse_columns(columns, f"{path}: [columns]")
+    sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
+    Instruments.from_mapping(sensors, f"{path}: [sensors]", particulars)
     entries = [
-        _entry(path, f"{path}: [[trials]] {k}", table, columns, conventions, particulars)
+        _entry(
+            path, f"{path}: [[trials]] {k}", table, columns, {**conventions, "sensors": sensors}, particulars
+        )
         for k, table in enumerate(tables, start=1)
     ]
-    by_path = {os.path.normpath(entry.path): entry for entry in reversed(entries)}
+    by_path = {_place(entry): entry for entry in reversed(entries)}
     for entry in entries:
-        if by_path[os.path.normpath(entry.path)] is not entry:
+        if by_path[_place(entry)] is not entry:
             raise InputError(f"{entry.where} file: '{entry.file}' is listed twice, expected each file once")
     if all(entry.use == "skip" for entry in entries):
         raise InputError(
             f'{path}: all trials have use = "skip", expected at least one to fit; set use = "fit"'
         )
     return tuple(entries)
+
+
+def _place(entry: TrialEntry) -> tuple[str, ...]:
+    """What no two entries share: the files and how they are cut."""
+    return (*map(os.path.normpath, entry.paths), str(entry.cut))
 
 
 def _entry(
@@ -152,26 +166,34 @@ def _entry(
     check_keys(check_table(table, where), _TRIAL, where)
     if "file" not in table:
         raise InputError(f'{where}: no file found, expected file = "run.csv"')
-    file = check_text(table["file"], f"{where} file")
+    files = table["file"] if isinstance(table["file"], list) and table["file"] else [table["file"]]
+    paths = tuple(path.parent / check_text(file, f"{where} file") for file in files)
+    check_cut(table.get("cut"), where)
     kind = check_choice(table["kind"], KINDS, f"{where} kind") if "kind" in table else None
     use = check_choice(table.get("use", "fit"), USES, f"{where} use")
-    own = check_table(table.get("columns", {}), f"{where} columns")
-    parse_columns(own, f"{where} columns")
+    own_columns = check_table(table.get("columns", {}), f"{where} columns")
+    parse_columns(own_columns, f"{where} columns")
     own_conventions = {key: table[key] for key in _CONVENTIONS if key in table}
-    csv_path = path.parent / file
+    if "sensors" in table:
+        own = check_table(table["sensors"], f"{where} sensors")
+        own_conventions["sensors"] = {**conventions["sensors"], **own}
     if use != "skip":
         with placed(f"{where} file"):
-            check_readable(csv_path, "CSV file")
+            for one in paths:
+                check_readable(one, "CSV file")
     return TrialEntry(
-        file=file,
-        path=csv_path,
+        file=" + ".join(files),
+        paths=paths,
+        cut=table.get("cut"),
         kind=kind,
         use=use,
-        columns={**columns, **own} or None,
+        columns={**columns, **own_columns} or None,
         conventions=_conventions({**conventions, **own_conventions}, particulars, where),
         where=where,
     )
 
 
 def _conventions(words: Mapping[str, Any], particulars: Particulars, where: str) -> Conventions:
-    return Conventions(**words, xg=particulars.xg, where=where)
+    tools = Instruments.from_mapping(words.get("sensors", {}), f"{where} sensors", particulars)
+    own = {key: word for key, word in words.items() if key != "sensors"}
+    return Conventions(**own, xg=particulars.xg, where=where, instruments=tools)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -17,7 +17,11 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import write_text
-from shipgym.trials.trial_import import Conventions, import_csv
+from shipgym.trials.csv_reader import Table
+from shipgym.trials.cuts import cut_log
+from shipgym.trials.navigation import Instruments
+from shipgym.trials.tables import from_frame, read_log
+from shipgym.trials.trial_import import Conventions, import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
 #: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
@@ -62,6 +66,8 @@ class Trial:
     over_ground : bool, optional
         Whether `u` and `v` are velocities over ground, with the current in them, and not through the water.
         By default where one of them was derived, as it is from positions.
+    notes : sequence of str, optional
+        Remarks of the reader: what it corrected, left out or found amiss.
 
     Raises
     ------
@@ -78,6 +84,7 @@ class Trial:
     length: float | None
     repaired: Mapping[str, int]
     over_ground: bool
+    notes: tuple[str, ...]
 
     def __init__(
         self,
@@ -92,6 +99,7 @@ class Trial:
         repaired: Mapping[str, int] | None = None,
         raw: Trial | None = None,
         over_ground: bool | None = None,
+        notes: Sequence[str] = (),
     ) -> None:
         check_text(name, "trial: name")
         where = f"trial '{name}'"
@@ -111,6 +119,7 @@ class Trial:
             length=None if length is None else check_number(length, f"{where}: length", above=0.0),
             repaired=MappingProxyType(dict(repaired or {})),
             over_ground=bool({"u", "v"} & set(derived)) if over_ground is None else bool(over_ground),
+            notes=tuple(notes),
             _raw=raw,
         )
 
@@ -164,7 +173,7 @@ class Trial:
 
     def _settings(self) -> dict[str, Any]:
         """The keyword arguments that make this trial of its channels."""
-        names = ("name", "kind", "use", "derived", "length", "over_ground")
+        names = ("name", "kind", "use", "derived", "length", "over_ground", "notes")
         own = {name: getattr(self, name) for name in names}
         return own | {"repaired": dict(self.repaired), "raw": vars(self)["_raw"]}
 
@@ -197,7 +206,7 @@ class Trial:
     @classmethod
     def from_csv(
         cls,
-        path: str | Path,
+        path: str | Path | Table,
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         rudder_positive: str = "starboard",
         velocity_frame: str = "body",
@@ -209,19 +218,21 @@ class Trial:
         kind: str | None = None,
         use: str = "fit",
         length: float | None = None,
+        sensors: Mapping[str, Any] | None = None,
     ) -> Trial:
-        """Read a trial from a CSV file and convert it to SI units and the project's signs.
+        """Read a trial from a log and convert it to SI units and the project's signs.
 
         Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
-        ``x``, ``y`` and ``psi``; ``psi`` from ``r`` where there is no position (relative to the start).
+        ``sog`` and ``cog``, else from position; ``psi`` from ``r`` where there is no position (relative to
+        the start). ``lat`` and ``lon`` become ``x`` and ``y``; ``stw``, speed through the water, is ``u``.
 
         Parameters
         ----------
         path : str or Path
-            The file: one header line; comma, semicolon or tab; UTF-8.
+            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB (.mat).
         columns : mapping of str to str or mapping, optional
             For each channel (``t`` included) its column, or ``{"column": name, "unit": unit}``. By default
-            every column that is named like a channel, in SI units.
+            every column that is named like a channel, in SI units. Of ``t`` also ``"date"`` and ``"zone"``.
         rudder_positive : {"starboard", "port"}
             Side to which a positive rudder angle of the file steers.
         velocity_frame : {"body", "earth"}
@@ -235,18 +246,31 @@ class Trial:
             are left out. Without it a missing value is an error.
         name, kind, use, length : optional
             As in :class:`Trial`; the name is the file's by default.
+        sensors : mapping, optional
+            The table ``[sensors]`` of a ship file.
 
         Raises
         ------
         InputError
             For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
-        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, where=f"{path}:")
-        t, channels, derived, repaired = import_csv(Path(path), columns, conventions)
-        name = Path(path).name if name is None else name
-        facts: dict[str, Any] = {"derived": derived, "repaired": repaired, "length": length}
-        facts["over_ground"] = True if velocity_frame == "earth" and "u" in channels else None
-        return cls(t, channels, name=name, kind=kind, use=use, **facts)
+        table = read_log(path)
+        tools = Instruments.from_mapping(sensors or {}, f"{table.path}: sensors")
+        conventions = Conventions(
+            rudder_positive, velocity_frame, origin, xg, repair, f"{table.path}:", tools
+        )
+        name = table.path.name if name is None else name
+        return read_trials([table], columns, conventions, name=name, kind=kind, use=use, length=length)[0]
+
+    @classmethod
+    def from_frame(
+        cls, frame: Any, columns: Mapping[str, str | Mapping[str, str]] | None = None, **settings: Any
+    ) -> Trial:
+        """A trial from a pandas frame, whose index is a column where it is no plain count of rows.
+
+        `columns` and the other keywords are those of :meth:`from_csv`. Raises InputError as that does.
+        """
+        return cls.from_csv(from_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
@@ -258,6 +282,34 @@ class Trial:
         rows = zip(*(self[name].tolist() for name in names), strict=True)
         text = "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]) + "\n"
         write_text(text, Path(path))
+
+
+def read_trials(
+    tables: Sequence[Table],
+    columns: Mapping[str, Any] | None,
+    conventions: Conventions,
+    cut: Any = None,
+    *,
+    name: str,
+    **facts: Any,
+) -> list[Trial]:
+    """The trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cuts.cut_log`).
+
+    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its seconds.
+    """
+    found = import_tables(tables, columns, conventions)
+    trials = []
+    for part in cut_log(cut, found, conventions.where):
+        t = found.t[part]
+        called = name if cut is None else f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
+        trials.append(
+            Trial(
+                t, {channel: values[part] for channel, values in found.channels.items()}, name=called,
+                derived=found.derived, repaired=found.repaired, over_ground=found.over_ground,
+                notes=found.notes, **facts,
+            )
+        )  # fmt: skip
+    return trials
 
 
 def _frozen_channels(

@@ -1,20 +1,25 @@
-"""From the columns of a CSV file to channels in SI units with the project's signs, frame and origin."""
+"""From the columns of a file to channels in SI units with the project's signs, frame and origin."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_number
+from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
-from shipgym.trials.columns import Source, choose_columns
-from shipgym.trials.csv_reader import read_table
+from shipgym.trials.clock_offsets import corrected_clocks
+from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
+from shipgym.trials.columns import Column, Source, choose_columns
+from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
+from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
+from shipgym.trials.navigation import rotate_to_body as rotate_to_body
 from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
+from shipgym.trials.resampling import Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
 RUDDER_SIGNS = ("starboard", "port")
@@ -43,6 +48,7 @@ class Conventions:
     xg: float | None = None
     repair: str | None = None
     where: str = "conventions"
+    instruments: Instruments = NO_OFFSETS
 
     def __post_init__(self) -> None:
         check_choice(self.rudder_positive, RUDDER_SIGNS, f"{self.where} rudder_positive")
@@ -59,53 +65,214 @@ class Conventions:
             )
 
 
-def import_csv(
-    path: Path, columns: Mapping[str, Any] | None, conventions: Conventions
-) -> tuple[Floats, dict[str, Floats], frozenset[str], dict[str, int]]:
-    """Read a CSV file: time, channels, names of the derived channels and counts of the repaired values.
+class Imported(NamedTuple):
+    """What is read from the files of one log, in SI units, with the project's signs, at midship."""
+
+    t: Floats
+    channels: dict[str, Floats]  # by name, shape (n_samples,)
+    derived: frozenset[str]
+    repaired: dict[str, int]  # how many values of a channel were filled in
+    over_ground: bool | None  # whether surge and sway are; None: where they are derived
+    notes: list[str]  # remarks of the readers
+    start: float | None  # clock at t = 0 as the file has it, s since 1970 or of the day
+
+
+class _Recorded(NamedTuple):
+    """The chosen columns of one table, in SI units, on their own clocks."""
+
+    series: Series
+    source: Source
+    filled: dict[str, int]
+    start: float | None  # as in `Imported`, but in UTC
+
+
+def import_tables(
+    tables: Sequence[Table], columns: Mapping[str, Any] | None, conventions: Conventions
+) -> Imported:
+    """Read channels from the tables of one log, as a rule one.
 
     The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels are in SI
     units, with the project's signs, in the body frame, at midship; each has shape (n_samples,). Anything
-    wrong with the file is an InputError that names line, column, value and remedy.
+    wrong with a file is an InputError that names line, column, value and remedy.
     """
-    table = read_table(path)
-    chosen = choose_columns(table, columns)
-    values = table.numbers([column.name for column in chosen.values()])
-    source = Source(table, chosen, np.arange(len(values)))
-    missing = ~np.isfinite(values)
-    values, source = _repaired(values, source, conventions.repair)
-    filled = dict(zip(chosen, missing[source.rows].sum(axis=0).tolist(), strict=True))
+    chosen = [choose_columns(table, columns, len(tables) > 1) for table in tables]
+    gnss = any("lat" in one for one in chosen)
+    recorded = [_recorded(*pair, conventions.repair) for pair in zip(tables, chosen, strict=True)]
+    series, source, where = _joined(recorded), recorded[0].source, str(tables[0].path)
+    signed = {
+        name: (
+            clock,
+            0.0 - values if conventions.rudder_positive == "port" and name.startswith("delta") else values,
+        )
+        for name, (clock, values) in series.items()
+    }
+    t, values, gaps = on_one_clock(signed, where)
+    told = check_log(t, values, conventions.instruments, source, gnss)
+    late, notes = corrected_clocks(t, values, signed, conventions.instruments.clock_offsets, where)
+    if late:
+        t, values, gaps = on_one_clock(late, where)
+    notes = [*(note for table in tables for note in table.notes), *gaps, *told, *notes]
+    check_consistency(t, values, conventions.velocity_frame, source)
+    channels, derived, over_ground, more = to_project_conventions(t, values, conventions, where)
+    filled = {name: n for one in recorded for name, n in one.filled.items() if n and name in channels}
+    start = recorded[0].start
+    if start is not None:
+        start += zone_seconds(chosen[0]["t"].zone, where)
+    ordered = {name: channels[name] for name in QUANTITIES if name in channels}
+    return Imported(t, ordered, derived, filled, over_ground, notes + more, start)
+
+
+def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _Recorded:
+    """Read the chosen columns of a table, check them, and fill what is missing where that is asked for."""
+    for name, other in (("lat", "lon"), ("lon", "lat"), ("sog", "cog"), ("cog", "sog")):
+        if name in chosen and other not in chosen:
+            raise InputError(
+                f"{table.path}: columns: {name} found without {other}, expected both; name its column"
+            )
+    t, start = _read_times(table, chosen)
+    numbers = {c: table.numbers(column.name) for c, column in chosen.items() if c not in ("t", "lat", "lon")}
+    if "lat" in chosen:
+        numbers |= _local_positions(table, chosen, t, repair)
+        chosen |= {new: replace(chosen.pop(old), unit="m") for new, old in (("x", "lat"), ("y", "lon"))}
+    values = np.column_stack([t, *numbers.values()])
+    source = Source(table, {name: chosen[name] for name in ("t", *numbers)}, np.arange(len(values)))
+    present, filled = np.isfinite(values), {}
+    own_clocks = bool(present[:, 0].all()) and have_own_clocks(present[:, 1:])
+    if not own_clocks:
+        values, source = _repaired(values, source, repair)
+        filled = dict(zip(source.columns, (~present)[source.rows].sum(axis=0).tolist(), strict=True))
     recorded = {
         channel: values[:, k] * si_factor(channel, column.unit)
-        for k, (channel, column) in enumerate(chosen.items())
+        for k, (channel, column) in enumerate(source.columns.items())
     }
     check_ranges(recorded, source)
     t = recorded.pop("t")
-    if "psi" in recorded:
-        raw_psi = recorded["psi"]
-        recorded["psi"] = np.unwrap(raw_psi)
-        check_heading(t, recorded["psi"], raw_psi, source)
-    check_consistency(t, recorded, conventions.velocity_frame, source)
-    channels, derived = to_project_conventions(t, recorded, conventions, str(path))
-    repaired = {name: count for name, count in filled.items() if count}
-    return t, {name: channels[name] for name in QUANTITIES if name in channels}, derived, repaired
+    series = {
+        channel: own_clock(channel, t, column, source) if own_clocks else (t, column)
+        for channel, column in recorded.items()
+    }
+    for name in {"psi", "wind_from"} & series.keys():
+        clock, raw = series[name]
+        series[name] = clock, np.unwrap(raw)
+        if name == "psi":
+            rows = source.rows[np.isfinite(recorded["psi"])]
+            check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
+    if "sog" in series:
+        (clock, speed), (_, course) = series.pop("sog"), series.pop("cog")
+        if speed.size != course.size:
+            raise InputError(
+                f"{table.path}: sog has {speed.size} values and cog {course.size}, expected both in a row"
+            )
+        series |= {
+            "ground_north": (clock, speed * np.cos(course)),
+            "ground_east": (clock, speed * np.sin(course)),
+        }
+    return _Recorded(series, source, filled, start)
+
+
+def _read_times(table: Table, chosen: dict[str, Column]) -> tuple[Floats, float | None]:
+    """Time of each row in the unit of its column, and the clock at zero in UTC where the column has one.
+
+    The column is in seconds from now on where it holds texts or counts from 1970.
+    """
+    column = chosen["t"]
+    cells = table.texts(column.name)
+    if column.date is not None:
+        cells = [f"{date} {time}".strip() for date, time in zip(table.texts(column.date), cells, strict=True)]
+    if is_number(next(filter(None, cells), "0").replace(",", ".")):
+        values = table.numbers(column.name)
+        if not column.unit.startswith("unix"):
+            return values, None
+        values = values * si_factor("t", column.unit)
+    else:
+        try:
+            values, _ = read_clock(cells)
+        except ValueError as error:
+            row = cells.index(str(error)) if str(error) in cells else 0
+            raise InputError(
+                f"{table.path}: {table.place(row)}, column '{column.name}': no time that can be read: "
+                f"{cells[row][:40]!r} found, expected a number, ISO 8601 (2024-05-31T09:30:00), or a time of "
+                f'day with its date beside it: t = {{ column = "{column.name}", date = "..." }}'
+            ) from None
+    chosen["t"] = replace(column, unit="s")
+    zero = float(next(iter(values[np.isfinite(values)]), 0.0))
+    return values - zero, zero - zone_seconds(column.zone, str(table.path))
+
+
+def _read_position(table: Table, column: Column) -> Floats:
+    """Degrees of latitude or longitude in whatever form."""
+    cells = table.texts(column.name)
+    try:
+        return read_angles(cells, column.unit != "deg")
+    except ValueError as error:
+        if is_number(str(error)):  # such as 1e-05
+            return table.numbers(column.name)
+        row = cells.index(str(error)) if str(error) in cells else 0
+        raise InputError(
+            f"{table.path}: {table.place(row)}, column '{column.name}': {str(error)!r} found, expected "
+            "degrees (57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N)"
+        ) from None
+
+
+def _local_positions(
+    table: Table, chosen: dict[str, Column], t: Floats, repair: str | None
+) -> dict[str, Floats]:
+    """North and east of the first position, m, nan where there is none."""
+    lat, lon = (_read_position(table, chosen[name]) for name in ("lat", "lon"))
+    source = Source(table, chosen, np.arange(t.size))
+    here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
+    local = np.full((2, t.size), np.nan)
+    if here.size:
+        check_ranges({"lat": lat, "lon": lon}, source)
+        local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
+        far = find_outliers(t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here)
+        if far.size and repair is None:
+            k = int(far[0])
+            raise InputError(
+                f"{source.at(k, 'lat')}: position {lat[k]:.5f}, {lon[k]:.5f} found, an outlier that no ship "
+                f"reaches from those beside it ({far.size} of {here.size} are); empty its cells, or leave "
+                'such rows to be filled with repair = "interpolate"'
+            )
+        local[:, far] = np.nan
+    return dict(zip(("x", "y"), local, strict=True))
+
+
+def _joined(recorded: Sequence[_Recorded]) -> Series:
+    """The channels of all tables on the clock of the first."""
+    base, series = recorded[0], dict(recorded[0].series)
+    for other in recorded[1:]:
+        path = other.source.table.path
+        if (base.start is None) != (other.start is None):
+            raise InputError(
+                f"{path}: one of the files of this log has a clock and the other has not, expected times "
+                "that count from one moment in both"
+            )
+        if twice := series.keys() & other.series.keys():
+            raise InputError(
+                f"{path}: {quoted(sorted(twice))} stands in another file of this log too, expected each in "
+                "one; rename the column that is not to be read"
+            )
+        shift = (other.start or 0.0) - (base.start or 0.0)
+        moved = {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
+        check_overlap(series, moved, path, other.source.columns["t"].name)
+        series |= moved
+    return series
 
 
 def to_project_conventions(
     t: Floats, recorded: Mapping[str, Floats], conventions: Conventions, where: str
-) -> tuple[dict[str, Floats], frozenset[str]]:
-    """Convert signs, frame and origin, and derive the channels that follow from others; also their names.
+) -> tuple[dict[str, Floats], frozenset[str], bool | None, list[str]]:
+    """Convert frame and origin, and derive the channels that follow from others.
 
-    The recorded channels are in SI units with the file's conventions, the heading without jumps, of shape
-    (n_samples,); time is in s. The yaw rate is derived from the heading, surge and sway from position and
-    heading, the heading (relative to the start) from the yaw rate where no position is recorded.
+    The recorded channels are in SI units in the file's frame, the heading without jumps, the rudder positive
+    to starboard, of shape (n_samples,); time is in s. The yaw rate is derived from the heading, surge and
+    sway from velocity over ground or position, the heading (relative to the start) from the yaw rate where no
+    position is recorded. Returns the channels, the names of the derived ones, whether surge and sway are over
+    ground, and remarks.
     """
     channels = dict(recorded)
     derived: set[str] = set()
-    if conventions.rudder_positive == "port":
-        channels.update(
-            {name: 0.0 - channels[name] for name in ("delta", "delta_command") if name in channels}
-        )
+    notes = correct_offsets(t, channels, conventions.instruments, where)
     if "psi" in channels and "r" not in channels:
         channels["r"] = time_derivative(t, channels["psi"])
         derived.add("r")
@@ -116,19 +283,10 @@ def to_project_conventions(
         _earth_to_body(channels, derived, where)
     if conventions.origin == "cg":
         _cg_to_midship(channels, conventions.xg or 0.0, where)
-    if {"x", "y", "psi"} <= channels.keys() and not {"u", "v"} <= channels.keys():
-        north, east = time_derivative(t, channels["x"]), time_derivative(t, channels["y"])
-        for name, values in zip(("u", "v"), rotate_to_body(north, east, channels["psi"]), strict=True):
-            if name not in channels:
-                channels[name] = values
-                derived.add(name)
-    return channels, frozenset(derived)
-
-
-def rotate_to_body(north: Floats, east: Floats, psi: Floats) -> tuple[Floats, Floats]:
-    """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
-    c, s = np.cos(psi), np.sin(psi)
-    return north * c + east * s, east * c - north * s
+    water = "stw" in channels
+    notes += to_midship(t, channels, derived, conventions.instruments, where)
+    over_ground = False if water else (conventions.velocity_frame == "earth" and "u" in recorded) or None
+    return channels, frozenset(derived), over_ground, notes
 
 
 def _earth_to_body(channels: dict[str, Floats], derived: set[str], where: str) -> None:

@@ -9,7 +9,7 @@ _DEGREE = math.pi / 180.0
 
 #: Factor from each unit to SI, by the quantity measured. The first unit of each is the SI one.
 UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0},
+    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "unix": 1.0, "unix ms": 1e-3},
     "length": {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nm": 1852.0},
     "angle": {"rad": 1.0, "deg": _DEGREE},
     "angular rate": {"rad/s": 1.0, "deg/s": _DEGREE, "deg/min": _DEGREE / 60.0},
@@ -17,6 +17,7 @@ UNITS: dict[str, dict[str, float]] = {
     "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
     "force": {"N": 1.0, "kN": 1000.0},
     "moment": {"N m": 1.0, "kN m": 1000.0},
+    "latitude or longitude": {"deg": 1.0, "ddmm.mm": 1.0},  # the second, as in NMEA 0183, by `read_angles`
     "acceleration": {"m/s^2": 1.0},
     "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
 }
@@ -28,16 +29,21 @@ QUANTITIES: dict[str, str] = {
     "delta_command": "angle", "n_command": "shaft speed", "X": "force", "Y": "force", "N": "moment",
     "psi_wave": "angle", "r_wave": "angular rate", "phi_wave": "angle", "p_wave": "angular rate",
     "current_north": "speed", "current_east": "speed", "wind_speed": "speed", "wind_from": "angle",
+    "lat": "latitude or longitude", "lon": "latitude or longitude", "sog": "speed", "cog": "angle",
+    "stw": "speed",
     "wind_udot": "acceleration", "wind_vdot": "acceleration", "wind_rdot": "angular acceleration",
 }  # fmt: skip
 
-#: Names of the channels, without time.
-CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name != "t")
+#: What a file may hold and a trial does not: position, speed and course over ground, speed through the water.
+INPUTS = ("lat", "lon", "sog", "cog", "stw")
+
+#: Names of the channels of a trial, without time.
+CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name not in ("t", *INPUTS))
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
     """Return `name`, which must be that of a channel (or ``t``, unless `time` is false)."""
-    known = tuple(QUANTITIES) if time else CHANNELS
+    known = tuple(QUANTITIES) if time else CHANNELS  # a file's, or a trial's
     if name not in known:
         hint = did_you_mean(str(name), known)
         raise InputError(f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}")

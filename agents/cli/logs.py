@@ -1,0 +1,81 @@
+"""Commands for logs as ships make them: `new-ship` and `look`."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from agents.cli.command import answered
+
+HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
+
+
+@answered
+def new_ship_command(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB.")
+    ],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
+    length: Annotated[
+        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; else to be filled in.")
+    ] = None,
+) -> None:
+    """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import warn
+    from shipgym.errors import InputError
+    from shipgym.files import write_text
+    from shipgym.pages import render
+    from shipgym.plots.trials import quantity
+    from shipgym.trials.guesses import guess_trial
+
+    if out.exists():
+        raise InputError(f"{out}: exists already; choose another name with --out, or remove it")
+    guesses, side, trial = guess_trial(logs[0])
+    speeds = quantity(trial, "speed")
+    page = render(
+        "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,
+        trial=trial, speed=None if speeds is None else float(sorted(speeds)[9 * len(speeds) // 10]),
+        files=[json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
+    )  # fmt: skip
+    write_text(page, out)
+    told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
+    told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
+    told += [f"a positive rudder steers to {side}, by the yaw that follows it"] if "delta" in trial else []
+    told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
+    console.print("\n".join(told), soft_wrap=True)
+    for note in trial.notes:
+        warn(note)
+
+
+@answered
+def look_command(
+    log: Annotated[Path, typer.Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
+) -> None:
+    """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import warn
+    from agents.cli.trials_page import check_page
+    from shipgym.files import write_text
+    from shipgym.pages import render
+    from shipgym.plots import history_figure, path_figure
+    from shipgym.trials.guesses import guess_trial
+    from shipgym.trials.ship_file import ShipFile
+
+    check_page(out)
+    trials = ShipFile.load(log).trials() if log.suffix == ".toml" else [guess_trial(log)[2]]
+    tracks = [path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None for one in trials]
+    histories = [history_figure({"measured": one}, HISTORIES) for one in trials]
+    shown = zip(trials, tracks, histories, strict=True)
+    write_text(render("shipgym.pages/look.html", name=log.name, trials=shown), out)
+    for trial in trials:
+        about = f"{len(trial)} samples over {trial.duration:.5g} s: {', '.join(trial.channels)}"
+        console.print(f"{trial.name}: {about}", soft_wrap=True)
+        for note in trial.notes:
+            warn(f"{trial.name}: {note}")
+    console.print(f"written: {out}", soft_wrap=True)

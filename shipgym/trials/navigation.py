@@ -1,0 +1,204 @@
+"""From what a bridge logs to midship: local metres, antenna, offsets, speed through the water."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym.arrays import Floats
+from shipgym.checks import check_choice, check_keys, check_number, check_table
+from shipgym.errors import InputError
+from shipgym.trials.derivatives import time_derivative
+
+if TYPE_CHECKING:
+    from shipgym.ships.particulars import Particulars
+
+DEGREE = math.pi / 180.0
+#: A straight part lasts this long, s, with heading and rudder within this range, rad.
+STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
+#: Courses this far apart tell an offset of the heading, and a current across, from each other.
+APART = 60.0 * DEGREE
+_EQUATOR, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3  # WGS 84
+_ESTIMATE = "estimate"
+_OFFSETS = {"heading_offset_deg": "psi", "rudder_offset_deg": "delta"}
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """Where the antenna stands, what heading and rudder show too much, whether clocks are corrected."""
+
+    forward: float = 0.0  # of the antenna from midship, m
+    starboard: float = 0.0
+    heading_offset: float | str = 0.0  # shown where the truth is zero, rad, or "estimate"
+    rudder_offset: float | str = 0.0
+    clock_offsets: str | None = None  # "correct" or "keep"; None: corrected where channels have own clocks
+
+    @classmethod
+    def from_mapping(cls, table: Any, where: str, ship: Particulars | None = None) -> Instruments:
+        """Check the table ``[sensors]`` of a ship file; InputError also for an antenna outside the ship."""
+        check_keys(check_table(table, where), ("gnss_antenna", *_OFFSETS, "clock_offsets"), where)
+        antenna = check_table(table.get("gnss_antenna", {}), place := f"{where} gnss_antenna")
+        check_keys(antenna, ("forward", "starboard"), place)
+        at = {key: check_number(antenna.get(key, 0.0), f"{place}.{key}") for key in ("forward", "starboard")}
+        for key, size in (("forward", "length"), ("starboard", "beam")):
+            limit = 0.6 * float((ship and (ship.get(size) or ship.length)) or np.inf)
+            if ship is not None and abs(at[key]) > limit:
+                raise InputError(
+                    f"{place}.{key}: {at[key]:g} m found, outside the ship of {ship.length:g} m, expected at "
+                    f"most {limit:.4g} m from midship; measured from the aft perpendicular take off "
+                    f"{ship.length / 2:g}"
+                )
+        offsets = [
+            value
+            if (value := table.get(key, 0.0)) == _ESTIMATE
+            else DEGREE * check_number(value, f"{where} {key}", at_least=-180.0, hint=f'or "{_ESTIMATE}"')
+            for key in _OFFSETS
+        ]
+        if (clocks := table.get("clock_offsets")) is not None:
+            check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+        return cls(at["forward"], at["starboard"], offsets[0], offsets[1], clocks)
+
+
+NO_OFFSETS = Instruments()
+
+
+def local_metres(lat: Floats, lon: Floats, origin: tuple[float, float]) -> tuple[Floats, Floats]:
+    """North and east of an origin, m, of latitudes and longitudes in degrees, over the date line too.
+
+    On the tangent plane of WGS 84: within 1 part in 10,000 up to 30 km away.
+    """
+    phi = origin[0] * DEGREE
+    curvature = 1.0 - _ECCENTRICITY_2 * math.sin(phi) ** 2
+    east = (lon - origin[1] + 180.0) % 360.0 - 180.0
+    parallel = _EQUATOR / math.sqrt(curvature) * np.cos(0.5 * (lat * DEGREE + phi))
+    meridian = _EQUATOR * (1.0 - _ECCENTRICITY_2) / curvature**1.5
+    return meridian * (lat - origin[0]) * DEGREE, parallel * east * DEGREE
+
+
+def rotate_to_body(north: Floats, east: Floats, psi: Floats) -> tuple[Floats, Floats]:
+    """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
+    c, s = np.cos(psi), np.sin(psi)
+    return north * c + east * s, east * c - north * s
+
+
+def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> npt.NDArray[np.bool_]:
+    """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    width = math.ceil(STRAIGHT_S / float(np.median(np.diff(t)))) + 1
+    straight = np.full(t.size, "psi" in channels and t.size > width)
+    for name in {"psi", "delta"} & channels.keys():
+        values = channels[name]
+        straight &= maximum_filter1d(values, width) - minimum_filter1d(values, width) < STRAIGHT_RANGE
+    return straight
+
+
+def correct_offsets(t: Floats, channels: dict[str, Floats], tools: Instruments, where: str) -> list[str]:
+    """Take the offsets of heading and rudder out of the channels, in place; what was estimated, in words."""
+    notes = []
+    for (key, name), offset in zip(
+        _OFFSETS.items(), (tools.heading_offset, tools.rudder_offset), strict=True
+    ):
+        if name not in channels:
+            continue
+        if isinstance(offset, str):
+            straight = straight_parts(t, channels)
+            found = heading_offset(channels, straight) if name == "psi" else None
+            if name == "delta" and straight.any():
+                found = float(np.mean(channels["delta"][straight])), 0.0
+            if found is None:
+                needed = "with sog and cog on courses over 60 deg apart" if name == "psi" else "and a heading"
+                raise InputError(
+                    f'{where}: {key} = "estimate" found, expected straight parts of {STRAIGHT_S:g} s '
+                    f"{needed}; give {key} in degrees, or leave it out"
+                )
+            offset = found[0]
+            notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and taken out")
+        channels[name] = channels[name] - offset if offset else channels[name]
+    return notes
+
+
+def heading_offset(
+    channels: Mapping[str, Floats], straight: npt.NDArray[np.bool_]
+) -> tuple[float, float] | None:
+    """What the heading shows too much by the course over ground, with its standard error, rad.
+
+    An offset turns with the ship, a current does not: None without straight parts on several courses.
+    """
+    psi = channels["psi"][straight]
+    if "ground_north" not in channels or psi.size < 10 or np.ptp(psi) < APART:
+        return None
+    c, s, no, one = np.cos(psi), np.sin(psi), np.zeros(psi.size), np.ones(psi.size)
+    # times U cos(offset), U sin(offset) and the current
+    rows = np.vstack([np.stack([c, s, one, no], axis=1), np.stack([s, -c, no, one], axis=1)])
+    ground = np.concatenate([channels[name][straight] for name in ("ground_north", "ground_east")])
+    fitted = np.linalg.lstsq(rows, ground, rcond=None)[0]
+    variance = STRAIGHT_S / 2.0 * np.var(ground - rows @ fitted)  # samples of one part say the same
+    error = math.sqrt(variance * np.linalg.pinv(rows.T @ rows)[1, 1]) / float(np.hypot(*fitted[:2]))
+    return float(np.arctan2(fitted[1], fitted[0])), error
+
+
+def to_midship(
+    t: Floats, channels: dict[str, Floats], derived: set[str], tools: Instruments, where: str
+) -> list[str]:
+    """Move positions and velocities of GNSS to midship and make surge and sway of what was logged, in place.
+
+    Speed and course over ground give u and v, else positions; a speed through the water takes the place of u,
+    and the current that it shows is taken out of v. Returns remarks.
+    """
+    north, east, water = (channels.pop(name, None) for name in ("ground_north", "ground_east", "stw"))
+    moved = bool(tools.forward or tools.starboard)
+    if "psi" not in channels:
+        if north is not None or moved:
+            raise InputError(
+                f"{where}: positions or velocities of GNSS found without a heading, expected a column psi"
+            )
+        channels |= {} if water is None else {"u": water}
+        return []
+    psi, r = channels["psi"], channels["r"]
+    if moved and {"x", "y"} <= channels.keys():
+        ahead, aside = rotate_to_body(np.full(t.size, tools.forward), np.full(t.size, tools.starboard), -psi)
+        channels["x"], channels["y"] = channels["x"] - ahead, channels["y"] - aside
+    if north is not None and east is not None:
+        u, v = rotate_to_body(north, east, psi)
+        ground = (u + tools.starboard * r, v - tools.forward * r) if moved else (u, v)
+    elif {"x", "y"} <= channels.keys() and not {"u", "v"} <= channels.keys():
+        ground = rotate_to_body(time_derivative(t, channels["x"]), time_derivative(t, channels["y"]), psi)
+    else:
+        channels |= {} if water is None else {"u": water}
+        return []
+    notes = []
+    if water is not None:
+        current, note = set_and_drift(psi, water, ground)
+        c, s = np.cos(psi), np.sin(psi)
+        channels["u"], ground = water, (water, ground[1] - (c * current[1] - s * current[0]))
+        notes.append(note)
+    for name, values in zip(("u", "v"), ground, strict=True):
+        if name not in channels:
+            channels[name] = values
+            derived.add(name)
+    return notes
+
+
+def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> tuple[Floats, str]:
+    """The current, north and east, m/s, that a speed log shows against the ground, and that in words.
+
+    It explains best the difference of speed over ground and through the water along the ship; on nearly one
+    course the part across is taken from the mean sway, as if there were no leeway.
+    """
+    c, s = np.cos(psi), np.sin(psi)
+    rows, values = np.stack([c, s], axis=1), ground[0] - water
+    if np.ptp(psi) < APART:
+        rows, values = np.vstack([rows, np.stack([-s, c], axis=1)]), np.concatenate([values, ground[1]])
+    current = np.linalg.lstsq(rows, values, rcond=None)[0]
+    size, toward = float(np.hypot(*current)), math.degrees(math.atan2(current[1], current[0])) % 360.0
+    return current, (
+        f"set and drift by the speed log against the ground: {size:.2f} m/s ({size * 3.6 / 1.852:.2f} kn) "
+        "toward "
+        f"{toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; taken out of the sway"
+    )

@@ -1,0 +1,56 @@
+"""From a log to a ship file and a page, in commands that say what they guessed."""
+
+import numpy as np
+import pytest
+
+from agents.cli import main
+from shipgym.trials.ship_file import ShipFile
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    """Heading and rudder of a first-order ship, the rudder positive to port, in degrees, with clock times."""
+    t = np.arange(300.0)
+    delta, r = 10.0 * np.sign(np.sin(0.07 * t)), np.zeros(t.size)
+    for k in range(1, t.size):
+        r[k] = r[k - 1] + (0.08 * delta[k - 1] - r[k - 1]) / 12.0
+    lines = ["time;Gyro [deg];Rudder"]
+    for k, psi in enumerate(30.0 + np.cumsum(r)):
+        lines.append(f"2024-05-31 09:{30 + k // 60}:{k % 60:02d};{psi:.2f};{-delta[k]:.1f}".replace(".", ","))
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def command(monkeypatch, capsys, *words):
+    monkeypatch.setattr("sys.argv", ["shipgym", *words])
+    with pytest.raises(SystemExit) as left:
+        main()
+    shown = capsys.readouterr()
+    return left.value.code or 0, shown.out + shown.err
+
+
+def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(log, monkeypatch, capsys):
+    code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", "150")
+    assert code == 0
+    assert "psi: column 'Gyro [deg]' in deg, unit by its name" in said
+    assert "delta: column 'Rudder' in deg, unit by its size, up to 10" in said
+    assert "a positive rudder steers to port, by the yaw that follows it" in said
+    (trial,) = ShipFile.load(log / "ship.toml").trials()
+    assert trial["delta"][20] == pytest.approx(np.radians(10.0))
+    code, said = command(monkeypatch, capsys, "new-ship", "log.csv")
+    assert (code, "ship.toml: exists already" in said) == (2, True)
+
+
+def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
+    code, said = command(monkeypatch, capsys, "look", "log.csv")
+    assert (code, "log.csv: 300 samples over 299 s: psi, r, delta" in said) == (0, True)
+    page = (log / "look.html").read_text()
+    assert page.count("Plotly.newPlot(") == 1
+    assert "The channels over time." in page
+
+
+def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
+    (log / "bad.csv").write_text("a;b\n1;2\n")
+    code, said = command(monkeypatch, capsys, "look", "bad.csv")
+    assert (code, "no column is named like a channel" in said) == (2, True)
