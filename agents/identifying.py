@@ -11,7 +11,7 @@ from identification.estimators.methods import METHODS
 from identification.validation.comparison import Comparison, compare_methods
 from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.trials.identify_table import check_options
+from shipgym.trials.identify_table import AUTO, check_options
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
 
@@ -19,11 +19,12 @@ RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it implies the
 MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file
 
 
-def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[str, Any]:
+def identification_settings(ship: ShipFile, given: Mapping[str, Any], unnamed: str = AUTO) -> dict[str, Any]:
     """Arguments of `identify`: those given, else the ship file's; the others are left to their defaults.
 
     `ship`: files that it names are found from its folder; `given`: by option; None for those that were not
-    given. Raises InputError for an option that does not exist or has a value of another kind.
+    given; `unnamed`: the structure where neither names one, nor a kernel. Raises InputError for
+    an option that does not exist or has a value of another kind.
     """
     own = dict(ship.identify)
     for option in MODELS:
@@ -37,6 +38,10 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any]) -> dict[st
         chosen.setdefault("reference_model", "auto")
     elif "structure" in given and given["structure"] is not None and given.get("reference_model") is None:
         chosen.pop("reference_model", None)  # of the structure that the ship file names
+    if "kernel" not in chosen:
+        chosen.setdefault("structure", unnamed if ship.structure is None else ship.structure.name)
+    if ship.structure is not None and chosen.get("structure") == ship.structure.name:
+        chosen["structure"] = ship.structure
     return chosen
 
 
@@ -64,19 +69,25 @@ def identify_trials(
         return identify(trials, particulars=ship.particulars, steering=ship.steering, **arguments)
 
 
-def compare_ship(ship: ShipFile, settings: Mapping[str, Any], methods: str | None) -> Comparison:
+def compare_ship(
+    ship: ShipFile, settings: Mapping[str, Any], structures: str | None, methods: str | None
+) -> Comparison:
     """`compare_methods` on a ship file.
 
-    `ship`: its trials are read; `settings`: from `identification_settings`; their method does not count;
-    `methods`: names with commas between, "all", or None for the usual ones.
+    `ship`: its trials are read; `settings`: from `identification_settings`; their method does not count, and
+    their structure where `structures` are named; names have commas between, None is for the usual `methods`,
+    and "all" for every one.
     """
     trials, arguments = trials_of(ship, settings)
     arguments.pop("method", None)
+    known: dict[str, Any] = {} if ship.structure is None else {ship.structure.name: ship.structure}
+    wanted = structures and [known.get(name.strip(), name.strip()) for name in structures.split(",")]
+    if wanted:
+        arguments.pop("structure", None)
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
+    own = {"particulars": ship.particulars, "steering": ship.steering, **arguments}
     with placed(str(ship.path)):
-        return compare_methods(
-            trials, names or None, particulars=ship.particulars, steering=ship.steering, **arguments
-        )
+        return compare_methods(trials, names or None, wanted or None, **own)
 
 
 def reduce_ship(

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from shipgym.ships import ShipModel
+from shipgym.ships import ShipModel, Structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import Options
 from shipgym.trials.trial import Trial
 
-__all__ = ["Options", "name_of", "provenance_settings", "whole_call"]
+Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
+
+__all__ = ["Given", "Options", "name_of", "provenance_settings", "whole_call"]
 
 
 def provenance_settings(options: Options, of_method: Mapping[str, Any]) -> dict[str, Any]:
@@ -27,10 +29,7 @@ def provenance_settings(options: Options, of_method: Mapping[str, Any]) -> dict[
 
 
 def whole_call(
-    options: Options,
-    trials: Sequence[Trial],
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    options: Options, trials: Sequence[Trial], particulars: Given, steering: SteeringGear | None
 ) -> dict[str, Any]:
     """The whole call for settings.json, trials by name, use and hash."""
     given = {**options.own(), **options.settings(), "particulars": particulars, "steering": steering}
@@ -45,14 +44,14 @@ def name_of(value: Any) -> str:
     """The name of a model or of a method, of an estimator that of its class."""
     if isinstance(value, str):
         return value
-    return value.name if isinstance(value, ShipModel) else type(value).__name__
+    return value.name if isinstance(value, ShipModel | Structure) else type(value).__name__
 
 
 def _plain(value: Any) -> Any:
     """A setting as JSON knows it: infinity as null, models and trials by their names."""
     if isinstance(value, ShipModel | Trial):
         return value.name
-    if isinstance(value, Particulars | SteeringGear):
+    if isinstance(value, Particulars | SteeringGear | Structure):
         return value.to_dict()
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}

@@ -14,9 +14,9 @@ from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
 from identification.estimators.threads import on_one_thread
-from identification.options import Options, name_of, provenance_settings, whole_call
+from identification.options import Given, Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics, explained_samples
-from identification.regression.problem import Problem, pose
+from identification.regression.problem import Problem, held_out, pose
 from identification.regression.samples import Samples
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import MAP, checked_mmg, fit_mmg
@@ -29,11 +29,13 @@ from identification.validation.diagnostics import diagnose
 from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
-from shipgym.ships import GreyBox, ShipModel
+from identification.validation.selection import select
+from shipgym.ships import GreyBox, ShipModel, Structure
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from shipgym.trials.identify_table import AUTO
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -44,10 +46,10 @@ MEMORY = 1.0  # of residuals, in the time to sail one ship length
 @on_one_thread
 def identify(
     trials: Sequence[Trial],
-    structure: str = "abkowitz",
+    structure: str | Structure = "abkowitz",
     method: str = "tls-svm",
     samples: str = "spline",
-    particulars: Particulars | Mapping[str, Any] | None = None,
+    particulars: Given = None,
     steering: SteeringGear | None = None,
     **options: Any,
 ) -> IdentificationResult:
@@ -60,8 +62,9 @@ def identify(
     trials : sequence of Trial
         Those with `use` "fit" are fitted; they need the channels u, v, r and delta, and n for structures
         that know the shaft speed.
-    structure : str
-        Terms of the model: a name of `shipgym.list_structures`.
+    structure : str or Structure
+        Terms of the model: a name of `shipgym.list_structures`, a table, or "auto": the structure and method
+        that predict the trials to fit best, each held out in turn; a method other than the default is kept.
     method : str or estimator
         A name of `identification.estimators.methods.METHODS`, or an object with scikit-learn's interface,
         `fit(X, y)` that sets `coef_`, of which each equation gets a copy.
@@ -81,6 +84,8 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
+    if structure == AUTO and asked.kernel is None:
+        return _identified_best(trials, asked, particulars, steering)
     if asked.kernel is not None:
         return _identified_with_kernel(trials, asked, particulars, steering)
     if structure == MMG:
@@ -88,17 +93,33 @@ def identify(
     chosen = get_method(method)
     problem = pose(trials, asked, particulars, steering)
     fit, refined = _fitted(chosen, asked, problem)
-    provenance = _provenance(asked, chosen, fit, refined, problem)
+    provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
     call = whole_call(asked, problem.trials, particulars, steering)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
 
 
+def _identified_best(
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
+) -> IdentificationResult:
+    """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
+
+    def fitted(some: Sequence[Trial], own: Options) -> IdentificationResult:
+        return identify(some, particulars=particulars, steering=steering, **own.own(), **own.settings())
+
+    marked = held_out(trials, options.hold_out)
+    chosen, found = select(fitted, [trial for trial in marked if trial.use == "fit"], options)
+    best = fitted(trials, chosen)
+    return replace(
+        best,
+        model=replace(best.model, provenance={**(best.model.provenance or {}), "selection": found}),
+        metrics=best.metrics | {"selection": found},
+        settings=whole_call(options, marked, particulars, steering),
+    )
+
+
 def _identified_with_kernel(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """A reference ship, fitted to the trials or named, and a kernel on what she leaves."""
     beneath = reference_options(options)
@@ -113,41 +134,25 @@ def _identified_with_kernel(
     found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
     fit = _simulated(found.model, found.estimators, problem.used)
     problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
-    provenance: dict[str, Any] = {
-        "structure": beneath.structure,
-        "method": name_of(options.method),
-        "samples": options.samples,
-        "settings": provenance_settings(options, options.settings()),
-        **_reference(problem),
-        **_origin(fit, found.samples, problem.used),
-        "kernel": found.report,
-    }
+    named = replace(options, structure=beneath.structure)
+    provenance = _provenance(named, name_of(options.method), options.settings(), fit, problem)
+    provenance["kernel"] = found.report
     covariance = _scaled_covariance(options, fit, None, problem, provenance)
     call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance, call)
 
 
 def _identified_mmg(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
     samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
     fit = _simulated(found.model, estimators, problem.used)
-    provenance = {
-        "structure": MMG,
-        "method": MAP,
-        "samples": options.samples,
-        "settings": provenance_settings(options, {}),
-        **_origin(fit, samples, problem.used),
-        **found.report,
-    }
-    call = whole_call(options, problem.trials, particulars, steering)
     problem = replace(problem, samples=samples, blank=found.model)
+    provenance = _provenance(options, MAP, {}, fit, problem) | found.report
+    call = whole_call(options, problem.trials, particulars, steering)
     return _evaluated(found.model, fit, problem, provenance, call)
 
 
@@ -178,18 +183,40 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
 
 
 def _provenance(
+    options: Options, method: str, settings: Mapping[str, Any], fit: GuardedFit, problem: Problem
+) -> dict[str, Any]:
+    """How a model came about, for its file; `settings`: of the method."""
+    box, samples = problem.table, problem.samples
+    reference = {}
+    if isinstance(box, GreyBox):
+        reference["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
+    searched = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
+    return {
+        "structure": name_of(options.structure),
+        "method": method,
+        "samples": options.samples,
+        "settings": provenance_settings(options, settings),
+        **reference,
+        "software": f"shipgym {shipgym.__version__}",
+        "steps_per_window": samples.window,
+        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
+        **({"search": searched} if searched else {}),
+        "guard": fit.report,
+        "stable": fit.stable,
+        "trials": [
+            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
+            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
+            for trial in problem.used
+        ],
+    }
+
+
+def _fitted_provenance(
     options: Options, method: Method, fit: GuardedFit, refined: Refined | None, problem: Problem
 ) -> dict[str, Any]:
-    """How a model came about, for its file."""
+    """How a model that was fitted by regression came about."""
     _, of_method = split_settings(options.settings(), method.refined)
-    found: dict[str, Any] = {
-        "structure": options.structure,
-        "method": method.name,
-        "samples": options.samples,
-        "settings": provenance_settings(options, of_method),
-        **_reference(problem),
-        **_origin(fit, problem.samples, problem.used),
-    }
+    found = _provenance(options, method.name, of_method, fit, problem)
     if options.prior is not None:
         prior = next(iter(getattr(estimator, "prior_", {}) for estimator in fit.estimators.values()), {})
         found |= {"prior": name_of(options.prior), **prior}
@@ -264,47 +291,26 @@ def _left_out(
     ]
 
 
-def _origin(fit: GuardedFit, regression: Samples, used: Sequence[Trial]) -> dict[str, Any]:
-    """The origin of a fit and its outcome, for the model's provenance."""
-    return {
-        "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": regression.window,
-        "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
-        **_searched(fit),
-        "guard": fit.report,
-        "stable": fit.stable,
-        "trials": [
-            {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
-            | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
-            for trial in used
-        ],
-    }
-
-
-def _searched(fit: GuardedFit) -> dict[str, Any]:
-    """What a search chose for each equation; nothing for methods that do not search."""
-    chosen = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
-    return {"search": chosen} if chosen else {}
-
-
 def _evaluated(
     model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
     provenance |= problem.sea
     provenance["steering"] = "estimated" if call["steering"] is None else "given"
-    model = replace(model, provenance=provenance)
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
-    model = _marked(model, [name for name, predicted in predictions.items() if predicted is None])
-    stable = bool((model.provenance or {})["stable"])
+    lost = [name for name, predicted in predictions.items() if predicted is None]
+    if lost:
+        provenance |= {"stable": False, "runs_away_on": lost}
+    model, stable = replace(model, provenance=provenance), bool(provenance["stable"])
+    reasons = [f"trial {name!r}, open loop" for name in lost] or provenance["guard"].get("rejected", [])
     bare = {"reference": bare_metrics(model, trials)} if isinstance(problem.table, GreyBox) else {}
     return IdentificationResult(
         model=model,
         stable=stable,
         metrics={
             "stable": stable,
-            "instability": None if stable else _why_unstable(model.provenance or {}),
+            "instability": None if stable else f"runs away: {'; '.join(reasons)}",
             "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
             **bare,
         },
@@ -316,26 +322,3 @@ def _evaluated(
         settings=call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )
-
-
-def _why_unstable(provenance: Mapping[str, Any]) -> str:
-    """The trials that the model runs away on, or the simulations of the guard."""
-    lost = [f"trial {name!r}, open loop" for name in provenance.get("runs_away_on", [])]
-    return "runs away: " + "; ".join(lost or provenance["guard"].get("rejected", []))
-
-
-def _marked(model: ShipModel, lost: Sequence[str]) -> ShipModel:
-    """The model, marked where it runs away on a recorded trial, one held out too."""
-    if not lost:
-        return model
-    return replace(
-        model, provenance={**(model.provenance or {}), "stable": False, "runs_away_on": list(lost)}
-    )
-
-
-def _reference(problem: Problem) -> dict[str, Any]:
-    """What a grey box stands on, for the provenance; nothing for other structures."""
-    box = problem.table
-    if not isinstance(box, GreyBox):
-        return {}
-    return {"reference": {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}}

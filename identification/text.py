@@ -5,12 +5,23 @@ from __future__ import annotations
 from io import StringIO
 
 from rich.console import Console, RenderableType
+from rich.table import Table
 
 WIDTH = 100
 
 
 def as_text(*tables: RenderableType) -> str:
-    """Tables one below the other, without colours."""
+    """Tables and lines one below the other, without colours."""
     file = StringIO()
-    Console(file=file, width=WIDTH, color_system=None).print(*tables)
+    console = Console(file=file, width=WIDTH, color_system=None)
+    for table in tables:
+        console.print(table, highlight=False, soft_wrap=isinstance(table, str))
     return file.getvalue()
+
+
+def lined_table(title: str, *headings: str) -> Table:
+    """A table with its title to the left; a heading that begins with > is aligned right."""
+    table = Table(title=title, title_justify="left")
+    for heading in headings:
+        table.add_column(heading.removeprefix(">"), justify="right" if heading[0] == ">" else "left")
+    return table

@@ -118,11 +118,10 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
     """Coverage of one case without and with model error: lists of whether an interval holds the truth."""
     warnings.simplefilter("ignore")
     ship = ship_of(name)
+    table, _, reference = structure.partition(":")
+    grey = {"reference_model": reference, "method": "rm-svm"} if reference else {}
     result = identify(
-        sea_trials(ship, kind, seed),
-        structure=structure,
-        particulars=ship.particulars,
-        steering=ship.steering,
+        sea_trials(ship, kind, seed), table, particulars=ship.particulars, steering=ship.steering, **grey
     )
     row: dict[str, object] = {"ship": name, "structure": structure, "trials": kind, "seed": seed}
     if not result.stable:
@@ -178,12 +177,15 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="of the noise")
     parser.add_argument("--draws", type=int, default=40, help="models drawn")
     parser.add_argument("--ships", default=",".join(SHIPS), help="with commas between")
+    parser.add_argument(
+        "--structures", default=",".join(STRUCTURES), help="grey-box:SHIP is RM-SVM on a reference ship"
+    )
     parser.add_argument("--workers", type=int, default=2)
     given = parser.parse_args()
     cases = [
         (ship, structure, kind, seed, given.draws)
         for ship in given.ships.split(",")
-        for structure in STRUCTURES
+        for structure in given.structures.split(",")
         if OWN.get(ship) != structure
         for kind in TRIALS
         for seed in range(given.seeds)

@@ -25,6 +25,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.verification": (3.5, 1, "the chain of shipgym autopilot"),
     "agents.rollouts": (1.25, 2, "one loop, metrics, replays"),
     "agents.engines": (3.5, 2, "jobs: processes, Ray"),
+    "agents.deployment": (2.37, 2, "C99, FMU, NMEA 0183"),
     "agents.policies": (0.5, 3, "learned policies, shield, ONNX"),
     "agents.controllers": (2, 3, "PID, LQ, LQG, MPC, adaptive"),
     "agents.suites": (3.5, 3, "tasks and seeds of benchmarks"),

@@ -49,6 +49,11 @@ mpc = MPC.from_model(shipgym.load_model("mariner"))
 action, _ = mpc.predict(numpy.full(len(mpc.observation_names), 0.1, numpy.float32))
 assert abs(action).max() > 0.0
 """
+NMEA = """
+from agents.deployment.nmea import library, readings, sentences
+assert library("serial").VERSION
+assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
+"""
 SHIP = str(ROOT / "examples" / "mariner" / "ship.toml")
 BENCHMARK = ("benchmark", "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", "2", "--out")
 LEARN = ("ppo", "--total-steps", "64", "--set", "ships=2", "--set", "n_steps=32", "--set", "batch_size=32")
@@ -61,6 +66,8 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "render": (PICTURE,),
     "mpc": (MPC,),
     "onnx": (("export", str(ROOT / "agents/pretrained/mariner-calm-ppo.json"), "--onnx", "agent.onnx"),),
+    "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
+    "nmea": (NMEA,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),
     "ray": ((*BENCHMARK, "results", "--engine", "ray", "--no-page"),),

@@ -1,6 +1,6 @@
 """Run the papers' tables again: `python scripts/reproduce.py all`, or one paper, or `requirements`.
 
-Two minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an aim is missed.
+Two to four minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an aim is missed.
 """
 
 from __future__ import annotations
@@ -23,10 +23,13 @@ app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_mar
 @answered
 def main(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="A paper's short name, or requirements.")
+        str, typer.Argument(metavar="PAPER", help="A paper's short name, comparators or requirements.")
     ] = ALL,
     markdown: Annotated[
         Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+    ] = None,
+    images: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="Draw the papers' figures into this folder.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -36,6 +39,11 @@ def main(
         results = reproduce(names, tell=status.update)
     if markdown is not None:
         write_text(page(results), markdown)
+    drawn = []
+    if images is not None:
+        from papers.figures import draw  # matplotlib, and every paper
+
+        drawn = [file for name in names for file in draw(name, images)]
     if as_json:
         print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
     else:
@@ -44,6 +52,8 @@ def main(
             console.print()
         if markdown is not None:
             console.print(f"written: {markdown}", soft_wrap=True)
+        for file in drawn:
+            console.print(f"written: {file}", soft_wrap=True)
     late = missed(results)
     if late:
         fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)

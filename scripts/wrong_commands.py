@@ -36,6 +36,8 @@ RIGHT: dict[str, list[str]] = {
     "reduce": [SHIP, "--out", "out"],
     "autopilot": [SHIP, "--out", "out"],
     "export": [AGENT, "--onnx", "out"],
+    "steer": [AGENT, "--nmea", "tcp:127.0.0.1:1"],  # where nobody listens
+    "simulate": ["mariner", "--nmea", "tcp:256.0.0.1:1"],  # where nobody can
     "train": ["ppo", "--out", "out"],
     "tune": ["ppo", "--out", "out"],
     "benchmark": ["--controllers", "pid", "--out", "out"],
@@ -53,7 +55,7 @@ WRONG: dict[str, tuple[str, ...]] = {
     "Path": ("", "no/such/thing", "/", ".", "/proc/self/mem", "/dev/null", "x" * 5000, "binary", "\0"),
     "out": ("", "file", "file/out", "full", "/proc/self/mem", "/dev/full", "x" * 5000, "/proc/x", "\0"),
 }
-WRITTEN = ("out", "onnx", "markdown")  # parameters that name what is written
+WRITTEN = ("out", "onnx", "markdown", "c", "fmu")  # parameters that name what is written
 
 
 def commands() -> dict[str, Any]:
@@ -86,7 +88,9 @@ def _wrong(parameter: Any, kind: str, right: list[str]) -> Iterator[list[str]]:
     """What is wrong of one parameter, beside what is right of the others."""
     values = next((values for name, values in WRONG.items() if name in kind), WRONG["str"])
     if parameter.name in WRITTEN:
-        values = WRONG["out"]
+        values = tuple(
+            one for one in WRONG["out"] if (parameter.name, one) != ("onnx", "file")
+        )  # is replaced
     if parameter.param_type_name == "argument":
         yield from ([value, *right[1:]] for value in values)
         return

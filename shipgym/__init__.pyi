@@ -25,6 +25,7 @@ from .ships import list_structures as list_structures
 from .ships import load_model as load_model
 from .ships import register_ship_equations as register_ship_equations
 from .ships import register_structure as register_structure
+from .ships import truth_of as truth_of
 from .ships.checker import ModelCheck as ModelCheck
 from .ships.checker import check_ship_model as check_ship_model
 from .ships.particulars import Particulars as Particulars

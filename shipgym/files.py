@@ -14,7 +14,7 @@ import stat
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EBUSY, ENOENT, EXDEV
 from functools import cache, partial
@@ -254,6 +254,17 @@ def toml_value(text: str) -> Any:
         return parse_toml(f"value = {text}", "value:")["value"]
     except InputError:
         return text
+
+
+def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, Any]:
+    """Values of texts `name=value`, as TOML has them, by name; InputError for one written otherwise."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = (part.strip() for part in text.partition("="))
+        if not sign or not name:
+            raise InputError(f"{where}: {text!r} found, expected name=value, such as {where} {example}")
+        found[name] = toml_value(value)
+    return found
 
 
 def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1) -> None:

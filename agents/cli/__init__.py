@@ -34,6 +34,7 @@ from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.logs import look_command, new_ship_command
 from agents.cli.reproduction import reproduce_command
+from agents.cli.steer import simulate_command, steer_command
 from agents.cli.training import train_command
 from agents.cli.tuning import tune_command
 from agents.cli.warm import warm_command
@@ -76,6 +77,8 @@ app.command("identify", cls=IdentifyCommand)(identify_command)
 app.command("advise", cls=IdentifyCommand)(advise_command)
 app.command("reduce", cls=IdentifyCommand)(reduce_command)
 app.command("export")(export_command)
+app.command("steer")(steer_command)
+app.command("simulate")(simulate_command)
 app.command("train")(train_command)
 app.command("tune")(tune_command)
 app.command("benchmark")(benchmark_command)

@@ -77,6 +77,8 @@ def benchmark_command(
     if verify is not None:
         _verify(verify, sample, tolerance, workers, allow_code or [], as_json)
         return
+    if allow_code or tolerance is not None:
+        fail("--allow-code and --tolerance are for --verify alone, leave them out", 2)
     from agents.benchmarking.run import benchmark
     from agents.cli.terminal import progress_bars
     from agents.controllers.designs import CLASSICAL

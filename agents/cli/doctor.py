@@ -26,6 +26,8 @@ EXTRAS = {
     "rl": ("torch", "stable-baselines3", "sb3-contrib"),
     "ray": ("ray",),
     "render": ("pygame-ce",),
+    "fmu": ("fmpy",),
+    "nmea": ("pynmea2", "pyserial"),
 }
 MARKS = {
     "fine": ("ok", "green"), "absent": ("absent", "dim"), "left": ("left", "yellow"),

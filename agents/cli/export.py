@@ -1,24 +1,83 @@
-"""Commands on learned policies."""
+"""`shipgym export`: controllers, learned policies and ship models for use outside Python."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from agents.cli.command import answered
 
+if TYPE_CHECKING:
+    from agents.deployment.c99 import Source
+
 
 @answered
 def export_command(
-    agent: Annotated[Path, typer.Argument(metavar="AGENT.JSON", help="A learned policy's file.")],
-    onnx: Annotated[Path, typer.Option(metavar="OUT.ONNX", help="The file to write.")],
+    what: Annotated[
+        str,
+        typer.Argument(
+            metavar="AGENT|MODEL", help="A controller's, policy's or model's file, or a shipped name."
+        ),
+    ],
+    onnx: Annotated[
+        Path | None, typer.Option(metavar="OUT.ONNX", help="Write a learned policy as an ONNX graph.")
+    ] = None,
+    c: Annotated[
+        Path | None, typer.Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")
+    ] = None,
+    fmu: Annotated[
+        Path | None, typer.Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
+    ] = None,
+    fmi: Annotated[str, typer.Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
+    name: Annotated[str | None, typer.Option(help="In C and FMU; default: that of the file.")] = None,
+    depth: Annotated[
+        float, typer.Option(metavar="M", help="Of a model: depth of the water, m; default: deep.")
+    ] = float("inf"),
 ) -> None:
-    """Write a learned policy as an ONNX file, observation to action; torch is not needed."""
+    """Write an autopilot or a ship model as C99, as an FMU or, of a learned policy, as ONNX."""
     from agents.agent_file import load_agent
     from agents.cli.terminal import out as console
+    from agents.cli.terminal import warn
+    from agents.deployment.fmu import write_fmu
+    from agents.output import whole_folder
     from agents.policies.onnx_export import export_onnx
+    from shipgym.errors import InputError
 
-    export_onnx(load_agent(agent), onnx)
-    console.print(f"written: {onnx}", soft_wrap=True)
+    if not (onnx or c or fmu):
+        raise InputError("nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX")
+    if not (c or fmu) and (name, fmi, depth) != (None, "3.0", float("inf")):
+        raise InputError("--name, --fmi and --depth found, which are for --c and --fmu alone; leave them out")
+    if c or fmu:
+        source = _source(what, name, depth)
+        for note in source.notes:
+            warn(note)
+    if c:
+        texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
+        with whole_folder(c, texts) as draft:
+            for file, text in texts.items():
+                (draft / file).write_text(text, encoding="utf-8")
+    if fmu:
+        write_fmu(source, fmu, fmi)
+    if onnx:
+        export_onnx(load_agent(what), onnx)
+    for path in filter(None, (onnx, c, fmu)):
+        console.print(f"written: {path}", soft_wrap=True)
+
+
+def _source(what: str, name: str | None, depth: float) -> Source:
+    """C99 of whatever a file or a name stands for."""
+    from agents.agent_file import list_pretrained, load_agent
+    from agents.deployment.c99 import autopilot_source, ship_source
+    from shipgym.errors import InputError
+    from shipgym.files import read_json
+    from shipgym.ships import load_model
+
+    file, what_it_is = Path(what), "file of a controller or a model"
+    content = read_json(file, what_it_is, "take another copy") if file.suffix == ".json" else {}
+    if "kind" in content or what in list_pretrained():
+        if depth != float("inf"):
+            raise InputError(f"--depth: {depth:g} found, but {what} is an autopilot; leave it out")
+        return autopilot_source(load_agent(what), name or file.stem)
+    return ship_source(load_model(what), name or file.stem, depth)

@@ -23,38 +23,43 @@ def identify_command(
     *,
     options: IdentifyOptions,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Fit several methods and rank them on the trials held out.")
+        bool,
+        typer.Option("--compare", help="Fit structures and methods and rank them on the trials held out."),
     ] = False,
     methods: Annotated[
         str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or all.")
+    ] = None,
+    structures: Annotated[
+        str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or auto.")
     ] = None,
     as_json: Json = False,
 ) -> None:
     """Identify a manoeuvring model from recorded trials; write model, metrics, settings and report.
 
-    Options not given here are those of the ship file's table [identify]. With --compare the methods are
-    ranked on the trials held out, and comparison and models are written instead.
+    Options not given here are those of the ship file's table [identify]; where neither names a structure,
+    structure and method are those that predict trials held out best. With --compare structures and methods
+    are ranked on the trials held out, and comparison and models are written instead.
 
     Exits with 1 if the identified model is unstable.
     """
     read, settings = _chosen(ship, options)
-    if compare or methods is not None:
-        _compare(read, settings, out, methods, as_json)
+    if compare or methods is not None or structures is not None:
+        _compare(read, settings, out, (structures, methods), as_json)
     else:
         _identify(read, settings, out, as_json)
 
 
-def _chosen(ship: Path, options: dict[str, Any]) -> tuple[ShipFile, dict[str, Any]]:
-    """The ship file, and the options: of the command line first."""
+def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFile, dict[str, Any]]:
+    """The ship file, and the options: of the command line first; `unnamed`: the structure if not auto."""
     from agents.identifying import identification_settings
     from shipgym.trials.ship_file import ShipFile
 
     read = ShipFile.load(ship)
-    return read, identification_settings(read, options)
+    return read, identification_settings(read, options, *unnamed)
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
-    from agents.cli.terminal import err, prediction_table, print_json
+    from agents.cli.terminal import err, prediction_table, print_json, selection_table
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
     from agents.output import whole_folder
@@ -68,6 +73,10 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
     if as_json:
         print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
     else:
+        if "selection" in result.metrics:
+            console.print(selection_table(result.metrics["selection"]))
+            for name, reason in result.metrics["selection"]["refused"].items():
+                console.print(f"{name} was not fitted: {reason}", soft_wrap=True)
         if instability is None:
             console.print(result.summary(), soft_wrap=True)
             console.print(prediction_table(result))
@@ -89,20 +98,23 @@ def _check_stable(result: IdentificationResult) -> None:
         warn(warning)
 
 
-def _compare(read: ShipFile, settings: dict[str, Any], out: Path, methods: str | None, as_json: bool) -> None:
-    from agents.cli.terminal import comparison_table, err, print_json, warn
+def _compare(
+    read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None], as_json: bool
+) -> None:
+    from agents.cli.terminal import err, print_json, selection_table, warn
     from agents.cli.terminal import out as console
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
 
-    with whole_folder(out, COMPARISON_FILES) as draft, err.status("comparing"):
-        found = compare_ship(read, settings, methods)
+    own = () if read.structure is None else (f"model-{read.structure.name}.json",)
+    with whole_folder(out, (*COMPARISON_FILES, *own)) as draft, err.status("comparing"):
+        found = compare_ship(read, settings, *names)
         found.save(draft)
     if as_json:
         print_json(found.to_dict())
     else:
-        console.print(comparison_table(found))
+        console.print(selection_table(found.to_dict()))
         console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
@@ -138,7 +150,7 @@ def advise_command(
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
-    read, settings = _chosen(ship, options)
+    read, settings = _chosen(ship, options, "abkowitz")
     with err.status("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
@@ -176,7 +188,7 @@ def reduce_command(
     from identification.result import FILES
     from shipgym.files import write_json
 
-    read, settings = _chosen(ship, options)
+    read, settings = _chosen(ship, options, "abkowitz")
     with whole_folder(out, (*FILES, "reduction.json")) as draft, err.status("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()

@@ -5,14 +5,12 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
-from shipgym.errors import InputError
-from shipgym.files import toml_value
-from shipgym.trials.identify_table import FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
+from shipgym.files import named_values
+from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
 TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
 #: Options with a name of their own on the command line.
@@ -70,7 +68,7 @@ def _help(name: str) -> str:
     if option.choices:
         *others, last = option.choices
         text += f": {', '.join(others)} or {last}"
-    default = next(item.default for item in fields(Options) if item.name == name)
+    default = AUTO if name == "structure" else getattr(Options, name)
     if isinstance(default, str):
         text += f"; default: the ship file's, else {default}"
     return f"{text}; may be repeated." if option.kind == TEXTS else f"{text}."
@@ -87,10 +85,4 @@ def parsed_options(texts: Sequence[str]) -> dict[str, Any]:
 
     Raises InputError for one that is not, or has no such name.
     """
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, value = text.partition("=")
-        if not sign or not name.strip():
-            raise InputError(f"--set: {text!r} found, expected name=value, such as --set seed=3")
-        found[name.strip()] = toml_value(value.strip())
-    return check_options(found, "--set")
+    return check_options(named_values(texts, "--set", "seed=3"), "--set")

@@ -19,7 +19,8 @@ def reproduce_command(
     paper: Annotated[
         str,
         typer.Argument(
-            metavar="PAPER", help="cao2015, xu2020, zhu2018, mei2019, song2020, requirements or all."
+            metavar="PAPER",
+            help="cao2015, xu2020, zhu2018, mei2019, song2020, comparators, requirements or all.",
         ),
     ],
     markdown: Annotated[
@@ -38,6 +39,4 @@ def reproduce_command(
             WRONG_INPUT,
         )
     options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if as_json else [])]
-    done = subprocess.run([sys.executable, str(SCRIPT), paper, *options], check=False)
-    if done.returncode:
-        raise typer.Exit(done.returncode)
+    raise typer.Exit(subprocess.run([sys.executable, str(SCRIPT), paper, *options], check=False).returncode)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from agents.verification.chain import Progress
     from agents.verification.result import AutopilotResult
     from identification import IdentificationResult
-    from identification.validation.comparison import Comparison
     from shipgym.manoeuvres import Criterion, IndexInterval
 
 WIDTH_WITHOUT_TERMINAL = 110
@@ -162,27 +161,18 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
     return table
 
 
-def comparison_table(comparison: Comparison) -> Table:
-    """Methods by how well they predict the trials held out, the best first."""
-    held = "each trial in turn" if comparison.in_turn else "trials held out"
+def selection_table(ranking: Mapping[str, Any]) -> Table:
+    """Structures and methods by how well they predict the trials held out, the best first."""
     headings = (
-        "method",
-        "model",
-        ">error by\nstd. dev.",
-        ">heading\ndeg",
-        ">yaw rate\ndeg/s",
-        ">ran away\ntrials",
-    )
-    table = plain_table(f"Methods by how they predict {held}", *headings)
-    for standing in comparison.standings:
-        table.add_row(
-            standing.method,
-            "stable" if standing.stable else Text("unstable", "bold red"),
-            _number(standing.error, 4),
-            _number(standing.heading_deg, 2),
-            _number(standing.yaw_rate_deg_s, 4),
-            str(standing.ran_away),
-        )
+        "method", "structure", ">coeffi-\ncients", "model", ">error by\nstd. dev.", ">heading\ndeg",
+        ">yaw rate\ndeg/s", ">ran away\ntrials",
+    )  # fmt: skip
+    table = plain_table(f"Structures and methods by how they predict {ranking['held_out']}", *headings)
+    for one in ranking["ranking"]:
+        state = "stable" if one["stable"] else Text("unstable", "bold red")
+        figures = (("error", 4), ("heading_deg", 2), ("yaw_rate_deg_s", 4), ("ran_away", 0))
+        numbers = (_number(one[name], digits) for name, digits in figures)
+        table.add_row(one["method"], one["structure"], str(one["coefficients"]), state, *numbers)
     return table
 
 

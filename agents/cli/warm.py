@@ -68,12 +68,12 @@ def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json =
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:
     """Environments and models that are asked for."""
-    from shipgym.envs.registration import TASKS, VARIANTS
+    from shipgym.envs.registration import TASKS, env_id, environments
     from shipgym.ships import list_models
 
     if everything:
-        return [f"shipgym/{task}{variant}-v0" for task in TASKS for variant in VARIANTS] + list_models()
-    return wanted or [*(f"shipgym/{task}-v0" for task in TASKS), "mariner"]
+        return [*environments(), *list_models()]
+    return wanted or [*map(env_id, TASKS), "mariner"]
 
 
 def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
@@ -98,6 +98,10 @@ def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _make(env_id: str, options: dict[str, Any]) -> None:
+    import warnings
+
     import gymnasium
 
-    gymnasium.make(env_id, **options).close()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # of ids that have a newer version
+        gymnasium.make(env_id, **options).close()

@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import checked_observation, heading_error
+from agents.controllers.memory import Flags, begun, checked_observation, deviations
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -115,6 +115,8 @@ class Controller:
     #: What it observes, and names of its gains where they are not those of `feedback`.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
     gain_names: ClassVar[tuple[str, ...]] = ()
+    #: What it reads of the ship beside her heading, where that does not follow from `feedback`.
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a length, or its name.
@@ -208,25 +210,49 @@ class Controller:
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
-        """See `Policy.predict`; nothing is remembered, and the state is returned as given."""
-        seen = checked_observation(observation, self.observation_names)
-        deviations = self._deviations(seen[..., : len(self.observation_names)])
-        order = np.full(seen.shape[:-1], self.neutral_rudder)
-        for gain, (signal, sign) in self.feedback.items():
-            order = order + sign * self.gains[gain] * deviations[signal]
-        limit = self.observation_scales[self.observation_names.index("rudder")]
-        return np.clip(order / limit, -1.0, 1.0)[..., None].astype(np.float32), state
+        """See `Policy.predict`; the state is an array of shape (memory_size,) or (n, memory_size).
 
-    def _deviations(self, seen: Floats) -> dict[str, Floats]:
-        """Deviations from straight running by signal, SI units, each of shape (...)."""
-        values = dict(zip(self.observation_names, (seen * self.observation_scales).T, strict=True))
-        return {
-            "heading_error": heading_error(values),
-            "yaw_rate": values["yaw_rate"],
-            "sway": values["sway"] - self.neutral_sway,
-            "rudder": values["rudder"] - self.neutral_rudder,
-            "heading_error_integral": values["heading_error_integral"],
-        }
+        A controller that remembers nothing returns the state as given.
+        """
+        n, size = len(self.observation_names), self.memory_size
+        given = checked_observation(observation, self.observation_names)
+        shape, rows = given.shape[:-1], np.atleast_2d(given)[:, :n] * self.observation_scales
+        memory, begins = begun(state if size else None, episode_start, shape, size)
+        seen = dict(zip(self.observation_names, rows.T, strict=True))
+        order, kept = self.steer(seen, memory.reshape(len(rows), size), begins.reshape(-1))
+        limit = self.observation_scales[self.observation_names.index("rudder")]
+        action = np.clip(order / limit, -1.0, 1.0)[:, None].astype(np.float32)
+        return action.reshape(*shape, 1), kept.reshape(*shape, size) if size else state
+
+    @property
+    def memory_size(self) -> int:
+        """How many numbers it remembers of each ship."""
+        return 0
+
+    def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
+        """Commanded rudder and what is remembered next.
+
+        Parameters
+        ----------
+        seen : dict of str to array of shape (n,)
+            What is observed by name, SI units.
+        memory : array of shape (n, memory_size)
+            Zeros where an episode begins.
+        begins : bool array of shape (n,)
+            Whether it does.
+
+        Returns
+        -------
+        order : array of shape (n,)
+            Rad, not yet limited.
+        memory : array of shape (n, memory_size)
+        """
+        found = deviations(seen, self.neutral_rudder, self.neutral_sway)
+        by_signal = dict(zip(SIGNALS, np.moveaxis(found, -1, 0), strict=True))
+        order = np.full(found.shape[:-1], self.neutral_rudder)
+        for gain, (signal, sign) in self.feedback.items():
+            order = order + sign * self.gains[gain] * by_signal[signal]
+        return order, memory
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
@@ -299,8 +325,9 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
 
 def check_observed(agent: Any, names: Sequence[str], scales: Sequence[float], where: str, meant: str) -> None:
     """Refuse observations that an agent was not made for; `meant` has {} for its own scale."""
-    n = len(agent.observation_names)
-    check_names(names[:n], agent.observation_names, where)
+    n, learned = len(agent.observation_names), getattr(agent, "env_id", None)
+    named = where if learned is None else f"{where}: not those that the agent learned with in {learned}"
+    check_names(names[:n], agent.observation_names, named)
     for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
         if abs(one - other) > SCALE_TOLERANCE * abs(other):
             raise InputError(

@@ -27,6 +27,7 @@ DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
 # and second derivative, the integral, and the notch's four numbers of heading and of yaw rate
 LAST_ERROR, LAST_RATE, LEAD, TURN, TURN_RATE, GATHERED, NOTCHES = range(7)
 N_MEMORY = NOTCHES + 8
+LEAST_INTEGRAL = 1e-12  # gain below which the integral is not worth limiting: the rudder does not see it
 FROM_NONE = Range(0.0, 1e6)  # of rates and frequencies; 0 leaves a filter out
 
 
@@ -41,6 +42,7 @@ class FilteredPID(Stateful):
 
     kind: ClassVar[str] = "pid-filtered"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = PID.feedback
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate",)
     ranges: ClassVar[Mapping[str, Range]] = {
         **Controller.ranges, "reference_frequency": FROM_NONE, "largest_turn_rate": FROM_NONE,
         "tracking_rate": FROM_NONE, "wave_frequency": FROM_NONE,
@@ -135,7 +137,7 @@ class FilteredPID(Stateful):
         order = order + gains["integral"] * gathered
         limit = self.observation_scales[self.observation_names.index("rudder")]
         cut = np.clip(order, -limit, limit) - order
-        if self.design["tracking_rate"] and gains["integral"] > 0.0:
+        if self.design["tracking_rate"] and gains["integral"] > LEAST_INTEGRAL:
             gathered = gathered + dt * self.design["tracking_rate"] * cut / gains["integral"]
         kept[:, GATHERED] = gathered
         return order, kept

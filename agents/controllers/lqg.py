@@ -74,6 +74,7 @@ class LQG(Stateful):
         "kalman": ("states", len(OUTPUTS)),
         "output": (len(OUTPUTS), "states"),
     }
+    reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
     ranges: ClassVar[Mapping[str, Range]] = {**Controller.ranges, "new_course_rad": Range(1e-6, 1e6)}
 
     transition: Floats

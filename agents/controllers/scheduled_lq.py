@@ -12,10 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, sample_ship
 from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
-from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -25,11 +25,11 @@ SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class ScheduledLQ(Stateful):
+class ScheduledLQ(Controller):
     """LQ designed at several speeds; gains and neutral rudder lie straight between them.
 
-    Below the lowest and above the highest speed those of the nearest are kept. It remembers nothing: the
-    state of `predict` is empty. `gains` and `margins` are those at service speed.
+    Below the lowest and above the highest speed those of the nearest are kept. `gains` and `margins` are
+    those at service speed.
 
     Attributes
     ----------
@@ -117,11 +117,6 @@ class ScheduledLQ(Stateful):
             schedule=np.array(gains),
             neutral=np.array(neutral),
         )
-
-    @property
-    def memory_size(self) -> int:
-        """Nothing is remembered."""
-        return 0
 
     def at(self, speed: Floats) -> tuple[Floats, Floats]:
         """Gains, shape (n, 5), and neutral rudder and sway, shape (n, 2), at surge speeds of shape (n,)."""

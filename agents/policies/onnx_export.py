@@ -1,21 +1,7 @@
 """A learned policy as an ONNX graph, written from its weights; neither torch nor shipgym is needed to run it.
 
-Inputs, with a free first axis:
-
-    observations   float32 (batch, frame_stack * n_observations): oldest first, the newest last, in the
-                   scales of the metadata; where an episode begins the first observation fills the stack
-    base_action    float32 (batch, 1): the base controller's command, part of the rudder limit; only if the
-                   policy adds to one, which stands in the metadata as in `agents.controllers.controller_file`
-
-Output:
-
-    action         float32 (batch, n_commands): parts of the limits in [-1, 1]; of discrete orders the order
-    part           float32 (batch, 1): what is added to the base's command, if there is a base
-
-Metadata, as JSON: observation_names, observation_scales, frame_stack, action, authority, action_repeat, base,
-environment, model; `history` and `hold` are older names of frame_stack and action_repeat. With action_repeat
-above 1 the graph decides once in so many control intervals; in between the action stays, or, with a base, is
-`base_action + part`, limited to [-1, 1], with the part of the last decision.
+Inputs, outputs and metadata stand in docs/policies.md; in these `history` and `hold` are older names of
+`frame_stack` and `action_repeat`.
 """
 
 from __future__ import annotations

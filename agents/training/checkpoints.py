@@ -59,6 +59,7 @@ def put_back(agent: Any, memory: Memory) -> None:
     memory = _with_own_settings(agent, memory)
     check_like(memory, _own(agent, memory), "agent")
     _check_weights(memory["parameters"])
+    _check_observed(agent, memory["counters"]["_last_obs"])
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)
@@ -83,6 +84,13 @@ def _check_weights(parameters: Memory) -> None:
                     raise ValueError(
                         f"parameters.{part}.{name}: expected numbers of magnitude {most:g} at most"
                     )
+
+
+def _check_observed(agent: Any, observed: Any) -> None:
+    """Raise ValueError for what an environment of the agent does not show."""
+    for row in observed:
+        if not agent.observation_space.contains(row):
+            raise ValueError("counters._last_obs: expected numbers within the bounds of the observations")
 
 
 def check_record(record: Any) -> None:

@@ -19,7 +19,7 @@ from agents.training.settings import (
     read_settings_file,
 )
 from shipgym.checks import check_choice, check_keys, check_whole
-from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.envs.registration import environments
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather, weather_column
@@ -187,11 +187,8 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
 
     Raises InputError for an unknown one, with the nearest known one.
     """
-    ids = {
-        f"shipgym/{task}{variant}-v0": (short, dict(options))
-        for short, task in zip(ENVIRONMENTS, TASKS, strict=True)
-        for variant, options in VARIANTS.items()
-    }
+    short_names = {task: short for short, (_, task) in ENVIRONMENTS.items()}
+    ids = {name: (short_names[options.pop("task")], options) for name, options in environments().items()}
     known: dict[str, tuple[str, dict[str, Any]]] = {short: (short, {}) for short in ENVIRONMENTS}
     known |= ids
     return known[check_choice(name, known, "env")]

@@ -22,7 +22,7 @@ from agents.controllers.registry import controller_kinds
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
-from shipgym.files import parse_toml, read_toml, toml_value
+from shipgym.files import named_values, parse_toml, read_toml
 from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
@@ -315,13 +315,7 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
 
     Raises InputError for one that is written otherwise.
     """
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, value = (part.strip() for part in text.partition("="))
-        if not sign or not name:
-            raise InputError(f"{where}: {text!r} found, expected name=value, such as {where} gamma=0.98")
-        found[name] = toml_value(value)
-    return found
+    return named_values(texts, where, "gamma=0.98")
 
 
 def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
-from shipgym.trials.identify_table import Options
+from shipgym.trials.identify_table import AUTO, Options
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -76,7 +76,7 @@ def reference_options(options: Options) -> Options:
     if options.regression not in (None, "ls-svm") or options.epsilon is not None:
         raise InputError(f"regression: epsilon-SVR found with kernel {RBF!r}, which is fitted by LS-SVM only")
     structure, method = options.structure, options.method
-    if structure == Options.structure:  # none was named
+    if structure in (Options.structure, AUTO):  # none was named
         structure = BLACK_BOX if options.reference_model is None else GREY_BOX
     if structure != GREY_BOX:
         method = "ls-svm" if method == "rm-svm" else method

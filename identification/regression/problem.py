@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from identification.options import Given, name_of
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
@@ -18,12 +19,12 @@ from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
-from shipgym.ships import Envelope, GreyBox, ShipModel, Structure, Term, get_structure
+from shipgym.ships import Envelope, ShipModel, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import get_dynamics
+from shipgym.ships.structures import STRUCTURES, get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
 from shipgym.trials.trial import Trial
@@ -50,17 +51,14 @@ class Problem:
 
 
 def pose(
-    trials: Sequence[Trial],
-    options: Options,
-    particulars: Particulars | Mapping[str, Any] | None,
-    steering: SteeringGear | None,
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> Problem:
     """Check what was given and make the regression; arguments as in `identify`.
 
     Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
     particulars that do not suffice.
     """
-    everything, sea = in_still_water(_held_out(trials, options.hold_out), options, particulars)
+    everything, sea = in_still_water(held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
@@ -87,7 +85,7 @@ def pose(
         )
         regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
-    gear = _gear(used, table) if steering is None else steering
+    gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
 
@@ -107,7 +105,7 @@ def _blank(
     name: str, table: Structure, ship: Particulars, gear: SteeringGear, shaft: float, used: Sequence[Trial]
 ) -> ShipModel:
     """The model but for its coefficients, with the envelope of the trials behind it."""
-    names = (table if isinstance(table, GreyBox) else get_dynamics(table.name)).coefficient_names
+    names = (get_dynamics(MMG) if table is MMG_CHANNELS else table).coefficient_names
     return ShipModel(
         name=name,
         structure=table.name,
@@ -115,7 +113,7 @@ def _blank(
         steering=gear,
         coefficients=dict.fromkeys(names, 0.0),
         service_shaft_speed=shaft,
-        own_table=table if isinstance(table, GreyBox) else None,
+        own_table=None if table.name in STRUCTURES or table is MMG_CHANNELS else table,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
     )
 
@@ -129,7 +127,7 @@ def _check_list(trials: Any) -> None:
         )
 
 
-def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
+def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
     """The trials, those named marked to validate only."""
     _check_list(trials)
     known = [trial.name for trial in trials]
@@ -140,10 +138,7 @@ def _held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
 
 
 def _table(
-    structure: str,
-    reference: str | ShipModel | None,
-    particulars: Particulars | Mapping[str, Any] | None,
-    used: Sequence[Trial],
+    structure: str | Structure, reference: str | ShipModel | None, particulars: Given, used: Sequence[Trial]
 ) -> tuple[Structure, dict[str, float]]:
     """The structure by name; a grey box with its reference ship, and the similarity of the candidates."""
     if structure == MMG:
@@ -151,10 +146,10 @@ def _table(
     if structure != GREY_BOX:
         if reference is not None:
             raise InputError(
-                f"reference_model: {reference!r} found with structure {structure!r}, expected structure "
-                "'grey-box'; or leave the reference_model out (to pull coefficients to a ship's, give prior)"
+                f"reference_model: {reference!r} found with structure {name_of(structure)!r}, expected "
+                "structure 'grey-box'; or leave it out (to pull coefficients to a ship's, give prior)"
             )
-        return get_structure(structure), {}
+        return structure if isinstance(structure, Structure) else get_structure(structure), {}
     check_trials(used, get_structure("linear-steering"))
     return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
 
@@ -171,9 +166,7 @@ def _used(trials: Sequence[Trial]) -> list[Trial]:
     return [trial for trial in trials if trial.use == "fit"]
 
 
-def _ship(
-    particulars: Particulars | Mapping[str, Any] | None, trials: Sequence[Trial], table: Structure
-) -> Particulars:
+def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:
     """Particulars with speed, and for forces inertia and added mass, estimated where absent."""
     if particulars is None:
         raise InputError(
@@ -207,8 +200,3 @@ def _shaft_speed(given: float | None, trials: Sequence[Trial], table: Structure)
             "speed; give service_shaft_speed"
         )
     return shaft
-
-
-def _gear(trials: Sequence[Trial], table: Structure) -> SteeringGear:
-    """The gear as the rudders of the trials show it; a usual one where no rudder has to move."""
-    return estimated_gear(trials) if table.has_rudder else SteeringGear()

@@ -30,7 +30,6 @@ def comparison_page(comparison: Ranking) -> str:
     return render(
         "identification.report/comparison.html",
         name=model.particulars.name or model.name,
-        structure=comparison.best.settings["structure"],
         comparison=comparison,
         errors=errors_figure(comparison),
         largest=f"{LARGEST:g}",
@@ -42,7 +41,7 @@ def comparison_page(comparison: Ranking) -> str:
 def errors_figure(comparison: Ranking) -> Figure:
     """Error of each trial held out, one row for each method."""
     go = graph_objects()
-    figure, names = go.Figure(), [standing.method for standing in comparison.standings]
+    figure, names = go.Figure(), list(comparison.results)
     trials = list(comparison.standings[0].errors)
     means = [min(s.error, LARGEST) if s.error is not None else None for s in comparison.standings]
     figure.add_trace(
@@ -75,7 +74,7 @@ def headings_figure(comparison: Ranking) -> Figure:
     figure = subplots(
         rows, 2, titles=[PurePath(trial.name).name for trial in held], vertical_spacing=0.36 / max(rows, 2)
     )
-    best = [standing.method for standing in comparison.standings[:SHOWN]]
+    best = list(comparison.results)[:SHOWN]
     for k, trial in enumerate(held):
         place = {"row": k // 2 + 1, "col": k % 2 + 1}
         for method, colour in zip(best, PALETTE, strict=False):

@@ -13,6 +13,7 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
 from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
+from identification.validation.warnings import EQUATIONS
 from shipgym.arrays import Floats
 from shipgym.plots import (
     LIMIT,
@@ -34,7 +35,6 @@ if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
 
-EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
 MOST_ROWS = 2500  # drawn of one equation
 LAGS = 24  # windows

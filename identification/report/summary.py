@@ -2,52 +2,40 @@
 
 from __future__ import annotations
 
-from io import StringIO
 from math import degrees
 from typing import Any
 
-from rich.console import Console
 from rich.table import Table
 
 from identification.fit import Fit
 from identification.report.sea import sea_sentences
+from identification.text import as_text, lined_table
 from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
 from shipgym.ships.particulars import ADDED_MASSES
 
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
 PRIME = 1e-5
-WIDTH = 100
 
 
 def summary_table(fit: Fit) -> str:
     """Coefficients with standard error and t, inertia with what was estimated, and the verdict."""
-    console = Console(file=StringIO(), width=WIDTH, color_system=None)
     verdict = "stable" if fit.stable else "NOT STABLE: its predictions run away and are not to be used"
     provenance = fit.model.provenance or {}
-    console.print(
+    shown = [
         f"{fit.model.name}: {provenance.get('structure')} by {provenance.get('method')}, "
-        f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})"
-    )
-    if "kernel" in provenance:
-        console.print(_kernel(provenance["kernel"]), highlight=False, soft_wrap=True)
-    else:
-        console.print(_coefficients(fit))
-    console.print(_inertia(fit), _equations(fit))
+        f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})",
+        kernel_text(provenance["kernel"]) if "kernel" in provenance else _coefficients(fit),
+        _inertia(fit),
+        _equations(fit),
+    ]
     if "model_error" in provenance:
         error = provenance["model_error"]
-        console.print(
-            f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']})."
-        )
-    for line in sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit):
-        console.print(line, highlight=False)
-    if "reference" in fit.metrics:
-        console.print(_against_reference(fit))
-    file = console.file
-    assert isinstance(file, StringIO)
-    return file.getvalue()
+        shown.append(f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']}).")
+    shown += sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit)
+    return as_text(*shown, *([_against_reference(fit)] if "reference" in fit.metrics else []))
 
 
-def _kernel(report: dict[str, Any]) -> str:
+def kernel_text(report: dict[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
     errors = report["heading_errors_held_out"].items()
     held_out = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
@@ -63,10 +51,7 @@ def _coefficients(fit: Fit) -> Table:
     title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     if (structure.normalisation, structure.quantity) != ("prime", "force"):
         title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0
-    table = Table(title=title, title_justify="left")
-    table.add_column("name")
-    for heading in ("value", "standard error", "t"):
-        table.add_column(heading, justify="right")
+    table = lined_table(title, "name", ">value", ">standard error", ">t")
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]
         t = f"{value / error:.1f}" if error > 0.0 else "-"
@@ -77,9 +62,7 @@ def _coefficients(fit: Fit) -> Table:
 
 def _inertia(fit: Fit) -> Table:
     ship = fit.model.particulars
-    table = Table(title="Inertia and service speed", title_justify="left")
-    for heading in ("name", "value", "unit", "source"):
-        table.add_column(heading, justify="right" if heading == "value" else "left")
+    table = lined_table("Inertia and service speed", "name", ">value", "unit", "source")
     units = {"mass": "kg", "xg": "m", "yaw_gyradius": "m", "speed": "m/s"}
     for name in INERTIA + ADDED_MASSES:
         if ship[name] is None:  # not needed by a structure of accelerations
@@ -99,20 +82,12 @@ def _inertia(fit: Fit) -> Table:
 
 
 def _equations(fit: Fit) -> Table:
-    table = Table(title="Fit of the equations", title_justify="left")
-    table.add_column("equation")
-    for heading in ("rows", "terms", "rank", "condition", "R2", "residual rms"):
-        table.add_column(heading, justify="right")
-    for name, equation in fit.diagnostics.items():
-        table.add_row(
-            EQUATIONS.get(name, name),
-            str(equation.samples),
-            str(equation.terms),
-            str(equation.rank),
-            f"{equation.condition_number:.0f}",
-            f"{equation.r_squared:.5f}",
-            f"{equation.residual_rms:.2e}",
-        )
+    headings = ("rows", "terms", "rank", "condition", "R2", "residual rms")
+    table = lined_table("Fit of the equations", "equation", *(f">{heading}" for heading in headings))
+    for name, found in fit.diagnostics.items():
+        counts = (str(count) for count in (found.samples, found.terms, found.rank))
+        quality = f"{found.condition_number:.0f}", f"{found.r_squared:.5f}", f"{found.residual_rms:.2e}"
+        table.add_row(EQUATIONS.get(name, name), *counts, *quality)
     return table
 
 
@@ -120,9 +95,7 @@ def _against_reference(fit: Fit) -> Table:
     """The heading of each trial as predicted, and as the bare reference ship predicts it."""
     reference = fit.metrics["reference"]
     title = f"Open-loop heading, root mean square error, beside the bare reference ship '{reference['name']}'"
-    table = Table(title=title, title_justify="left")
-    for heading in ("trial", "use", "model, deg", "reference, deg"):
-        table.add_column(heading, justify="right" if heading.endswith("deg") else "left")
+    table = lined_table(title, "trial", "use", ">model, deg", ">reference, deg")
     for name, metrics in fit.metrics["trials"].items():
         errors = (found["rmse"]["psi"] for found in (metrics, reference["trials"][name]))
         shown = ("ran away" if e is None else f"{degrees(e):.2f}" for e in errors)

@@ -11,6 +11,7 @@ import numpy as np
 from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
+from identification.report.summary import kernel_text
 from identification.validation.warnings import EQUATIONS, model_warnings
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
@@ -62,6 +63,7 @@ def fit_view(fit: Fit) -> dict[str, Any]:
         ],
         "derivatives": _derivatives(fit.model),
         "coefficients": _coefficients(fit),
+        "kernel": kernel_text(found) if (found := (fit.model.provenance or {}).get("kernel")) else None,
     }
 
 

@@ -1,4 +1,4 @@
-"""Several methods on the same trials, ranked by how well they predict trials that they have not seen."""
+"""Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
 from __future__ import annotations
 
@@ -7,33 +7,40 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from identification.estimators.methods import METHODS, Method, get_method
+from identification.options import name_of
 from identification.pipeline import identify
+from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.cross_validation import cross_validate
-from identification.validation.prediction import COMPARED
-from identification.validation.ranking import Ranking, Standing
+from identification.validation.ranking import Ranking, Standing, named, standing
+from identification.validation.selection import RM_SVM, STRUCTURES, methods_of, reference_of
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
+from shipgym.ships import Structure, list_structures
 from shipgym.ships.grey_boxes import GREY_BOX
-from shipgym.trials.identify_table import OPTIONS
+from shipgym.ships.mmg import MMG
+from shipgym.trials.identify_table import AUTO, OPTIONS, Options
 from shipgym.trials.trial import Trial
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "output-error")
-#: Files of a saved comparison: of the models only those of the methods compared.
-COMPARISON_FILES = ("comparison.json", "comparison.html", *(f"model-{name}.json" for name in METHODS))
+#: Files of a saved comparison: of the models only those of the methods, or of the structures, compared.
+COMPARISON_FILES = (
+    "comparison.json", "comparison.html", *(f"model-{name}.json" for name in (*METHODS, *list_structures()))
+)  # fmt: skip
 
 
 class Comparison(Ranking):
-    """Methods on the same trials, ranked; `Ranking` lists its attributes."""
+    """Structures and methods on the same trials, ranked; `Ranking` lists its attributes."""
 
     def save(self, folder: str | Path) -> None:
-        """Write `comparison.json`, `comparison.html` and each method's `model-METHOD.json`.
+        """Write `comparison.json`, `comparison.html` and models.
+
+        These are each method's `model-METHOD.json`, of several structures the best one's of each,
+        `model-STRUCTURE.json`.
 
         Raises
         ------
@@ -43,77 +50,90 @@ class Comparison(Ranking):
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         written = comparison_page(self)
-        for name, result in self.results.items():
-            result.model.save(folder / f"model-{name}.json")
+        several = self.standings[0].method not in self.results
+        for one, name in reversed(list(zip(self.standings, self.results, strict=True))):
+            self.results[name].model.save(folder / f"model-{one.structure if several else name}.json")
         write_json(self.to_dict(), folder / "comparison.json")
         write_text(written, folder / "comparison.html")
 
 
 def compare_methods(
-    trials: Sequence[Trial], methods: Sequence[Any] | None = None, **arguments: Any
+    trials: Sequence[Trial],
+    methods: Sequence[Any] | None = None,
+    structures: Sequence[str | Structure] | None = None,
+    **arguments: Any,
 ) -> Comparison:
-    """Identify by several methods and rank them on trials held out.
+    """Identify by several methods, or structures and methods, and rank them on trials held out.
 
-    Held out are the trials marked `validate` or named by `hold_out`; where there are none, each trial to fit
-    in turn.
+    These are marked `validate` or named by `hold_out`; where there are none, each trial to fit in turn.
 
     Parameters
     ----------
     trials : sequence of Trial
         As for `identify`.
     methods : sequence of str or estimator, optional
-        As for `identify`; by default `USUAL`, and `rm-svm` for a grey box.
+        By default `USUAL`, and `rm-svm` for a grey box; of several structures those of "auto".
+    structures : sequence of str or Structure, optional
+        As for `identify`; `auto` for all that it tries. A `reference_model` goes to those that know one.
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not have.
 
     Raises
     ------
     InputError
-        For an unknown method, a setting that none of the methods knows, no two trials to hold one out of, and
-        where no method can be fitted.
+        For an unknown method or setting, no two trials to hold one out of, and where nothing can be fitted.
     """
-    names = list(methods) if methods is not None else _usual(arguments.get("structure"))
-    given = {get_method(method).name: method for method in names}
-    chosen = {name: get_method(method) for name, method in given.items()}
-    if not chosen:
+    wanted = [arguments.pop("structure", Options.structure)] if structures is None else [*structures]
+    several = structures is not None or AUTO in wanted
+    pairs = _pairs(STRUCTURES if AUTO in wanted else wanted, methods, several)
+    if not pairs:
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
-    held = {trial.name for trial in trials if trial.use == "validate"} | _named(arguments)
-    fitted = [trial for trial in trials if trial.use == "fit" and trial.name not in held]
+    marked = held_out(trials, arguments.get("hold_out", ()))
+    fitted, held = ([trial for trial in marked if trial.use == use] for use in ("fit", "validate"))
     if not held and len(fitted) < 2:
-        raise InputError(
-            f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank "
-            'the methods on; mark one use = "validate", or give two to fit'
-        )
-    left_out = _left_out(chosen, arguments)
-    results: dict[str, IdentificationResult] = {}
-    seen: dict[str, dict[str, Any]] = {}
+        told = f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank the"
+        raise InputError(f'{told} methods on; mark one use = "validate", or give two to fit')
+    left_out = _left_out([get_method(method) for _, method in pairs], arguments)
+    found: list[tuple[Standing, IdentificationResult]] = []
     refused: dict[str, str] = {}
-    for name in chosen:
+    for structure, method in pairs:
+        name = get_method(method).name
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
+        if several:
+            own["reference_model"] = reference_of(structure, own.get("reference_model"))
         try:
-            result = identify(trials, method=given[name], **own)
-            seen[name] = _in_turn(fitted, given[name], own) if not held else _seen(result)
-            results[name] = result
+            result = identify(trials, structure, method, **own)
+            seen = {t.name: result.metrics["trials"][t.name] for t in held}
+            if not held:
+                own |= {"structure": structure, "method": method, "uncertainty": "analytic"}
+                seen = cross_validate(fitted, **{k: v for k, v in own.items() if k != "hold_out"})
         except InputError as error:
-            refused[name] = str(error)
-    if not results:
+            refused[named(name_of(structure), name) if several else name] = str(error)
+            continue
+        found.append((standing([result], seen, trials), result))
+    if not found:
         raise InputError(next(iter(refused.values())))
-    standings = [_standing(name, results[name], seen[name], trials) for name in results]
-    standings.sort(key=lambda s: (s.ran_away, not s.stable, s.error is None, s.error or 0.0))
-    return Comparison(tuple(standings), results, refused, left_out, not held)
+    found.sort(key=lambda pair: pair[0].rank)
+    results = {named(one.structure, one.method) if several else one.method: result for one, result in found}
+    return Comparison(tuple(one for one, _ in found), results, refused, left_out, not held)
 
 
-def _named(arguments: Mapping[str, Any]) -> set[str]:
-    """Trials that `hold_out` names."""
-    names = arguments.get("hold_out", ())
-    return {names} if isinstance(names, str) else set(names)
+def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bool) -> list[tuple[Any, Any]]:
+    """Structures, each with the methods that it is fitted by: those given, of the MMG form the first."""
+    pairs: list[tuple[Any, Any]] = []
+    for structure in {name_of(one): one for one in structures}.values():
+        own = methods
+        if methods is None and several:
+            own = methods_of(structure, Options.method)
+        elif methods is None:
+            own = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
+        elif several and structure == MMG:
+            own = methods[:1]
+        pairs += [(structure, one) for one in {get_method(one).name: one for one in own or ()}.values()]
+    return pairs
 
 
-def _usual(structure: str | None) -> list[str]:
-    return [*USUAL, "rm-svm"] if structure == GREY_BOX else list(USUAL)
-
-
-def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
+def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Settings that each method does not have but another one does."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
@@ -122,53 +142,8 @@ def _left_out(chosen: Mapping[str, Method], arguments: Mapping[str, Any]) -> dic
         return method.knows(setting) or (method.refined and setting in of_refinement)
 
     for setting in settings:
-        if not any(known(method, setting) for method in chosen.values()):
-            raise InputError(
-                f"settings: {setting} found, which none of the methods {', '.join(chosen)} knows"
-            )
-    left = {name: tuple(s for s in settings if not known(method, s)) for name, method in chosen.items()}
+        if not any(known(method, setting) for method in chosen):
+            names = ", ".join(dict.fromkeys(method.name for method in chosen))
+            raise InputError(f"settings: {setting} found, which none of the methods {names} knows")
+    left = {method.name: tuple(s for s in settings if not known(method, s)) for method in chosen}
     return {name: unknown for name, unknown in left.items() if unknown}
-
-
-def _seen(result: IdentificationResult) -> dict[str, Any]:
-    """Metrics of the trials that were held out."""
-    return {name: m for name, m in result.metrics["trials"].items() if m["use"] == "validate"}
-
-
-def _in_turn(trials: Sequence[Trial], method: Any, arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Metrics of each trial, predicted by a model identified from the others."""
-    own = {key: value for key, value in arguments.items() if key not in ("hold_out", "uncertainty")}
-    return cross_validate(trials, method=method, **own)
-
-
-def _standing(
-    name: str, result: IdentificationResult, seen: Mapping[str, Any], trials: Sequence[Trial]
-) -> Standing:
-    measured = {trial.name: trial for trial in trials}
-    errors = {trial: _error(metrics, measured[trial]) for trial, metrics in seen.items()}
-    known = [error for error in errors.values() if error is not None]
-    whole = len(known) == len(errors)
-    return Standing(
-        method=name,
-        stable=result.stable,
-        ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=float(np.mean(known)) if whole else None,
-        heading_deg=_mean_degrees(seen, "psi"),
-        yaw_rate_deg_s=_mean_degrees(seen, "r"),
-        errors=errors,
-    )
-
-
-def _error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
-    """Errors of the channels by their standard deviation; None where the simulation ran away."""
-    ratios = [
-        metrics["rmse"][channel] / float(np.std(trial[channel]))
-        for channel in COMPARED
-        if metrics["rmse"][channel] is not None and np.std(trial[channel]) > 0.0
-    ]
-    return float(np.mean(ratios)) if ratios else None
-
-
-def _mean_degrees(seen: Mapping[str, Any], channel: str) -> float | None:
-    found = [m["rmse"][channel] for m in seen.values() if m["rmse"][channel] is not None]
-    return float(np.degrees(np.mean(found))) if found else None

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from identification.pipeline import identify
+from identification.validation.ranking import in_turn
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
@@ -39,9 +40,5 @@ def cross_validate(trials: Sequence[Trial], folds: int | None = None, **argument
     n = len(used)
     if folds is not None:
         n = int(check_number(folds, "folds", at_least=2, at_most=len(used), hint="at most one per trial"))
-    metrics: dict[str, Any] = {}
-    for k in range(n):
-        held = [trial.name for i, trial in enumerate(used) if i * n // len(used) == k]
-        result = identify(used, hold_out=held, **{"model_error": False, **arguments})
-        metrics |= {name: result.metrics["trials"][name] for name in held}
-    return metrics
+    own = {"model_error": False, **arguments}
+    return in_turn(lambda held: identify(used, hold_out=held, **own), used, n)[0]

@@ -50,11 +50,15 @@ def held_out_rows(
         for index, trial in enumerate(trials):
             yield samples.trial != index, trial
         return
-    (trial,) = trials
-    edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
     start, end = samples.start, samples.start + samples.duration
-    for first, last in pairwise(edges):
-        held = slice(first, last)
-        channels = {name: values[held] for name, values in trial.channels.items()}
-        piece = Trial(trial.t[held], channels, name=trial.name)
+    for piece in pieces(trials[0]):
         yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
+
+
+def pieces(trial: Trial) -> list[Trial]:
+    """A trial cut into parts, which are no manoeuvres."""
+    edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
+    return [
+        Trial(trial.t[a:b], {k: x[a:b] for k, x in trial.channels.items()}, name=f"{trial.name}, part {n}")
+        for n, (a, b) in enumerate(pairwise(edges), start=1)
+    ]

@@ -21,6 +21,8 @@ from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
+from agents.deployment.nmea import Line
+from agents.deployment.steering import Helm, Limits
 from agents.engines.jobs import run_jobs
 from agents.engines.serialisation import KeptResults, pack, serialised, unpack
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
@@ -199,7 +201,31 @@ def read_part(path: Path) -> Any:
     return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
 
 
+@cache
+def pid() -> Any:
+    """An autopilot to be told what is read."""
+    return load_agent(CORPUS / "controller" / "pid.json")
+
+
+def read_bridge(path: Path) -> Helm:
+    """A helm that was told the bytes of a line, and steers by what it understood."""
+    helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
+    Line(lambda text: helm.hear(text, 0.0), set()).data_received(read_bytes(path, "log", LARGEST_TOML))
+    for now in range(4):
+        helm.watch(1.0, float(now))
+        helm.steer(float(now))
+    return helm
+
+
+def use_helm(helm: Helm) -> None:
+    """What it sends, and its order, which is a number within the limit."""
+    if not abs(helm.order) <= helm.pilot.limit:
+        raise AssertionError(f"order {helm.order}")
+    helm.sentences().encode("ascii")
+
+
 KINDS = (
+    Kind("bridge", read_bridge, use_helm, slow=2),
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
     Kind("log", lambda path: [guess_trial(path)[2]], use_ship, slow=4),

@@ -1,20 +1,20 @@
 """The papers' cases, run again: what they print, what comes out their way, and what is best.
 
 One file or folder per paper. Each has a `PAPER`: a citation and a function that yields the rows of its
-tables. Beside them stand Zhu's requirements R1 to R8, in the same form.
+tables. Beside them stand two comparators, and Zhu's requirements R1 to R8, in the same form.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 
-from papers.row import Paper, Requirement, Row
+from papers.row import Conclusion, Paper, Requirement, Row
 from shipgym.checks import check_choice
 
-__all__ = ["CASES", "PAPERS", "Paper", "Requirement", "Row", "get_paper"]
+__all__ = ["CASES", "PAPERS", "Conclusion", "Paper", "Requirement", "Row", "get_paper"]
 
 PAPERS = ("cao2015", "xu2020", "zhu2018", "mei2019", "song2020")
-CASES = (*PAPERS, "requirements")
+CASES = (*PAPERS, "comparators", "requirements")
 
 
 def get_paper(name: str) -> Paper:

@@ -26,7 +26,7 @@ from papers.mei2019_targets import (
     usual_way,
     virtual,
 )
-from papers.row import Paper, Row
+from papers.row import Conclusion, Paper, Row
 from shipgym.ships import ShipModel, load_model
 
 Pair = tuple[float | None, float | None]  # their way, at best
@@ -287,6 +287,72 @@ def _within(error: float | None, limit: float) -> bool:
     return error is not None and abs(error) < limit
 
 
+def _turn(rudder: float, words: str, kind: str = "") -> str:
+    return f"Table {6 if rudder > 0.0 else 7}: MARIN: {rudder:+.0f} deg: {words}, L{kind and ', ' + kind}"
+
+
+def _off(row: Row, index: str) -> float:
+    """Error of a turn by their way, or of the bare reference, of what was measured."""
+    value = row.best if row.as_paper is None else row.as_paper
+    return abs((value or 0.0) / MEASURED[index] - 1.0)
+
+
+CONCLUSIONS = (
+    Conclusion(
+        "By five particulars the tanker is the ship most like KVLCC2",
+        ("Table 4: the tanker is chosen (1: yes)",),
+        lambda found: found.as_paper == 1.0,
+    ),
+    Conclusion(
+        "The reference ship replicates the dynamics of the target very well",
+        tuple(f"Figure 5: MARIN: correlation of {word} accelerations, reference and target"
+              for word in ("surge", "sway", "yaw")),
+        lambda *found: all(row.as_paper > 0.9 for row in found),
+        "very well: a correlation above 0.9; a correlation does not see scale or offset",
+    ),
+    Conclusion(
+        "RM-SVM predicts turns from zigzags of small rudder angles (generalisation)",
+        tuple(_turn(HARD, words) for words in WORDS.values()),
+        lambda advance, tactical: _off(advance, "advance") < 0.05 and _off(tactical, "tactical") < 0.05,
+        "within 5 % of the measured turn to starboard; what is printed as measured at -35 is that of +35",
+    ),
+    Conclusion(
+        "It is the support vector machine that makes the prediction accurate, beyond the reference ship",
+        (*(_turn(HARD, words) for words in WORDS.values()),
+         *(_turn(HARD, words, BARE) for words in WORDS.values())),
+        lambda advance, tactical, bare_advance, bare_tactical:
+        _off(advance, "advance") < _off(bare_advance, "advance")
+        and _off(tactical, "tactical") < _off(bare_tactical, "tactical"),
+        "on MARIN's turn; the bare tanker is 1 and 6 % off",
+    ),
+    Conclusion(
+        "The same of the MMG model as the target",
+        tuple(f"{VIRTUAL}: +35 deg: {words}{kind}, error, %" for kind in ("", f", {BARE}")
+              for words in WORDS.values()),
+        lambda advance, tactical, bare_advance, bare_tactical:
+        abs(advance.as_paper) < abs(bare_advance.as_paper)
+        and abs(tactical.as_paper) < abs(bare_tactical.as_paper),
+        "where the bare reference happens to be right a correction from zigzags can spoil it",
+    ),
+    Conclusion(
+        "The zigzag's overshoots are acceptable (Table 5)",
+        ("Table 5: MARIN: 20/20: 1st overshoot, deg", "Table 5: MARIN: 20/20: 2nd overshoot, deg"),
+        lambda first, second: abs(first.as_paper - MEASURED["overshoot_1"]) < 2.0
+        and abs(second.as_paper - MEASURED["overshoot_2"]) < 2.0,
+        "within 2 deg of the measured ones, as printed",
+    ),
+    Conclusion(
+        "The adaptive search finds the insensitive bands",
+        tuple(f"Figure 6: MARIN: insensitive band of {word}" for word in ("surge", "sway", "yaw")),
+        lambda *found: all(row.agrees for row in found),
+        "it finds others, of about the same correlation of headings: without C the bands mean little, and a "
+        "correlation ignores scale and offset",
+    ),
+    Conclusion(
+        "It is more accurate than computational fluid dynamics (Tables 5 to 7)",
+        remark="those results are of others; one model test without repetition bounds neither",
+    ),
+)  # fmt: skip
 PAPER = Paper(
     "mei2019",
     "Mei, Sun, Shi & Liu 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with "
@@ -294,4 +360,12 @@ PAPER = Paper(
     "KVLCC2 from 10/10 and 20/20 zigzags: a reference ship plus a linear support vector regression, to "
     "predict 35 deg turns; the MMG model as the target ship, and MARIN's measured zigzags.",
     rows,
+    conclusions=CONCLUSIONS,
+    figures=(
+        (
+            "reproduction_mei2019.png",
+            "35 deg turns of KVLCC2's MMG model, which her zigzags of 10 and 20 deg do not show: the bare "
+            "tanker, RM-SVM as the paper, RM-SVM at best, and a neural network taught the same zigzags",
+        ),
+    ),
 )

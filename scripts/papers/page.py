@@ -8,17 +8,24 @@ from itertools import groupby
 from rich.table import Table
 
 from agents.cli.terminal import plain_table
-from papers import CASES, Requirement, Row, get_paper
+from papers import CASES, Conclusion, Paper, Requirement, Row, get_paper
+from papers.row import CONFIRMED, CONTRADICTED, NOT_TESTABLE, aims
 from shipgym.checks import check_choice
 
 ALL = "all"
-HEADINGS = ("case", "quantity", "printed", "as the paper", "at best", "aim", "met")
+HEADINGS = ("case", "quantity", "printed", "{ours}", "agrees", "at best", "aim", "met")
+NUMBERS = ("printed", "{ours}", "at best")
 INTRODUCTION = """# The papers' tables, run again
 
 Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed* is the paper's number,
 *as the paper* ours by its method on the same case, *at best* ours by the best method that there is here, on
 the same data. A cell is empty where the paper shows only a picture or does not publish what it used; the
 note, whose number stands in the last column, then says what stands in for it.
+
+*Agrees* says whether *as the paper* is what is printed: within 10 %, or by what rounding to the printed
+digits hides. It is another question than *met*: whether *at best* reaches the aim. An aim is counted once
+however many rows show the same number. The conclusions of each paper stand before its tables, each with the
+rows that confirm or contradict it; what "accurate" or "better" was taken to mean is said beside.
 """
 
 
@@ -69,9 +76,10 @@ def missed(results: Mapping[str, Sequence[Row]]) -> list[str]:
 
 def terminal_table(name: str, rows: Sequence[Row]) -> Table:
     """The rows of one paper for the terminal."""
-    table = plain_table(get_paper(name).citation)
+    paper = get_paper(name)
+    table = plain_table(paper.citation)
     for heading in HEADINGS:
-        table.add_column(heading, justify="right" if heading in HEADINGS[2:5] else "left")
+        table.add_column(heading.format(ours=paper.ours), justify="right" if heading in NUMBERS else "left")
     for _, case in groupby(rows, lambda row: row.case):
         for k, row in enumerate(case):
             cells = _cells(row)
@@ -81,37 +89,92 @@ def terminal_table(name: str, rows: Sequence[Row]) -> Table:
 
 def page(results: Mapping[str, Sequence[Row]]) -> str:
     """The page of the documentation, Markdown."""
-    return "\n".join([INTRODUCTION, *(_section(name, rows) for name, rows in results.items())])
+    sections = (_section(name, rows) for name, rows in results.items())
+    return "\n".join([INTRODUCTION, *_overview(results), *sections])
+
+
+def _overview(results: Mapping[str, Sequence[Row]]) -> list[str]:
+    """Verdicts, agreement and aims of each paper, a line each."""
+    words = (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
+    lines = ["| | " + " | ".join((*words, "agree with print", "aims met")) + " |"]
+    lines.append("| --- " + "| ---: " * (len(words) + 2) + "|")
+    for name, rows in results.items():
+        verdicts = [one.verdict(rows) for one in get_paper(name).conclusions]
+        counts = [str(verdicts.count(word)) if verdicts else "" for word in words]
+        cells = (*counts, _share(*_agreement(rows)), _share(*aims(rows)))
+        lines.append(f"| [{name}](#{name}) | " + " | ".join(cells) + " |")
+    return [*lines, ""]
+
+
+def _agreement(rows: Sequence[Row]) -> tuple[int, int]:
+    """How many rows agree with print, and how many can."""
+    agree = [row.agrees for row in rows if row.agrees is not None]
+    return sum(agree), len(agree)
+
+
+def _share(part: int, whole: int) -> str:
+    return f"{part} of {whole}" if whole else ""
 
 
 def _section(name: str, rows: Sequence[Row]) -> str:
     paper = get_paper(name)
-    kept = [row for row in rows if row.met is not None]
-    aims = f"Aims met: {sum(bool(row.met) for row in kept)} of {len(kept)}."
+    counts = (("Aims met", aims(rows)), ("Agree with print", _agreement(rows)))
+    told = "".join(f"{word}: {_share(*count)}. " for word, count in counts if count[1])
     lines = [
         f"## {name}",
         "",
         f"{paper.citation}. {paper.what}",
         "",
         *_requirements(paper.requirements),
-        f"{aims} `python scripts/reproduce.py {name}`",
+        f"{told}`python scripts/reproduce.py {name}`",
         "",
-        *_table(rows),
+        *_conclusions(paper.conclusions, rows),
+        *(
+            line
+            for file, caption in paper.figures
+            for line in (f"![{name}](images/{file})", "", f"*{caption}*", "")
+        ),
+        *_table(paper, rows),
     ]
     return "\n".join([*lines, ""])
 
 
-def _table(rows: Sequence[Row]) -> list[str]:
+def _table(paper: Paper, rows: Sequence[Row]) -> list[str]:
     """The rows, and below them each note once."""
     lines = [
-        "| " + " | ".join((*HEADINGS, "note")) + " |",
-        "| --- | --- | ---: | ---: | ---: | --- | --- | --- |",
+        "| " + " | ".join((*HEADINGS, "note")).format(ours=paper.ours) + " |",
+        "| --- | --- | ---: | ---: | --- | ---: | --- | --- | --- |",
     ]
     notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
     for row in rows:
         number = str(notes[row.note]) if row.note else ""
         lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
     return [*lines, "", *(f"{k}. {note}" for note, k in notes.items())]
+
+
+def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list[str]:
+    """What the paper concludes, what became of it, and the rows that show it."""
+    if not conclusions:
+        return []
+    verdicts = [one.verdict(rows) for one in conclusions]
+    counts = ", ".join(f"{verdicts.count(word)} {word}" for word in (CONFIRMED, CONTRADICTED, NOT_TESTABLE))
+    lines = [
+        f"Conclusions: {counts}.",
+        "",
+        "| the paper concludes | here | shown by |",
+        "| --- | --- | --- |",
+    ]
+    for one, verdict in zip(conclusions, verdicts, strict=True):
+        shown = [f"{row.name} = {_found(row)}" for row in one.rows(rows)]
+        cells = (one.statement, verdict, "<br>".join([*shown, *([one.remark] if one.remark else [])]))
+        lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
+    return [*lines, ""]
+
+
+def _found(row: Row) -> str:
+    """Ours by the paper's method and, after a semicolon, at best."""
+    best = "" if row.best is None else f"at best {_number(row.best)}"
+    return "; ".join(filter(None, (_number(row.as_paper), best))) or "not at hand"
 
 
 def _requirements(requirements: Sequence[Requirement]) -> list[str]:
@@ -127,9 +190,18 @@ def _requirements(requirements: Sequence[Requirement]) -> list[str]:
 
 
 def _cells(row: Row) -> tuple[str, ...]:
-    met = {True: "yes", False: "no", None: ""}[row.met]
-    numbers = (_number(value) for value in (row.printed, row.as_paper, row.best))
-    return (row.case, row.quantity, *numbers, row.aim, met)
+    yes = {True: "yes", False: "no", None: ""}
+    ours, agrees = _number(row.as_paper), yes[row.agrees]
+    return (
+        row.case,
+        row.quantity,
+        _number(row.printed),
+        ours,
+        agrees,
+        _number(row.best),
+        row.aim,
+        yes[row.met],
+    )
 
 
 def _number(value: float | None) -> str:

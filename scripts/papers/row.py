@@ -1,10 +1,13 @@
-"""One line of a reproduction: printed, ours as the paper did it, ours at its best."""
+"""A line of a reproduction (printed, ours as the paper did it, ours at best) and what a paper concludes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
+
+AGREEMENT = 0.1  # relative difference from print that still agrees
+CONFIRMED, CONTRADICTED, NOT_TESTABLE = "confirmed", "contradicted", "not testable"
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,76 @@ class Row:
     met: bool | None = None
     note: str = ""
 
+    @property
+    def agrees(self) -> bool | None:
+        """Whether ours by the paper's method is what is printed; None where one of the two is lacking.
+
+        Within 10 %, or by what rounding to the printed digits hides.
+        """
+        if self.printed is None or self.as_paper is None:
+            return None
+        mantissa, _, power = f"{self.printed:.4g}".partition("e")
+        hidden = 0.5 * 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
+        return abs(self.as_paper - self.printed) <= max(AGREEMENT * abs(self.printed), hidden)
+
+    @property
+    def figure(self) -> object:
+        """What its aim is about: rows of the same measured number at best share one aim."""
+        found = self.as_paper if self.best is None else self.best
+        return (self.quantity, found) if found is None or float(found).is_integer() else found
+
+    @property
+    def name(self) -> str:
+        """Case and quantity, by which a conclusion points at it."""
+        return f"{self.case}: {self.quantity}"
+
     def to_dict(self) -> dict[str, Any]:
         """The row for JSON."""
-        return asdict(self)
+        return asdict(self) | {"agrees": self.agrees}
+
+
+def aims(rows: Iterable[Row]) -> tuple[int, int]:
+    """How many distinct figures meet all of their aims, and how many have one."""
+    met: dict[object, bool] = {}
+    for row in rows:
+        if row.met is not None:
+            met[row.figure] = met.get(row.figure, True) and bool(row.met)
+    return sum(met.values()), len(met)
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What a paper concludes, and the rows that confirm or contradict it.
+
+    Attributes
+    ----------
+    statement : str
+        The conclusion.
+    shown_by : tuple of str
+        Names of rows.
+    holds : callable or None
+        Whether the conclusion does, from these rows; None where nothing at hand can test it.
+    remark : str
+        What was taken for a test of it, or why there is none.
+    """
+
+    statement: str
+    shown_by: tuple[str, ...] = ()
+    holds: Callable[..., bool] | None = None
+    remark: str = ""
+
+    def rows(self, rows: Iterable[Row]) -> list[Row]:
+        """Those of the rows that show it, in the order of `shown_by`."""
+        by_name = {row.name: row for row in rows}
+        return [by_name[name] for name in self.shown_by if name in by_name]
+
+    def verdict(self, rows: Sequence[Row]) -> str:
+        """`confirmed`, `contradicted`, or `not testable`, also where the rows' data is not at hand."""
+        shown = self.rows(rows)
+        found = [row for row in shown if row.as_paper is not None or row.best is not None]
+        if self.holds is None or len(found) < len(self.shown_by):
+            return NOT_TESTABLE
+        return CONFIRMED if self.holds(*shown) else CONTRADICTED
 
 
 @dataclass(frozen=True)
@@ -86,6 +156,12 @@ class Paper:
         Yields the rows, in the order of the paper.
     requirements : tuple of Requirement
         That the rows measure; of the tables of a paper none.
+    conclusions : tuple of Conclusion
+        Of the paper.
+    figures : tuple of (str, str)
+        File name in `docs/images` and caption; `papers.figures` draws them.
+    ours : str
+        Heading of the column `as_paper`.
     """
 
     name: str
@@ -93,3 +169,6 @@ class Paper:
     what: str
     rows: Callable[[], Iterator[Row]]
     requirements: tuple[Requirement, ...] = ()
+    conclusions: tuple[Conclusion, ...] = ()
+    figures: tuple[tuple[str, str], ...] = ()
+    ours: str = "as the paper"

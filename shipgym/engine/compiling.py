@@ -14,6 +14,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from shipgym.engine.cache_folder import lock_of, locked, usable_folder
 from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
 from shipgym.errors import InputError
@@ -47,7 +49,8 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     """
     tag = fingerprint(loop, parts)
     if plain_python():
-        return Specialisation(parts, tag, None).copy(loop)
+        wraps = np.errstate(over="ignore")  # words of random numbers overflow, as they do when compiled
+        return wraps(Specialisation(parts, tag, None).copy(loop))
     import numba
 
     from shipgym.engine.disk_cache import DiskCache

@@ -135,10 +135,14 @@ def wrap(angle: float) -> float:
     return rest - 2.0 * pi if rest >= pi else rest
 
 
+def power_of_bits(biased: float) -> float:
+    """2 to the power whose biased exponent stands in the lowest bits of a number."""
+    return np.int64(np.float64(biased).view(np.int64) << 52).view(np.float64)
+
+
 def power_of_two(k: float) -> float:
     """2 to the power of a whole number in [-1022, 1023]."""
-    bits = np.float64(k + EXPONENT).view(np.int64) << 52
-    return np.int64(bits).view(np.float64)
+    return power_of_bits(k + EXPONENT)
 
 
 def exponential(x: float) -> float:
@@ -177,7 +181,7 @@ def two_to(x: float) -> float:
     )
     mantissa = 0.05550410866438316 + f * (0.009618129194101738 + f * (0.001333355823666942 + f * mantissa))
     mantissa = 1.0000000000000144 + f * (0.6931471805599516 + f * (0.24022650695639336 + f * mantissa))
-    return mantissa * np.int64(np.float64(shifted).view(np.int64) << 52).view(np.float64)
+    return mantissa * power_of_bits(shifted)
 
 
 def arctan2(y: float, x: float) -> float:

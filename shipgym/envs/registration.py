@@ -17,16 +17,47 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
 }
-TASKS = ("CourseKeeping", "PathFollowing")
+#: Tasks by their names, a version in them where it is not the first.
+TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
+#: Identified models that are the defaults of ids of version 1, most by a method or of a ship of their own.
+#: Ids of version 0 keep the ships that they have; that of course keeping is identified anyway.
+IDENTIFIED = {
+    "shipgym/CourseKeepingShaft-v1": "kvlcc2-mmg",
+    "shipgym/CourseKeepingRoll-v1": "container-4dof-output-error",
+    "shipgym/PathFollowing-v1": "container-abc-lssvr",
+    "shipgym/PathFollowingDiscrete-v1": "kvlcc2-tanker-rm-svm",
+    "shipgym/PathFollowingShaft-v1": "tanker-tls-svm",
+    "shipgym/PathFollowingRoll-v1": "container-4dof-output-error",
+}
+
+
+def env_id(task: str, variant: str = "") -> str:
+    """Id of a task's environment, or of a variant of it."""
+    name, _, version = task.partition("-")
+    return f"shipgym/{name}{variant}-{version or 'v0'}"
+
+
+def environments() -> dict[str, dict[str, Any]]:
+    """Keywords of every environment by its id."""
+    found = {
+        env_id(task, variant): {"task": task, **options}
+        for task in TASKS
+        for variant, options in VARIANTS.items()
+    }
+    for name in IDENTIFIED:
+        if name.startswith("shipgym/CourseKeeping"):  # the same task, on another model
+            found[name] = found[name.replace("-v1", "-v0")]
+    return {
+        name: options | ({"model": IDENTIFIED[name]} if name in IDENTIFIED else {})
+        for name, options in found.items()
+    }
 
 
 def register_environments() -> None:
     """Register the environments with Gymnasium; a second call changes nothing."""
-    for task in TASKS:
-        for variant, options in VARIANTS.items():
-            name = f"shipgym/{task}{variant}-v0"
-            if name not in gymnasium.registry:
-                _register(name, {"task": task, **options})
+    for name, options in environments().items():
+        if name not in gymnasium.registry:
+            _register(name, options)
 
 
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:

@@ -1,6 +1,7 @@
 from .catalogue import list_models as list_models
 from .catalogue import load_model as load_model
 from .catalogue import register_ship_equations as register_ship_equations
+from .catalogue import truth_of as truth_of
 from .envelope import Envelope as Envelope
 from .equations import ShipEquations as ShipEquations
 from .grey_box_model import converted_model as converted_model

@@ -127,3 +127,26 @@ def load_model(name: str | Path) -> ShipModel:
     if known in REFERENCE_SHIPS:
         return REFERENCE_SHIPS[known]()
     return model_of(EQUATIONS[known]) if known in EQUATIONS else ShipModel.load(LIBRARY / f"{known}.json")
+
+
+def truth_of(model: str | Path | ShipModel) -> ShipModel:
+    """The reference ship whose simulated trials an identified model comes from.
+
+    What was designed, tuned or trained on the model can be evaluated on her: the identified models in the box
+    name her in their provenance, as `truth`. A model is given as itself, or as `load_model` takes it.
+
+    Raises InputError for a model that names no reference ship of its size: a reference ship herself, one
+    identified from recorded trials, one that was scaled.
+
+    >>> truth_of("mariner-tls-svm").name
+    'mariner'
+    """
+    known = model if isinstance(model, ShipModel) else load_model(model)
+    name = str((known.provenance or {}).get("truth"))
+    ship = REFERENCE_SHIPS[name]() if name in REFERENCE_SHIPS else None
+    if ship is None or ship.particulars.length != known.particulars.length:
+        raise InputError(
+            f"model {known.name!r}: provenance.truth {name!r} found, expected the reference ship of her "
+            "size behind the trials, as 'mariner-tls-svm' names it; evaluate on a ship that you name yourself"
+        )
+    return ship

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from shipgym.checks import check_choice, check_table
+from shipgym.checks import check_choice, check_keys, check_table, placed
 from shipgym.errors import InputError
 from shipgym.ships import container, kvlcc2, mmg, tanker
 from shipgym.ships.equations import ShipEquations
@@ -13,8 +13,8 @@ from shipgym.ships.terms import SYMBOLS, Term, prime_terms, read_terms
 
 __all__ = [
     "ABKOWITZ", "EQUATIONS", "EQUATION_NAMES", "FORCE_OF_EQUATION", "SHIPPED_EQUATIONS", "STRUCTURES",
-    "SYMBOLS", "Structure", "Term", "get_dynamics", "get_structure", "list_structures", "prime_terms",
-    "read_terms", "register_structure",
+    "SYMBOLS", "Structure", "Term", "get_dynamics", "get_structure", "list_structures", "own_structure",
+    "prime_terms", "read_terms", "register_structure",
 ]  # fmt: skip
 
 ZHU = "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship dynamics"
@@ -217,21 +217,38 @@ def register_structure(
     InputError
         For a formula that cannot be read, a table that cannot be computed, or a name that another table has.
     """
-    table = check_table(equations, "register_structure: equations")
-    terms = {q: _terms(given, f"register_structure: equations.{q}") for q, given in table.items()}
-    structure = Structure(name, source, terms, normalisation, quantity)
-    if name in EQUATIONS or name == WITH_REFERENCE or STRUCTURES.get(name, structure) != structure:
-        raise InputError(
-            f"register_structure: name {name!r} found, which is another structure's; expected a new name"
-        )
-    STRUCTURES[name] = structure
+    units = {"normalisation": normalisation, "quantity": quantity}
+    table = {"name": name, "equations": equations, "source": source, **units}
+    STRUCTURES[name] = own_structure(table, "register_structure")
+    return STRUCTURES[name]
+
+
+def own_structure(table: Any, where: str) -> Structure:
+    """A structure from the arguments of `register_structure`; messages begin with `where`."""
+    own = {"source": "own", "normalisation": "si", "quantity": "acceleration", **check_table(table, where)}
+    check_keys(own, ("name", "source", "equations", "normalisation", "quantity"), where)
+    for key in ("name", "equations"):
+        if key not in own:
+            raise InputError(
+                f'{where}: no {key} found, expected a name and equations, such as r = "r, delta"'
+            )
+    given = check_table(own["equations"], f"{where}: equations")
+    own["equations"] = {q: _terms(formulas, f"{where}: equations.{q}") for q, formulas in given.items()}
+    with placed(where):
+        structure = Structure(**own)
+    name = structure.name
+    if name in (*EQUATIONS, WITH_REFERENCE, "auto") or STRUCTURES.get(name, structure) != structure:
+        raise InputError(f"{where}: name {name!r} found, which is another structure's; expected a new name")
     return structure
 
 
 def _terms(given: Any, where: str) -> tuple[Term, ...]:
     """Terms from formulas, or terms as they are."""
     if isinstance(given, str):
-        return read_terms(given)
+        if not given.strip():
+            raise InputError(f"{where}: no terms found, expected formulas such as 'v, |v| r, delta'")
+        with placed(where):
+            return read_terms(given)
     if not isinstance(given, Sequence):
         raise InputError(f"{where}: {given!r} found, expected formulas such as 'v, |v| r, delta'")
     for term in given:

@@ -18,6 +18,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
+NO_TURN = 1e-6  # rad, below which a waypoint only divides a leg
+SHARPEST_TURN = np.radians(150.0)  # beyond it a path doubles back
 FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the earth
 
 
@@ -91,6 +93,28 @@ class Path:
     def length(self) -> float:
         """Length of the path, m."""
         return float(self.lengths.sum())
+
+    def check_turns(self, radius: float) -> None:
+        """Refuse a path that doubles back, or whose turns of a radius, m, take more than there is of a leg.
+
+        Raises InputError naming the waypoints.
+        """
+        turns = np.abs(self.turns)
+        for row in np.flatnonzero(turns > SHARPEST_TURN)[:1] + 1:
+            raise InputError(
+                f"waypoints: the path doubles back at row {row}, by {np.degrees(turns[row - 1]):.0f} deg, "
+                f"expected turns of {np.degrees(SHARPEST_TURN):.0f} deg at most"
+            )
+        corners = np.concatenate([[0], np.flatnonzero(turns > NO_TURN) + 1, [self.n_legs]])
+        tangents = radius * np.tan(0.5 * np.append(0.0, turns)[corners])
+        found = np.diff(np.append(0.0, np.cumsum(self.lengths))[corners])
+        needed = tangents[:-1] + tangents[1:]
+        for k in np.flatnonzero(found < needed * (1.0 - 1e-9))[:1]:
+            raise InputError(
+                f"waypoints: rows {corners[k]} and {corners[k + 1]} are {found[k]:.6g} m apart, expected at "
+                f"least {needed[k]:.6g} m, which turns with a radius of {radius:.6g} m take; set them "
+                "further apart, or set a smaller turn_radius"
+            )
 
     def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
         """Where ships stand on given legs.

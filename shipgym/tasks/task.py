@@ -304,7 +304,12 @@ def ship_of(model: ShipModel, water_depth: float = float("inf")) -> Ship:
 
 def control_interval(model: ShipModel) -> float:
     """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
-    wanted = model.particulars["length"] / model.particulars["speed"] / STEPS_PER_LENGTH
+    return rounded_interval(model.particulars["length"] / model.particulars["speed"])
+
+
+def rounded_interval(length_time: float) -> float:
+    """The same for a ship that travels her length in so many seconds."""
+    wanted = length_time / STEPS_PER_LENGTH
     power = 10.0 ** np.floor(np.log10(wanted))
     return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted))) * power)
 

@@ -23,6 +23,7 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 
+AUTO = "auto"  # the structure where a ship file names none: ranked by trials held out
 TEXT, FLAG, NUMBER, WHOLE = "a text", "true or false", "a number", "a whole number"
 TEXTS, TWO_NUMBERS = "a list of texts", "a list of two numbers"
 WHOLE_OR_TEXT, TEXT_OR_TABLE = "a whole number or a text", "a text or a table"
@@ -78,7 +79,7 @@ class Options:
     InputError for an unknown uncertainty, and for settings of a prior without one.
     """
 
-    structure: str = _model(TEXT, "terms of the model", "abkowitz", common=True)
+    structure: Any = _model(TEXT, "terms of the model; auto: by trials held out", "abkowitz", common=True)
     name: str | None = _model(TEXT, "name of the model; by default that of the ship")
     service_shaft_speed: float | None = _model(
         NUMBER, "shaft speed at service speed, 1/s; by default that at the start of the trials", above=0.0

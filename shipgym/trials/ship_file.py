@@ -13,6 +13,8 @@ from shipgym.errors import InputError
 from shipgym.files import check_readable, read_toml
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import own_structure
+from shipgym.ships.term_table import Structure
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.cuts import check_cut
 from shipgym.trials.identify_table import check_options
@@ -22,7 +24,9 @@ from shipgym.trials.tables import read_log
 from shipgym.trials.trial import KINDS, USES, Trial, read_trials
 from shipgym.trials.trial_import import Conventions
 
-_SECTIONS = ("ship", "steering", "columns", "conventions", "sensors", "identify", "wind", "trials")
+_SECTIONS = (
+    "ship", "steering", "columns", "conventions", "sensors", "structure", "identify", "wind", "trials",
+)  # fmt: skip
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
 _TRIAL = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
@@ -51,6 +55,7 @@ class ShipFile:
     # defaults for the identification, by the names of :data:`shipgym.trials.identify_table.OPTIONS`
     identify: dict[str, Any]
     entries: tuple[TrialEntry, ...]  # the trials, not read yet
+    structure: Structure | None = None  # the table of terms in ``[structure]``
 
     @classmethod
     def load(cls, path: str | Path) -> ShipFile:
@@ -78,7 +83,8 @@ class ShipFile:
         given = {**given, "wind": data["wind"]} if "wind" in data else given
         identify = check_options(given, f"{path}: [identify]")
         data_only(identify, f"{path}: [identify]")
-        return cls(path, particulars, steering, identify, _entries(path, data, particulars))
+        structure = own_structure(data["structure"], f"{path}: [structure]") if "structure" in data else None
+        return cls(path, particulars, steering, identify, _entries(path, data, particulars), structure)
 
     def completed_particulars(self) -> Particulars:
         """The particulars with what is absent estimated and marked (:meth:`Particulars.completed`)."""

@@ -146,6 +146,14 @@ def test_weights_with_which_outputs_overflow_are_refused(fresh, memory, wrong):
         checkpoints.put_back(fresh, changed)
 
 
+@pytest.mark.parametrize("wrong", [np.nan, 3.0])
+def test_observations_that_no_environment_shows_are_refused(fresh, memory, wrong):
+    changed = copy.deepcopy(memory)
+    changed["counters"]["_last_obs"][0, 0] = wrong
+    with pytest.raises(ValueError, match=r"_last_obs: expected numbers within the bounds"):
+        checkpoints.put_back(fresh, changed)
+
+
 @pytest.mark.parametrize("memory", [None, "/etc/passwd", [], {}, {"parameters": {}}])
 def test_what_is_no_memory_is_refused(fresh, memory):
     with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8"):

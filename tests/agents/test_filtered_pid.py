@@ -1,5 +1,7 @@
 """PID with reference filter, anti-windup and wave filter: what each of them does."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,6 +111,16 @@ def test_it_is_a_controller_and_a_file(period, tmp_path):
     assert np.array_equal(again.predict(shown, state)[0], pid.predict(shown, state)[0])
     assert state.shape == (4, pid.memory_size)
     assert np.all(state[:, TURN] != 0.0)
+
+
+def test_the_least_integral_that_a_number_can_be_leaves_commands_finite(filtered):
+    tiny = replace(filtered, gains={**filtered.gains, "integral": 5e-324})
+    none = replace(filtered, gains={**filtered.gains, "integral": 0.0})
+    seen, state, other = np.full((1, 8), 0.9), None, None
+    for _ in range(3):
+        order, state = tiny.predict(seen, state)
+        same, other = none.predict(seen, other)
+        assert np.array_equal(order, same)
 
 
 def test_impossible_designs_are_refused():

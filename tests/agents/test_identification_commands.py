@@ -1,6 +1,7 @@
 """`shipgym identify`, `advise` and `reduce`, with every option from the ship file or the command line."""
 
 import json
+import re
 from pathlib import Path
 
 import document_options
@@ -11,7 +12,8 @@ from agents.cli import app
 from agents.cli.identify_options import parsed_options
 from agents.identifying import identification_settings, identify_ship
 from identification.estimators.methods import METHODS
-from shipgym import InputError, ShipFile, load_model
+from identification.validation import selection
+from shipgym import InputError, ShipFile, list_structures, load_model
 from shipgym.trials.identify_table import OPTIONS
 
 #: Every option of [identify], set to something that is not its default, of a method that has it.
@@ -29,11 +31,17 @@ SETTINGS = {
         "start_interval = 2", "start_C = 1e4", "omega = 0.1",
     ],
 }  # fmt: skip
+#: The table of terms that the documentation shows.
+TABLE = re.search(
+    r"```toml\n(\[structure\].*?)```",
+    document_options.PAGE.with_name("structures.md").read_text(encoding="utf-8"),
+    re.S,
+)[1]
 GENERAL = [
     'structure = "linear-steering"', 'samples = "integral"', 'name = "mine"', "window = 9", "smooth = false",
     'preprocessing = "savgol"', "repair = true", 'uncertainty = "bootstrap"', "guarded = false",
     'hold_out = ["zigzag_10_10.csv"]', 'prior = "clarke"', "prior_strength = 0.1",
-    'prior_folds = "largest-rudder"',
+    'prior_folds = "largest-rudder"', "current = { north = 0.1, east = -0.2 }", 'wind = "none"',
 ]  # fmt: skip
 
 
@@ -217,6 +225,65 @@ def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
     assert rows == [row["method"] for row in told["ranking"]]
     for name in names:
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
+
+
+def test_compare_ranks_structures_by_both_names(ship, tmp_path):
+    given = ("--structures", "nomoto, mine", "--methods", "ls,tls-svm", "--out", tmp_path / "out")
+    answer = shipgym("identify", ship(*TABLE.splitlines()), *given)
+    assert answer.exit_code == 0, answer.stderr
+    rows = [tuple(line.split()[:2]) for line in answer.stdout.splitlines() if "stable " in line]
+    assert set(rows) == {(method, name) for method in ("ls", "tls-svm") for name in ("nomoto", "mine")}
+    written = {path.name for path in (tmp_path / "out").glob("model-*")}
+    assert written == {"model-nomoto.json", "model-mine.json"}
+    page = (tmp_path / "out" / "comparison.html").read_text()
+    assert f"{rows[0][1]} by {rows[0][0]} predicts best" in page
+    assert shipgym("identify", ship(), "--structures", "nomto", "--out", tmp_path / "no").exit_code == 2
+
+
+def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, monkeypatch, tmp_path):
+    read = ShipFile.load(ship())
+    assert identification_settings(read, {})["structure"] == "auto"
+    assert "structure" not in identification_settings(read, {"kernel": "rbf"})
+    assert identification_settings(read, {}, "abkowitz")["structure"] == "abkowitz"
+    monkeypatch.setattr(selection, "STRUCTURES", ("nomoto", "linear-steering", "mmg"))
+    monkeypatch.setattr(selection, "OTHERS", ())
+    answer = shipgym("identify", ship(), "--out", tmp_path / "out")
+    assert answer.exit_code == 0, answer.stderr
+    assert "Structures and methods by how they predict each trial in turn" in answer.stdout
+    assert "mmg by map was not fitted: trial" in answer.stdout
+    told = json.loads((tmp_path / "out" / "metrics.json").read_text())["selection"]
+    assert told["ranking"][0]["structure"] == load_model(tmp_path / "out" / "model.json").structure
+    assert "The call named no structure" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_a_table_of_terms_in_the_ship_file_is_taken_and_stays_with_the_model(ship):
+    read, result = identified(ship(*TABLE.splitlines()))
+    assert "mine" not in list_structures()
+    assert list(result.coefficients) == ["b_v", "b_|v|v", "b_d", "c_v", "c_r", "c_v2r/U", "c_d"]
+    assert (result.settings["structure"]["name"], result.stable) == ("mine", True)
+    assert result.model.structure == result.model.provenance["structure"] == "mine"
+    assert identification_settings(read, {"structure": "nomoto"})["structure"] == "nomoto"
+    assert identification_settings(read, {"structure": "mine"})["structure"] is read.structure
+
+
+@pytest.mark.parametrize(
+    ("line", "other", "said"),
+    [
+        ('r = "v, r, v^2 r/U, delta"', 'r = "v, rr"', "[structure]: equations.r: terms: 'rr' found in 'rr'"),
+        ('r = "v, r, v^2 r/U, delta"', 'r = ""', "[structure]: equations.r: no terms found"),
+        ('r = "v, r, v^2 r/U, delta"', 'r = "v r, r v"', "stands twice in one equation: 'rv'"),
+        ('r = "v, r, v^2 r/U, delta"', 'w = "v"', "equations 'v', 'w' found, expected some of 'u', 'v'"),
+        ('r = "v, r, v^2 r/U, delta"', 'r = "import os"', "'import' found in 'import os'"),
+        ('name = "mine"', 'name = "auto"', "name 'auto' found, which is another structure's"),
+        ('name = "mine"', "", "[structure]: no name found"),
+        ('name = "mine"', 'name = "mine"\nterms = 3', "[structure]: unknown key 'terms'"),
+    ],
+)
+def test_a_wrong_table_of_terms_is_named(ship, line, other, said, tmp_path):
+    assert line in TABLE
+    answer = shipgym("identify", ship(*TABLE.replace(line, other).splitlines()), "--out", tmp_path / "out")
+    assert answer.exit_code == 2
+    assert said in answer.stderr
 
 
 def test_compare_names_a_method_that_does_not_exist(demo, tmp_path):

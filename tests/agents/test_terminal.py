@@ -103,18 +103,18 @@ def test_predictions_are_shown_by_trial_in_degrees():
     assert text[-1].split() == ["b.csv", "validate", "-", "-", "-", "-", "ran", "away"]
 
 
-def test_methods_are_shown_the_best_first():
-    first = SimpleNamespace(
-        method="tls-svm", stable=True, error=0.12345, heading_deg=1.234, yaw_rate_deg_s=0.01234, ran_away=0
-    )
-    second = SimpleNamespace(
-        method="ls", stable=False, error=None, heading_deg=None, yaw_rate_deg_s=None, ran_away=3
-    )
-    for in_turn, held in ((True, "each trial in turn"), (False, "trials held out")):
-        text = lines(terminal.comparison_table(SimpleNamespace(in_turn=in_turn, standings=[first, second])))
-        assert text[0] == f"Methods by how they predict {held}"
-        assert text[-2].split() == ["tls-svm", "stable", "0.1235", "1.23", "0.0123", "0"]
-        assert text[-1].split() == ["ls", "unstable", "-", "-", "-", "3"]
+def test_structures_and_methods_are_shown_the_best_first():
+    first = {
+        "method": "tls-svm", "structure": "abkowitz", "coefficients": 40, "stable": True, "error": 0.12345,
+        "heading_deg": 1.234, "yaw_rate_deg_s": 0.01234, "ran_away": 0,
+    }  # fmt: skip
+    lost = dict.fromkeys(("error", "heading_deg", "yaw_rate_deg_s"))
+    second = first | lost | {"method": "ls", "stable": False, "ran_away": 3}
+    for held in ("each trial in turn", "trials marked validate"):
+        text = lines(terminal.selection_table({"held_out": held, "ranking": [first, second]}))
+        assert text[0] == f"Structures and methods by how they predict {held}"
+        assert text[-2].split() == ["tls-svm", "abkowitz", "40", "stable", "0.1235", "1.23", "0.0123", "0"]
+        assert text[-1].split() == ["ls", "abkowitz", "40", "unstable", "-", "-", "-", "3"]
 
 
 def test_margins_without_bound_and_without_number_are_told_apart():

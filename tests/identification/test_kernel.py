@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, identify
+from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
@@ -132,6 +133,13 @@ def test_a_black_box_predicts_a_zigzag_that_was_held_out(black_box: Identificati
     assert black_box.model.covariance is not None
     assert check_ship_model(black_box.model).problems == ()
     assert nomoto(black_box.model).K / nomoto(black_box.model).T > 0.0
+
+
+def test_the_report_tells_the_kernel_and_not_its_weights(black_box: IdentificationResult) -> None:
+    page = report_page(black_box)
+    assert " radial basis functions of length " in page
+    assert "a_k1" in black_box.coefficients
+    assert "a_k1" not in page
 
 
 def test_its_file_holds_numbers_only(black_box: IdentificationResult, tmp_path: Path) -> None:

@@ -1,8 +1,8 @@
 """The identified models in the box: made again from the trials that ship with the project."""
 
-import importlib.util
 from pathlib import Path
 
+import build_models
 import gymnasium
 import numpy as np
 import pytest
@@ -11,17 +11,11 @@ import shipgym
 from agents import LQ, PID
 from identification import identify
 from shipgym import manoeuvres
+from shipgym.envs.registration import IDENTIFIED
+from shipgym.envs.ship_env import DEFAULT_MODEL
 
 ROOT = Path(__file__).parents[2]
 MARINER_TRIALS = ROOT / "examples" / "mariner" / "ship.toml"
-
-
-@pytest.fixture(scope="module")
-def script():
-    spec = importlib.util.spec_from_file_location("build_models", ROOT / "scripts" / "build_models.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def off_in_standard_errors(model, shipped):
@@ -54,21 +48,64 @@ def test_mariner_tls_svm_sails_like_the_ship_behind_its_trials(angle):
     assert found.overshoot_2_deg == pytest.approx(truth.overshoot_2_deg, rel=0.03, abs=0.1)
 
 
-def test_it_is_the_default_of_the_environment():
-    env = gymnasium.make("shipgym/CourseKeeping-v0")
-    assert env.unwrapped.model.name == "mariner-tls-svm"
-    assert env.unwrapped.model.provenance["stable"]
+def test_every_environment_has_an_identified_model_by_default():
+    """Three quarters of them by different pairs of method and ship; ids of version 0 keep their ships."""
+    names = ("", "Discrete", "Shaft", "Roll")
+    ids = [f"shipgym/{task}{name}-v1" for task in ("CourseKeeping", "PathFollowing") for name in names]
+    assert set(IDENTIFIED) <= set(ids)
+    models = [shipgym.load_model(IDENTIFIED.get(name, DEFAULT_MODEL)) for name in ids]
+    found = [(model.provenance["method"], shipgym.truth_of(model).name) for model in models]
+    assert all(model.provenance["stable"] and model.covariance is not None for model in models)
+    assert len(set(found)) >= 0.75 * len(ids)
+    assert {"tls-svm", "abc-lssvr", "rm-svm"} <= {method for method, _ in found}
+    assert gymnasium.spec("shipgym/CourseKeepingShaft-v1").kwargs["model"] == "kvlcc2-mmg"
+    assert gymnasium.spec("shipgym/CourseKeepingShaft-v0").kwargs["model"] == "kvlcc2"
+
+
+@pytest.mark.parametrize(
+    ("name", "turn", "overshoot"),
+    [("kvlcc2-mmg", 0.02, 0.3), ("kvlcc2-tanker-rm-svm", 0.045, 0.6), ("tanker-tls-svm", 0.05, 1.1),
+     ("container-4dof-output-error", 0.02, 0.6), ("container-two-zigzags", 0.09, 0.6)],
+)  # fmt: skip
+def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reach(name, turn, overshoot):
+    """Turning circles at 35 deg and zigzags 15/15 and 25/25 are in no model's trials."""
+    model = shipgym.load_model(name)
+    turns, held_out, _ = build_models.errors(model, *build_models.COMPARED_DEG)
+    assert turns < 100.0 * turn
+    assert held_out < overshoot
+
+
+@pytest.mark.parametrize("name", ["tanker-tls-svm", "container-two-zigzags"])
+def test_a_recipe_gives_its_model_again(name):
+    model, shipped = build_models.MODELS[name].identify(name).model, shipgym.load_model(name)
+    assert off_in_standard_errors(model, shipped) < 0.1
+    assert model.provenance["truth"] == shipped.provenance["truth"]
+
+
+def test_the_ship_behind_a_model_is_known_or_the_error_says_what_to_do():
+    assert {name: shipgym.truth_of(name).name for name in ("mariner-nomoto", "tanker-tls-svm")} == {
+        "mariner-nomoto": "mariner", "tanker-tls-svm": "tanker"
+    }  # fmt: skip
+    drawn = shipgym.load_model("tanker-tls-svm").sample(1, 0)[0]
+    assert shipgym.truth_of(drawn).name == "tanker"
+    for other in ("kvlcc2", shipgym.scale_model(shipgym.load_model("mariner-tls-svm"), 100.0)):
+        with pytest.raises(shipgym.InputError, match=r"provenance.truth .* found, expected the reference"):
+            shipgym.truth_of(other)
+
+
+def test_the_tanker_is_unstable_on_her_course_and_her_model_knows_it():
+    for model in (shipgym.load_model("tanker-tls-svm"), shipgym.truth_of("tanker-tls-svm")):
+        assert not shipgym.straight_line_stability(model).stable
 
 
 @pytest.mark.parametrize("name", ["kvlcc2-rm-svm", "kvlcc2-nomoto"])
-def test_kvlcc2_is_what_her_virtual_sea_trials_give(script, name):
+def test_kvlcc2_is_what_her_virtual_sea_trials_give(name):
     """A search for insensitive bands may end a mesh size off where rounding differs."""
-    make = next(make for make in script.MODELS if make.__name__ == name.replace("-", "_"))
-    result, shipped = make(), shipgym.load_model(name)
+    result, shipped = build_models.MODELS[name].identify(name), shipgym.load_model(name)
     assert result.model.name == name
     assert result.stable
     assert off_in_standard_errors(result.model, shipped) < 0.1
-    assert [t["name"] for t in shipped.provenance["trials"]] == [t.name for t in script.kvlcc2_trials()]
+    assert [t["name"] for t in shipped.provenance["trials"]] == [t.name for t in build_models.kvlcc2_trials()]
 
 
 def kvlcc2_turns(model):
@@ -129,9 +166,9 @@ def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
 
 
 @pytest.mark.parametrize("name", ["mariner-nomoto", "container-abc-lssvr", "container-nomoto"])
-def test_the_container_ship_and_nomotos_forms_are_what_their_trials_give(script, name):
+def test_the_container_ship_and_nomotos_forms_are_what_their_trials_give(name):
     """A search for C may end a step off where rounding differs."""
-    result = next(make for make in script.MODELS if make.__name__ == name.replace("-", "_"))()
+    result = build_models.MODELS[name].identify(name)
     shipped = shipgym.load_model(name)
     assert result.model.name == name
     assert result.stable

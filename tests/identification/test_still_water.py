@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from identification import identify
 from identification.regression.still_water import in_still_water, through_water
-from identification.report.sea import sea_sentences
+from identification.report.sea import sea_sentences, track_figure
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
@@ -62,9 +63,29 @@ def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial])
     )
     np.testing.assert_allclose(drift, (row["north"], row["east"]))
     assert found[0].raw.sha256 == logs[0].sha256
+    fit = SimpleNamespace(model=SimpleNamespace(provenance=report), trials=found)
+    figure = track_figure(fit)
+    assert [trace.name for trace in figure.data[:3]] == [
+        "over ground",
+        "through the water",
+        "the water meanwhile",
+    ]
+    assert figure.layout.annotations[0].text.startswith("turn: 0.5")
     told = sea_sentences(report)[0]
     assert told.startswith("turn, zigzag, held out: current of 0.5")
     assert told.endswith("which differs from zero; taken out")
+
+
+def test_each_trial_may_have_a_current_of_its_own(mariner: ShipModel, logs: list[Trial]) -> None:
+    """Trials that contradict one current have two; that of a trial held out follows from these."""
+    other = turning_circle(mariner, -35.0, 700.0, 0.5, weather=Weather(Current(0.8, 90.0)))
+    trials = [logs[0], log(other, 5).with_(name="other"), logs[2]]
+    _, report = in_still_water(trials, Options(), mariner.particulars)
+    rows = {name: (row["north"], row["east"]) for name, row in report["currents"].items()}
+    np.testing.assert_allclose(rows["turn"], (NORTH, EAST), atol=0.05)
+    np.testing.assert_allclose(rows["other"], (0.0, 0.8), atol=0.05)
+    np.testing.assert_allclose(rows["held out"], (NORTH, EAST), atol=0.2)
+    assert {row["source"] for row in report["currents"].values()} == {"trial"}
 
 
 def test_still_water_stays_still(mariner: ShipModel) -> None:

@@ -51,11 +51,25 @@ def test_one_of_sixteen_errors_is_larger_than_printed_and_its_note_tells_the_lim
     assert "the limit" in missed[0].note
 
 
-def test_the_chosen_pair_reaches_its_aims_with_either_rudder_limit():
+def test_the_chosen_pair_reaches_its_aims_with_another_term_or_rudder_limit_and_not_in_yaw_by_its_own():
+    """|v| r reaches 0.0173 and 0.0101, v^2 r/U 0.0054 and 0.0042."""
     rows = list(steering_forms.chosen_rows())
-    assert [row.aim for row in rows] == ["below 0.02", "below 0.005"] * 2
-    assert all(row.met for row in rows)
+    assert [row.aim for row in rows] == ["below 0.02", "below 0.005"] * 3
+    assert [row.met for row in rows] == [True, False, True, True, True, True]
+    assert [row.best for row in rows[:4]] == pytest.approx([0.0173, 0.0101, 0.0054, 0.0042], rel=0.02)
     assert all(row.as_paper > row.best for row in rows[:2])
+
+
+def test_the_thesis_order_of_the_recursions_is_that_of_a_ship_integrated_by_euler_s_rule():
+    a22 = recursive_start.NAMES.index("a22")
+    plain, started = (
+        recursive_start.errors(recursive_start.history(method, euler=True)[-1])
+        for method in ("RLS", "LSSVR-RLS")
+    )
+    assert plain[a22] == pytest.approx(-31.3, abs=1.0)
+    assert np.abs(started).max() < 0.1
+    accurate = [recursive_start.errors(recursive_start.as_printed(m))[a22] for m in ("RLS", "LSSVR-RLS")]
+    assert abs(accurate[0]) < abs(accurate[1])
 
 
 def test_coefficients_of_the_chosen_yaw_model_come_out_as_printed():

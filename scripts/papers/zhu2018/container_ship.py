@@ -43,6 +43,7 @@ DURATION, STEP, INTERVAL = 900.0, 0.1, 0.5  # of the simulation and of the sampl
 RPM = 1.0 / 60.0
 #: Shaft orders of the straight lines, rpm, each held for 150 s: a stand-in within the printed ranges.
 ORDERS = {"learned": (120, 160, 140, 130, 150, 120), "verified": (100, 160, 120, 140, 110, 150)}
+OTHER_TERMS = "at best: U v, U r, v^2 r/U, U^2 delta, with surge: not the thesis' terms, which have |v| r"
 ACCEPTED = 0.5  # mean squared error of surge that the thesis accepts, m^2/s^2
 REPEATS = 30  # of timings
 FAST = 0.010  # aim, s
@@ -90,8 +91,8 @@ PRINTED_REGRESSION = {"u": 4.0346e-6, "v": 3.5005e-6, "r": 4.3924e-6}
 TABLES = {"u": "7.4.5", "v": "7.4.6", "r": "7.4.7"}
 BOUND = "bounds of the search are not printed; the training objective drives C to the upper one, here "
 
-#: Terms of `WITH_SPEED`: u^2, n^2, n u; u^2, v r, n^2; U v, U r, v^2 r/U, U^2 delta, which is row 6 of Tables
-#: 7.4.9 and 7.4.10 with the speed of the moment and the smooth v^2 in place of |v|.
+#: Terms of `WITH_SPEED`: u^2, n^2, n u; u^2, v r, n^2; U v, U r, v^2 r/U, U^2 delta, which is not row 6 of
+#: Tables 7.4.9 and 7.4.10: that has |v| r in place of v^2 r/U.
 SURGE_ALONE, SURGE_IN_TURNS, FOUR_WITH_SPEED = (0, 2, 3), (0, 1, 2), (0, 3, 7, 6)
 
 
@@ -282,7 +283,7 @@ def prediction_rows() -> Iterator[Row]:
                 best < least,
                 "shaft orders of the straight lines are not printed: a stand-in; at best: u^2, n^2 and n u"
                 if q == "u"
-                else "at best: row 6 of Table 7.4.9 with the instantaneous speed and surge",
+                else OTHER_TERMS,
             )
 
 

@@ -1,0 +1,96 @@
+"""`shipgym steer` and `shipgym simulate`: an autopilot and a simulated ship, the two ends of NMEA 0183."""
+
+from __future__ import annotations
+
+import asyncio
+from math import inf, radians
+from typing import Annotated
+
+import typer
+
+from agents.cli.command import FAILED, Json, answered, fail
+
+Address = Annotated[
+    str, typer.Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
+]
+Duration = Annotated[float, typer.Option(min=0.0, help="Seconds after which it ends; default: never.")]
+SpeedUp = Annotated[float, typer.Option(min=0.01, help="Seconds that pass in one; the same at both ends.")]
+
+
+@answered
+def steer_command(
+    agent: Annotated[
+        str,
+        typer.Argument(metavar="AGENT", help="A file of a controller, or the name of a pretrained agent."),
+    ],
+    nmea: Address,
+    heading: Annotated[
+        float | None, typer.Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
+    ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=VALUE", help="When it hands over: silence_s=3, rudder_deg=5; repeatable."),
+    ] = None,
+    duration: Duration = inf,
+    speed_up: SpeedUp = 1.0,
+    as_json: Json = False,
+) -> None:
+    """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB and XTE in, ROR and HTD out.
+
+    It begins when all that the autopilot reads is there. When a sensor falls silent, two disagree, the rudder
+    does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and steers no
+    more. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
+    """
+    from agents.agent_file import load_agent
+    from agents.cli.terminal import out as console
+    from agents.cli.terminal import print_json
+    from agents.deployment.steering import Limits, steer
+    from shipgym.checks import check_keys
+    from shipgym.files import named_values
+
+    limits = named_values(limit or (), "--limit", "silence_s=3")
+    check_keys(limits, Limits.__dataclass_fields__, "--limit")
+    course = None if heading is None else radians(heading)
+    found = asyncio.run(
+        steer(
+            load_agent(agent), nmea, heading=course, limits=Limits(**limits), duration=duration,
+            speed_up=speed_up, told=lambda line: None if as_json else console.print(line, soft_wrap=True),
+        )
+    )  # fmt: skip
+    if as_json:
+        print_json({"state": found.state, "alarm": found.alarm, **found.counts})
+    if found.alarm:
+        fail(f"handed over: {found.alarm}", FAILED)
+
+
+@answered
+def simulate_command(
+    model: Annotated[
+        str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
+    ],
+    nmea: Address,
+    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter tells of.")] = 0.0,
+    sea: Annotated[str, typer.Option(help="calm, slight, moderate or rough.")] = "calm",
+    seed: Annotated[int, typer.Option(min=0, help="Of the sea.")] = 0,
+    drop: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="HDT=60", help="Sentence that falls silent, and after how many seconds; repeatable."
+        ),
+    ] = None,
+    duration: Duration = inf,
+    speed_up: SpeedUp = 1.0,
+) -> None:
+    """Sail a ship model as the other end of `shipgym steer`: instruments out, rudder orders in.
+
+    Over TCP it waits to be connected to, by the autopilot and a chart plotter at once.
+    """
+    from agents.deployment.simulated import SimulatedShip, simulate_ship
+    from shipgym.checks import check_number
+    from shipgym.files import named_values
+    from shipgym.ships import load_model
+
+    given = named_values(drop or (), "--drop", "HDT=60")
+    dropped = {kind.upper(): check_number(after, f"--drop {kind}") for kind, after in given.items()}
+    ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
+    asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))

@@ -1,0 +1,110 @@
+"""A controller as it stands on a bridge: numbers of one ship in SI units in, the ordered rudder out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from agents.controllers.controller import Controller
+from agents.controllers.los_autopilot import Guided
+from shipgym.engine.records import field_types
+from shipgym.errors import InputError
+from shipgym.files import read_toml
+from shipgym.tasks.contract import Seen
+from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.path_following import Observation
+from shipgym.tasks.steering import INTEGRAL_ZONE, Extras, Helm
+from shipgym.tasks.task import rounded_interval
+
+#: Unit and meaning of variables by name, of ships and autopilots.
+VARIABLES = read_toml(Path(__file__).with_name("variables.toml"), "table of variables")
+INPUTS = VARIABLES["autopilot_input"]
+#: Observations that an autopilot makes itself.
+OWN = ("heading_error_sin", "heading_error_cos", "last_command", "heading_error_integral")
+
+
+def _reads(agent: Any) -> set[str]:
+    """What a controller reads of the ship beside her heading."""
+    if isinstance(agent, Guided):
+        return {"cross_track"} | _reads(agent.autopilot)
+    if not isinstance(agent, Controller):
+        base = getattr(agent, "base", None)
+        return {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
+    if type(agent).steer is not Controller.steer:
+        return {*agent.reads}
+    used = [signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]]
+    return {one for one in used if one in INPUTS}
+
+
+@cache
+def bounds() -> dict[str, tuple[float, float]]:
+    """Bounds of observations by name, in multiples of their scale."""
+    notes = [
+        note for record in (Helm, Extras, Observation) for note in field_types(record, notes=True).items()
+    ]
+    seen = [(name, one) for name, note in notes for one in getattr(note, "__metadata__", ())]
+    return {name: (one.low, one.high) for name, one in seen if isinstance(one, Seen)}
+
+
+class Autopilot:
+    """Any controller or policy, stepped once in each control interval `dt` in double precision.
+
+    It adds what an environment would: the integral of the heading error, and the last command. `inputs` names
+    what it reads. Guidance is given the direction of the leg as its set-point, a policy that learned to
+    follow paths the course that its environment shows: the leg's less atan(cross-track error / lookahead).
+
+    Raises
+    ------
+    InputError
+        For a policy that commands the shaft too, or reads what no ship is known to show.
+    """
+
+    def __init__(self, agent: Any) -> None:
+        names = {"set_point", "heading", *_reads(agent)}
+        if getattr(agent, "action", "rudder") == "rudder-shaft" or not names <= INPUTS.keys():
+            raise InputError(
+                f"autopilot: a policy that commands {getattr(agent, 'action', 'rudder')} and reads "
+                f"{', '.join(sorted(names))[:200]} found, expected rudder alone, by {', '.join(INPUTS)}"
+            )
+        self.agent, self.inputs = agent, [name for name in INPUTS if name in names]
+        self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
+        self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
+        self.limit, given = float(self.scales["rudder"]), getattr(agent, "env_options", {}).get("dt")
+        self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
+        if isinstance(agent, Controller):
+            self.dt = float(agent.design["dt"])
+        self.begins, self.drift, self.integral, self.last_command = True, np.zeros(1), 0.0, 0.0
+        self.memory: Any = (
+            np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Controller) else None
+        )
+
+    def step(self, given: Mapping[str, float]) -> float:
+        """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""
+        error = wrapped(given["set_point"] - given["heading"])
+        if isinstance(self.agent, Guided):
+            course, self.drift = self.agent.course(np.array([given["cross_track"]]), self.drift)
+            error = wrapped(error + course[0])
+        reach = self.scales["heading_error_integral"]
+        gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
+        self.integral = min(max(self.integral + gathered, -reach), reach)
+        own = (float(np.sin(error)), float(np.cos(error)), self.last_command, self.integral)
+        order = self._order({**given, **dict(zip(OWN, own, strict=True))})
+        self.begins, self.last_command = False, min(max(order, -self.limit), self.limit)
+        return self.last_command
+
+    def _order(self, seen: Mapping[str, float]) -> float:
+        pilot = self.pilot
+        if isinstance(pilot, Controller):
+            arrays = {name: np.array([seen.get(name, 0.0)]) for name in pilot.observation_names}
+            order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
+            return float(order[0])
+        pairs = zip(pilot.observation_names, pilot.observation_scales, strict=True)
+        shown = np.array(
+            [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in pairs], dtype=np.float32
+        )
+        action, self.memory = pilot.predict(shown, self.memory, self.begins)
+        return float(action[0]) * self.limit

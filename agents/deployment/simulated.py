@@ -1,0 +1,99 @@
+"""`shipgym simulate`: a ship model with the instruments of a ship, to steer over NMEA 0183."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+from contextlib import closing, suppress
+from math import atan2, cos, hypot, inf, radians, sin
+from typing import Any
+
+import numpy as np
+
+from agents.deployment.c99 import render
+from agents.deployment.nmea import Link, readings, sentences
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Weather
+from shipgym.ships import ShipModel
+from shipgym.ships.conditions import Conditions, Passage
+
+STEP = 0.1  # s, between two sentences of a compass
+SLOW = 10  # steps between two of the log and the GNSS receiver
+START = 54.0, 7.5  # degrees north and east, where the ship is at the beginning
+MINUTE = 1852.0  # m, of latitude
+
+
+class SimulatedShip:
+    """A ship model that sails on, step by step, and tells what her instruments show.
+
+    She begins to the north at service speed in a weather (calm by default) that follows from the seed. Her
+    plotter tells of a leg through where she began, to the direction `leg`, rad.
+    """
+
+    def __init__(
+        self, model: ShipModel, leg: float = 0.0, weather: Weather | str | None = None, seed: int = 0
+    ) -> None:
+        self.model, self.leg, self.order, self.steps = model, check_number(leg, "leg"), 0.0, 0
+        self.passage = Passage(model, Conditions(weather=weather, seed=seed), STEP)
+        self.states = self.passage.states(model.service_state, 1)
+
+    def hear(self, line: str) -> None:
+        """Take a rudder order; one whose status is invalid lets the rudder go amidships."""
+        for reading in readings(line) or ():
+            if reading.quantity in ("order", "released"):
+                self.order = reading.value if reading.quantity == "order" else 0.0
+
+    def advance(self) -> None:
+        """One step; InputError where the ship has run away."""
+        order = np.array([[self.order, self.model.service_shaft_speed]])
+        if not self.passage.loop("simulate")(
+            self.states, order, STEP, *self.passage.sea, self.passage.numbers
+        ):
+            raise InputError(f"model '{self.model.name}' ran away after {self.steps * STEP:.1f} s")
+        self.states[0], self.steps = self.states[1], self.steps + 1
+
+    @property
+    def now(self) -> dict[str, Any]:
+        """Her state by name."""
+        return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
+
+    def sentences(self) -> str:
+        """What her instruments send now."""
+        s, (north, east) = self.now, self.states[0, -4:-2] if self.passage.windy else (0.0, 0.0)
+        ahead, aside, sine, cosine = s["u"], s["v"] * cos(s.get("phi", 0.0)), sin(s["psi"]), cos(s["psi"])
+        north, east = north + ahead * cosine - aside * sine, east + ahead * sine + aside * cosine
+        latitude = START[0] + s["x"] / MINUTE / 60.0
+        longitude = START[1] + s["y"] / MINUTE / 60.0 / cos(radians(latitude))
+        minutes, seconds = divmod(self.steps * STEP, 60.0)
+        cross = s["y"] * cos(self.leg) - s["x"] * sin(self.leg)
+        text = render(
+            "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg,
+            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=atan2(east, north),
+            speed=hypot(north, east),
+            latitude=f"{int(latitude):02d}{latitude % 1 * 60:07.4f}",
+            longitude=f"{int(longitude):03d}{longitude % 1 * 60:07.4f}",
+            time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",
+        )  # fmt: skip
+        return sentences(text)
+
+
+async def simulate_ship(
+    ship: SimulatedShip, address: str, *, duration: float = inf, speed_up: float = 1.0,
+    drop: Mapping[str, float] | None = None,
+) -> None:  # fmt: skip
+    """Sail a ship over NMEA 0183, in real time or `speed_up` times as fast, for a duration in s.
+
+    Over TCP others connect to the `address` (`Link`), over UDP it sends there. `drop` names types of sentence
+    that fall silent, and when, s. Raises InputError for an address that cannot be opened.
+    """
+    loop, link = asyncio.get_running_loop(), Link(ship.hear)
+    check_number(speed_up, "speed_up", above=0.0)
+    await link.open(address, serve=True)
+    begin, dropped = loop.time(), dict(drop or {})
+    with closing(link), suppress(asyncio.CancelledError):
+        while (now := ship.steps * STEP) < duration:
+            await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))
+            lines = ship.sentences().splitlines(keepends=True)
+            link.send("".join(line for line in lines if now < dropped.get(line[3:6], inf)))
+            ship.advance()

@@ -1,0 +1,195 @@
+"""`shipgym steer`: an autopilot on NMEA 0183, which hands over when it cannot trust what it is told."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+from collections.abc import Callable, Iterable
+from contextlib import closing, suppress
+from dataclasses import dataclass, field
+from math import ceil, cos, inf, radians, sin
+from typing import Any
+
+from agents.controllers.los_autopilot import Guided
+from agents.deployment.autopilot import Autopilot
+from agents.deployment.c99 import render
+from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
+from shipgym.checks import check_number
+from shipgym.errors import InputError
+from shipgym.tasks.guidance import wrapped
+
+STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
+LONGEST_TICK = 1.0  # s, between two looks at the sensors
+ANGLES = ("heading", "course", "leg", "to_steer", "rudder")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """When an autopilot hands over to the helmsman."""
+
+    silence_s: float = 3.0  # without a valid reading of anything that it steers by
+    disagreement_deg: float = 5.0  # between angles of two instruments; of yaw rates a tenth of it a second
+    disagreement_kn: float = 4.0  # between their speeds
+    rudder_deg: float = 5.0  # between the rudder and where its order should have brought it
+    rudder_rate_deg_s: float = 2.3  # slowest of the steering gear; this is that of SOLAS II-1/29
+    persistence_s: float = 2.0  # how long a disagreement may last
+    late_s: float = 1.0  # how late a step may be; then the computer cannot keep up
+
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            check_number(value, name, above=0.0)
+
+    def between(self, quantity: str) -> float:
+        """How much two instruments may differ, SI units."""
+        if quantity in ANGLES or quantity == "yaw_rate":
+            return radians(self.disagreement_deg) * (0.1 if quantity == "yaw_rate" else 1.0)
+        return inf if quantity == "cross_track" else self.disagreement_kn * 1852.0 / 3600.0
+
+
+@dataclass
+class Sensors:
+    """The newest readings, and what is wrong with them."""
+
+    limits: Limits
+    newest: dict[str, dict[str, tuple[float, float]]] = field(default_factory=dict)  # by quantity and talker
+    since: dict[str, float] = field(default_factory=dict)  # when something wrong was first seen, s
+    expected: float | None = None  # where the rudder should be by now, at the slowest, rad
+
+    def take(self, reading: Reading, now: float) -> None:
+        """Keep a reading; the first talker of a quantity is the one that is steered by."""
+        self.newest.setdefault(reading.quantity, {})[reading.talker] = reading.value, now
+
+    def value(self, quantity: str, now: float) -> float | None:
+        """What the first talker of a quantity said last; None if that is too long ago."""
+        value, at = next(iter(self.newest.get(quantity, {}).values()), (0.0, -inf))
+        return value if now - at <= self.limits.silence_s else None
+
+    def numbers(self, needed: Iterable[str], now: float) -> dict[str, float | None]:
+        """What an autopilot reads; speeds over ground where no log tells those through the water."""
+        found = {quantity: self.value(quantity, now) for quantity in needed}
+        course, speed, heading = (self.value(one, now) for one in ("course", "speed", "heading"))
+        for quantity, part in (("surge", cos), ("sway", sin)):
+            if quantity in found and quantity not in self.newest and None not in (course, speed, heading):
+                found[quantity] = speed * part(course - heading)  # type: ignore[operator]
+        return found
+
+    def fault(self, order: float, step: float, now: float) -> str | None:
+        """Two talkers that differ, or a rudder that does not follow its order, for too long."""
+        for quantity, talkers in self.newest.items():
+            fresh = [(name, v) for name, (v, at) in talkers.items() if now - at <= self.limits.silence_s]
+            for name, value in fresh[1:]:
+                apart = abs(value - fresh[0][1])
+                apart = abs(float(wrapped(apart))) if quantity in ANGLES else apart
+                if self._lasts(f"{quantity} {name}", apart > self.limits.between(quantity), now):
+                    return f"{quantity.replace('_', ' ')} of {fresh[0][0]} and {name} disagree"
+        rudder, reach = self.value("rudder", now) or 0.0, radians(self.limits.rudder_rate_deg_s) * step
+        expected = rudder if self.expected is None else self.expected
+        self.expected = expected + min(max(order - expected, -reach), reach)
+        low, high = sorted((self.expected, order))
+        off = max(low - rudder, rudder - high) > radians(self.limits.rudder_deg)
+        return "the rudder does not follow its order" if self._lasts("order", off, now) else None
+
+    def _lasts(self, what: str, wrong: bool, now: float) -> bool:
+        if not wrong:
+            self.since.pop(what, None)
+        return wrong and now - self.since.setdefault(what, now) > self.limits.persistence_s
+
+
+class Helm:
+    """The autopilot between sensors and rudder: `standby`, `steering`, and, after a fault, `manual` for good.
+
+    `heading`, rad, is its set-point, of guidance the direction of the leg; None: the plotter's (APB). Raises
+    InputError for an autopilot that reads what no sentence tells.
+    """
+
+    def __init__(self, agent: Any, heading: float | None, limits: Limits) -> None:
+        self.pilot, self.limits, self.sensors = Autopilot(agent), limits, Sensors(limits)
+        self.heading, self.state, self.alarm, self.order = heading, STANDBY, "", 0.0
+        self.plotted = "leg" if isinstance(agent, Guided) else "to_steer"
+        self.needed = [one for one in (*self.pilot.inputs, "rudder") if one != "set_point"]
+        if unknown := set(self.needed) - TABLES["believed"].keys():
+            raise InputError(
+                f"autopilot: it reads {', '.join(sorted(unknown))}, which no sentence of NMEA 0183 tells it"
+            )
+        self.silent, self.counts = ["sensors"], {"sentences": 0, "damaged": 0}
+
+    def hear(self, line: str, now: float) -> None:
+        """Take in a line that was received."""
+        found = readings(line)
+        self.counts["damaged" if found is None else "sentences"] += 1
+        for reading in found or ():
+            self.sensors.take(reading, now)
+
+    def watch(self, step: float, now: float, fault: str | None = None) -> None:
+        """Begin when all sensors are there; hand over for good when one is wrong, or at another fault."""
+        given = self._given(now)
+        self.silent = silent = [name.replace("_", " ") for name, value in given.items() if value is None]
+        if self.state == STANDBY and not silent:
+            self.state = STEERING
+        elif self.state == STEERING and not fault:
+            fault = f"no {' and no '.join(silent)} for {self.limits.silence_s:g} s" if silent else None
+            fault = fault or self.sensors.fault(self.order, step, now)
+        if fault and self.state != MANUAL:
+            self.state, self.alarm = MANUAL, fault
+
+    def steer(self, now: float) -> None:
+        """One control interval."""
+        if self.state == STEERING:
+            self.order = self.pilot.step({name: value or 0.0 for name, value in self._given(now).items()})
+
+    def _given(self, now: float) -> dict[str, float | None]:
+        set_point = self.sensors.value(self.plotted, now) if self.heading is None else self.heading
+        return {**self.sensors.numbers(self.needed, now), "set_point": set_point}
+
+    @property
+    def status(self) -> str:
+        """What it does, what it waits for, or why it has handed over."""
+        if self.state == STANDBY:
+            return f"{STANDBY}, waits for {', '.join(self.silent)}"
+        return f"{MANUAL}: ALARM, {self.alarm}: take the wheel" if self.alarm else self.state
+
+    def sentences(self) -> str:
+        """Rudder order and status, and the alarm if there is one."""
+        return sentences(
+            render(
+                "helm.nmea.j2", order=self.order, valid=self.state == STEERING, limit=self.pilot.limit,
+                set_point=self.heading, alarm=self.alarm,
+            )
+        )  # fmt: skip
+
+
+async def steer(
+    agent: Any, address: str, *, heading: float | None = None, limits: Limits | None = None,
+    duration: float = inf, speed_up: float = 1.0, told: Callable[[str], None] = print,
+) -> Helm:  # fmt: skip
+    """Steer a ship over NMEA 0183 for a duration in s; the helm as it was at the end.
+
+    `agent`, `heading` and `limits` are those of `Helm`, `address` is that of a `Link`. Of simulated ships
+    `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises InputError for an
+    address that cannot be opened, and for an autopilot that reads what no sentence tells.
+    """
+    for name, number in (("speed_up", speed_up), ("heading", heading or 0.0)):
+        check_number(number, name)
+    helm, loop = Helm(agent, heading, limits or Limits()), asyncio.get_running_loop()
+    link = Link(lambda line: helm.hear(line, loop.time() * speed_up))
+    await link.open(address)
+    parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
+    tick, begin, number, status = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
+    gc.freeze()  # so that no collection of garbage looks through all that was imported, which takes long
+    with closing(link), suppress(asyncio.CancelledError):  # the end that an interruption asks for
+        while number * tick < duration:
+            due = begin + number * tick
+            await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
+            now = loop.time() * speed_up
+            late = helm.state == STEERING and now - due > helm.limits.late_s * speed_up
+            fault = f"a step came {now - due:.1f} s late" if late else None
+            helm.watch(tick, now, fault if link.ends else "the connection was closed")
+            if number % parts == 0:
+                helm.steer(now)
+            link.send(helm.sentences())
+            if helm.status != status:
+                told(f"{number * tick:.1f} s: {helm.status}")
+            status, number = helm.status, number + 1
+            if not link.ends:
+                break
+    return helm

@@ -1,0 +1,164 @@
+"""Measure what docs/deployment.md publishes: C on this computer and on ARM, an FMU, the live loop.
+
+`python scripts/deployment_speed.py [--seconds 60]`; needs gcc and the extras fmu and nmea.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import multiprocessing
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from agents import LQ, load_agent
+from agents.deployment import steering
+from agents.deployment.c99 import Source, autopilot_source, ship_source
+from agents.deployment.fmu import write_fmu
+from agents.deployment.simulated import SimulatedShip, simulate_ship
+from shipgym.ships import load_model
+
+CROSS = ("arm-linux-gnueabihf-gcc", "aarch64-linux-gnu-gcc")
+QEMU = {"arm-linux-gnueabihf-gcc": "qemu-arm", "aarch64-linux-gnu-gcc": "qemu-aarch64"}
+STEPS = 2_000_000
+MAIN = """
+#include "{name}.h"
+#include <stdio.h>
+#include <time.h>
+int main(void) {{
+    {name}_state state;
+    {name}_input input = {{0}};
+    double sum = 0.0;
+    clock_t begin;
+    {name}_init(&state);
+    begin = clock();
+    for (int k = 0; k < {steps}; ++k) {{
+        input.{first} = 0.1 * (k % 7);
+        sum += {call};
+    }}
+    printf("%.4f us a step (%.17g)\\n", (double)(clock() - begin) / CLOCKS_PER_SEC / {steps} * 1e6, sum);
+    return 0;
+}}
+"""
+
+
+def timed(source: Source, compiler: str, steps: int, runner: str | None = None) -> str:
+    """What a program that steps it prints."""
+    call = f"{source.name}_step(&state, &input" + (
+        f", 0.5 * {source.name.upper()}_LONGEST_STEP)" if source.ship else ")"
+    )
+    text = MAIN.format(name=source.name, steps=steps, first=next(iter(source.inputs)), call=call)
+    with tempfile.TemporaryDirectory() as folder:
+        for file, content in {
+            f"{source.name}.h": source.header,
+            f"{source.name}.c": source.source,
+            "main.c": text,
+        }.items():
+            (Path(folder) / file).write_text(content, encoding="utf-8")
+        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-static"]
+        subprocess.run(
+            [compiler, *flags, "main.c", f"{source.name}.c", "-o", "main", "-lm"], cwd=folder, check=True
+        )
+        command = [*([runner] if runner else []), "./main"]
+        return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def real_time_factor(source: Source, version: str) -> float:
+    """Seconds simulated in one by FMPy's loop, at communication steps of the longest step."""
+    import fmpy
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"{folder}/it.fmu"
+        write_fmu(source, path, version)
+        unzipped = fmpy.extract(path)
+        options = {
+            "step_size": source.step,
+            "output_interval": source.step,
+            "stop_time": 20_000 * source.step,
+        }
+        begin = time.perf_counter()
+        fmpy.simulate_fmu(unzipped, validate=False, start_values={"rudder": 0.1}, **options)
+        elapsed = time.perf_counter() - begin
+        shutil.rmtree(unzipped)
+    return options["stop_time"] / elapsed
+
+
+def burn() -> None:
+    """Keep a processor busy."""
+    while True:
+        sum(range(10_000))
+
+
+def sail(address: str, seconds: float) -> None:
+    """The simulated ship, in a process of her own."""
+    asyncio.run(simulate_ship(SimulatedShip(load_model("mariner")), address, duration=seconds))
+
+
+def periods(seconds: float, real_time: bool) -> np.ndarray:
+    """Periods of the live loop at 10 Hz, s, with the simulated ship in another process."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        address = f"tcp:127.0.0.1:{server.getsockname()[1]}"
+    ship = multiprocessing.Process(target=sail, args=(address, seconds + 60.0), daemon=True)
+    ship.start()
+    beats: list[float] = []
+    inner, agent = steering.Helm.steer, LQ.from_model(load_model("mariner"), dt=0.1)
+    steering.Helm.steer = lambda self, now: (beats.append(time.perf_counter()), inner(self, now))[1]  # type: ignore[assignment,method-assign,func-returns-value]
+    time.sleep(20.0)  # until she is there
+    os.sched_setscheduler(0, os.SCHED_FIFO if real_time else os.SCHED_OTHER, os.sched_param(10 * real_time))
+    asyncio.run(steering.steer(agent, address, heading=0.1, duration=seconds))
+    os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
+    steering.Helm.steer = inner  # type: ignore[method-assign]
+    ship.terminate()
+    return np.diff(beats)
+
+
+def main() -> None:
+    """Print all figures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=60.0, help="of the live loop, each time")
+    seconds = parser.parse_args().seconds
+    mariner = load_model("mariner")
+    exported = {
+        "lq": autopilot_source(LQ.from_model(mariner), "lq"),
+        "ppo": autopilot_source(load_agent("mariner-calm-ppo"), "ppo"), "ship": ship_source(mariner, "ship"),
+    }  # fmt: skip
+    for name, source in exported.items():
+        print(f"{name}: gcc: {timed(source, 'gcc', STEPS)}")
+        for compiler in CROSS:
+            if shutil.which(compiler) is None:
+                print(f"{name}: {compiler} is not installed", file=sys.stderr)
+            else:
+                runner = shutil.which(QEMU[compiler])
+                found = timed(source, compiler, STEPS // 100, runner) if runner else "no emulator (qemu-user)"
+                print(f"{name}: {compiler}, emulated: {found}")
+    for version in ("2.0", "3.0"):
+        print(f"ship.fmu, FMI {version}: {real_time_factor(exported['ship'], version):.0f} times real time")
+    for load, real_time in ((0, False), (4, False), (4, True)):
+        busy = [multiprocessing.Process(target=burn, daemon=True) for _ in range(load)]
+        for one in busy:
+            one.start()
+        try:
+            off = np.abs(periods(seconds, real_time) - 0.1) * 1e3
+            print(
+                f"live loop, {load} busy processes on {os.cpu_count()} cores, "
+                f"{'real-time' if real_time else 'ordinary'} priority: {len(off)} periods, off 100 ms by "
+                f"{np.median(off):.2f} ms at the median, {np.quantile(off, 0.99):.2f} ms at the 99th "
+                f"percentile, {off.max():.2f} ms at most; load average {os.getloadavg()[0]:.0f}",
+                flush=True,
+            )
+        except PermissionError:
+            print("real-time priority is not permitted here")
+        for one in busy:
+            one.terminate()
+
+
+if __name__ == "__main__":
+    main()

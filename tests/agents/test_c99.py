@@ -1,0 +1,205 @@
+"""The exported C does what the library does, and what cannot be written as C is refused by name."""
+
+import ctypes
+import subprocess
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from agents import LQ, LQG, PID, FilteredPID, IntegralLineOfSight, ScheduledLQ, Shielded, load_agent
+from agents.cli import app
+from agents.controllers.adaptive_lq import AdaptiveLQ
+from agents.controllers.los_autopilot import AdaptiveLineOfSight
+from agents.deployment.autopilot import Autopilot
+from agents.deployment.c99 import ShipInput, advance, autopilot_source, ship_source
+from agents.deployment.translator import Translator
+from shipgym.engine import mathematics
+from shipgym.engine.motion import Motion
+from shipgym.engine.specialise import Specialisation
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea.open_sea import sea_functions
+from shipgym.sea.weather_column import CALM
+from shipgym.ships import load_model
+from shipgym.ships.kernel_boxes import Kernel, kernel_box
+from tests.agents.policies import MARINER, random_policy
+
+FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+
+
+def built(folder, name, *texts):
+    """The shared library of a header and a source."""
+    for suffix, text in zip("hc", texts, strict=True):
+        (folder / f"{name}.{suffix}").write_text(text)
+    command = ["gcc", *FLAGS, f"{name}.c", "-o", f"{name}.so", "-lm"]
+    subprocess.run(command, cwd=folder, check=True)
+    return ctypes.CDLL(str(folder / f"{name}.so"))
+
+
+def sailed(folder, model, commands, given, dt):
+    """States of the exported ship, shape (n + 1, 11)."""
+    source = ship_source(model, "ship")
+    library = built(folder, "ship", source.header, source.source)
+    library.ship_step.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_double]
+    state, inputs, states = np.zeros(11), np.zeros(6), []
+    library.ship_init(ctypes.c_void_p(state.ctypes.data))
+    inputs[1:] = model.service_shaft_speed, *given
+    for rudder in commands:
+        states.append(state.copy())
+        inputs[0] = rudder
+        assert library.ship_step(state.ctypes.data, inputs.ctypes.data, dt) == 0
+    return np.array([*states, state])
+
+
+@pytest.mark.parametrize(("name", "steps"), [("mariner", 10_000), ("container", 300)])
+def test_a_ship_in_c_sails_as_the_library_does(name, steps, tmp_path):
+    model, dt, windy = load_model(name), 1.0, name == "mariner"
+    weather = Weather(Current(0.5, 90.0), Wind(8.0, 30.0, gust=False)) if windy else None
+    given = (0.5 * np.cos(np.pi / 2), 0.5, 8.0, np.radians(30.0)) if windy else (0.0, 0.0, 0.0, 0.0)
+    rudder = np.radians(15.0) * np.sign(np.sin(0.01 * np.arange(steps) + 0.001))
+    commands = np.column_stack([rudder, np.full(steps, model.service_shaft_speed)])
+    trial = model.simulate(commands[:, : len(model.command_names)], dt, weather=weather)
+    found = sailed(tmp_path, model, rudder, given, dt)
+    for channel in model.state_names:
+        expected = trial[channel]
+        error = np.abs(found[:, Motion._fields.index(channel)] - expected).max()
+        assert error <= 1e-12 * np.abs(expected).max(), channel
+
+
+def kernel_ship():
+    """A grey box whose table is a kernel of a few centres."""
+    box, random = load_model("kvlcc2-rm-svm"), np.random.default_rng(0)
+    shapes = ((8, 4), (8, 3))
+    kernel = Kernel(
+        np.array([0.0, 0.0, 0.0, 1.0]), np.full(4, 0.5), *(random.normal(size=one) for one in shapes)
+    )
+    structure = kernel_box(box.dynamics, kernel)
+    weights = dict(zip(structure.coefficient_names, 1e-3 * random.normal(size=9), strict=True))
+    return replace(box, coefficients=weights, covariance=None, own_table=structure)
+
+
+@pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])
+def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
+    model = kernel_ship() if name == "kernel" else load_model(name)
+    parts = {**model.vessel.parts(), **sea_functions(True)}
+    plain, numbers = Specialisation(parts, "plain", None).copy(advance), model.ship_numbers()
+    ship, coefficients = (parts[one].function(numbers, 0) for one in ("load_ship", "load_coefficients"))
+    rudder, shaft = np.radians(20.0), model.service_shaft_speed
+    found = sailed(tmp_path, model, [rudder] * 30, (0.1, 0.2, 0.0, 0.0), 1.0)
+    motion, given = Motion(*found[0].tolist()), ShipInput(rudder, shaft, 0.1, 0.2, 0.0, 0.0)
+    for row in found[1:]:
+        motion = plain(motion, given, 1.0, coefficients, ship, CALM)
+        np.testing.assert_allclose(row, motion, rtol=1e-12, atol=1e-15)
+
+
+def test_functions_of_the_engine_are_the_same_in_c_bit_by_bit(tmp_path):
+    c = Translator({}, "it")
+    names = [
+        c.function(one, float)[0] for one in (mathematics.exponential, mathematics.two_to, mathematics.wrap)
+    ]
+    names.append(c.function(mathematics.arctan, float)[0])
+    prelude = ship_source(MARINER, "ship").source.partition("typedef")[0].replace('"ship.h"', '"it.h"')
+    public = [
+        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}" for k, one in enumerate(names)
+    ]
+    library = built(tmp_path, "it", "", "\n".join([prelude, *c.structures, *c.functions, *public]))
+    plain = (mathematics.exponential, mathematics.two_to, mathematics.wrap, mathematics.arctan)
+    for k, function in enumerate(plain):
+        in_c = getattr(library, f"f{k}")
+        in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
+        for x in np.linspace(-9.0, 0.0 if k == 1 else 9.0, 37).tolist():
+            assert in_c(x) == function(x)
+
+
+CONTROLLERS = {
+    "pid": PID.from_model(MARINER),
+    "filtered": FilteredPID.from_model(MARINER, wave_period=9.0, largest_turn_rate_deg_s=0.5),
+    "lq": LQ.from_model(MARINER),
+    "scheduled": ScheduledLQ.from_model(MARINER),
+    "lqg": LQG.from_model(MARINER, wave_period=9.0),
+    "ilos": IntegralLineOfSight.from_model(MARINER),
+    "alos": AdaptiveLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
+    "ppo": load_agent("mariner-calm-ppo"),
+    "path_ppo": load_agent("container-roll-path-ppo"),
+    "orders": random_policy(action="rudder-discrete", frame_stack=3, action_repeat=2),
+}
+SIZES = {
+    "heading": 0.1, "set_point": 0.3, "yaw_rate": 0.01, "sway": 1.0, "surge": 8.0, "rudder": 0.3,
+    "cross_track": 200.0, "turn_distance": 300.0,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
+    agent, steps = CONTROLLERS[name], 10_000 if name == "lq" else 1000
+    source, bridge = autopilot_source(agent, name), Autopilot(agent)
+    library = built(tmp_path, name, source.header, source.source)
+    state, step = ctypes.create_string_buffer(10_000), getattr(library, f"{name}_step")
+    step.restype, step.argtypes = ctypes.c_double, [ctypes.c_void_p, ctypes.c_void_p]
+    getattr(library, f"{name}_init")(state)
+    random = np.random.default_rng(0)
+    numbers = random.normal(0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs)))
+    numbers[:, 0] = 0.4 * (np.arange(steps) % 600 > 300)  # the set-point stands first
+    within = 1e-12 if name not in ("ppo", "path_ppo", "orders") else 1e-6
+    for row in numbers:
+        expected = bridge.step(dict(zip(source.inputs, row.tolist(), strict=True)))
+        assert abs(step(state, row.ctypes.data) - expected) <= within
+
+
+SHIELDED = Shielded.from_model(MARINER, random_policy())
+
+
+@pytest.mark.parametrize(
+    "agent", [CONTROLLERS["lq"], CONTROLLERS["ppo"], SHIELDED], ids=["lq", "ppo", "shield"]
+)
+def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(agent):
+    env = gym.make("shipgym/CourseKeeping-v0", model="mariner")
+    seen, _ = env.reset(seed=3)
+    scales, bridge, state = env.unwrapped.observation_scales, Autopilot(agent), None
+    for step in range(60):
+        physical = dict(zip(env.unwrapped.observation_names, seen * scales, strict=True))
+        error = np.arctan2(seen[0], seen[1])
+        order = bridge.step({**physical, "set_point": error, "heading": 0.0})
+        action, state = agent.predict(seen, state, step == 0)
+        assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)  # observations are single
+        seen, *_ = env.step(action)
+
+
+def test_what_is_no_closed_law_is_refused():
+    with pytest.raises(
+        InputError, match=r"'lq-adaptive' found, which is no closed law that could be C. Export 'pid', 'lq'"
+    ):
+        autopilot_source(AdaptiveLQ.from_model(MARINER))
+    with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):
+        autopilot_source(random_policy(action="rudder-shaft"))
+
+
+@pytest.mark.parametrize("name", ["9lives", "double", "", "x" * 32])
+def test_a_name_that_c_does_not_take_is_refused(name):
+    with pytest.raises(InputError, match=r"expected at most 31 letters.*--name"):
+        autopilot_source(CONTROLLERS["pid"], name or "é")
+
+
+def unwritable(x):
+    """What C has no word for."""
+    return sum([x, x])
+
+
+def test_python_that_is_not_arithmetic_is_refused_with_its_line():
+    with pytest.raises(InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"):
+        Translator({}, "it").function(unwritable, float)
+
+
+def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
+    CONTROLLERS["pid"].save(tmp_path / "pid.json")
+    run = CliRunner().invoke
+    found = run(app, ["export", str(tmp_path / "pid.json"), "--c", str(tmp_path / "out")])
+    assert found.exit_code == 0, found.output
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["pid.c", "pid.h"]
+    found = run(app, ["export", "mariner", "--c", str(tmp_path)])
+    assert (found.exit_code, (tmp_path / "mariner.c").exists()) == (2, False)  # a folder with other files
+    assert run(app, ["export", "mariner"]).exit_code == 2
+    assert run(app, ["export", "marinr", "--c", str(tmp_path / "no")]).exit_code == 2

@@ -1,0 +1,67 @@
+"""FMUs are valid for FMPy and simulate as the library does."""
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy import validation
+
+from agents import LQ
+from agents.deployment.autopilot import Autopilot
+from agents.deployment.c99 import autopilot_source, ship_source
+from agents.deployment.fmu import write_fmu
+from shipgym.errors import InputError
+from shipgym.sea.conditions import Current, Weather, Wind
+from tests.agents.policies import MARINER
+
+DT, STEPS = 0.5, 200
+RUDDER = np.radians(20.0)
+
+
+def run(path, names, values, **more):
+    """Outputs of an FMU with inputs that stay."""
+    given = np.array([(0.0, *values)], dtype=[("time", float), *((name, float) for name in names)])
+    return fmpy.simulate_fmu(
+        str(path), input=given, stop_time=STEPS * DT, step_size=DT, output_interval=DT,
+        validate=True, **more,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_a_ship_turns_as_in_the_library(version, tmp_path):
+    path = tmp_path / "ship.fmu"
+    write_fmu(ship_source(MARINER, "ship"), path, version)
+    assert validation.validate_fmu(str(path)) == []
+    inputs = {
+        "rudder": RUDDER, "current_north": 0.0, "current_east": 0.5, "wind_speed": 8.0, "wind_from": 0.5
+    }  # fmt: skip
+    found = run(path, inputs, inputs.values(), start_values={"u": 7.0})
+    weather = Weather(Current(0.5, 90.0), Wind(8.0, np.degrees(0.5), gust=False))
+    start = MARINER.service_state.copy()
+    start[MARINER.state_names.index("u")] = 7.0
+    commands = np.full((STEPS, 1), RUDDER)
+    trial = MARINER.simulate(commands, DT, state=start, weather=weather)
+    for name in MARINER.state_names:
+        np.testing.assert_allclose(found[name], trial[name], rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_an_autopilot_decides_once_in_each_of_its_intervals(version, tmp_path):
+    agent, path = LQ.from_model(MARINER, dt=2 * DT), tmp_path / "lq.fmu"
+    write_fmu(autopilot_source(agent, "lq"), path, version)
+    given = {"set_point": 0.1, "heading": 0.02, "yaw_rate": 0.001, "sway": 0.1, "rudder": 0.05}
+    found, bridge = run(path, given, given.values()), Autopilot(agent)
+    orders = np.repeat([bridge.step(given) for _ in range(STEPS // 2)], 2)
+    np.testing.assert_allclose(found["order"][1:], orders, rtol=0.0, atol=1e-12)
+
+
+def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
+    source = autopilot_source(LQ.from_model(MARINER), "lq")
+    (tmp_path / "lq.fmu").mkdir()
+    with pytest.raises(InputError, match=r"lq\.fmu: is not a file; choose another name"):
+        write_fmu(source, tmp_path / "lq.fmu")
+    with pytest.raises(InputError, match=r"fmi: '1\.0' found, expected one of '2\.0', '3\.0'"):
+        write_fmu(source, tmp_path / "other.fmu", "1.0")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(InputError, match="no C compiler for Linux found"):
+        write_fmu(source, tmp_path / "other.fmu")
+    assert not (tmp_path / "other.fmu").exists()

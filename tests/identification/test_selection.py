@@ -1,0 +1,95 @@
+"""Where no structure is named, that is taken which predicts the trials to fit best, each held out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from identification import IdentificationResult, identify
+from identification.validation import selection
+from identification.validation.ranking import Standing
+from identification.validation.selection import _simplest
+from shipgym import InputError, ShipModel, Trial
+from shipgym.manoeuvres import zigzag
+
+Auto = Callable[..., IdentificationResult]
+
+
+def standing(structure: str, coefficients: int, *errors: float, method: str = "tls-svm") -> Standing:
+    by_trial = {str(k): error for k, error in enumerate(errors)}
+    mean = sum(errors) / len(errors)
+    return Standing(structure, method, coefficients, True, 0, mean, None, None, by_trial)
+
+
+@pytest.fixture(scope="module")
+def trials(mariner: ShipModel, record: Callable[..., Trial]) -> list[Trial]:
+    runs = [(10, False), (20, False), (20, True)]
+    return [
+        record(zigzag(mariner, angle, angle, port, 300, 0.25), 4, 1.0, 5 + k, name=f"zigzag {k}")
+        for k, (angle, port) in enumerate(runs)
+    ]
+
+
+@pytest.fixture
+def auto(mariner: ShipModel, monkeypatch: pytest.MonkeyPatch) -> Auto:
+    """`identify` by few structures, to be quick."""
+    monkeypatch.setattr(selection, "STRUCTURES", ("nomoto", "abkowitz", "cubic"))
+    monkeypatch.setattr(selection, "OTHERS", ())
+
+    def run(trials: list[Trial], **options: object) -> IdentificationResult:
+        particulars, steering = mariner.particulars, mariner.steering
+        return identify(trials, "auto", particulars=particulars, steering=steering, **options)
+
+    return run
+
+
+def test_the_structure_that_predicts_best_is_taken_and_the_ranking_told(
+    auto: Auto, trials: list[Trial], mariner: ShipModel
+) -> None:
+    turned = trials[2].with_(use="validate")
+    result = auto([*trials[:2], turned])
+    told = result.metrics["selection"]
+    assert result.model.structure == "abkowitz"
+    assert [row["structure"] for row in told["ranking"]] == ["abkowitz", "nomoto"]
+    assert told["ranking"][0]["errors"].keys() == {"zigzag 0", "zigzag 1"}
+    assert "channel 'n' is missing" in told["refused"]["cubic by tls-svm"]
+    assert result.model.provenance is not None
+    assert result.model.provenance["selection"] == told
+    assert result.settings["structure"] == "auto"
+    # a trial that is not to fit has no part in it
+    assert auto(trials[:2]).metrics["selection"] == told
+    alone = identify(
+        [*trials[:2], turned], "abkowitz", particulars=mariner.particulars, steering=mariner.steering
+    )
+    assert alone.coefficients == result.coefficients
+
+
+def test_a_single_trial_is_cut_into_thirds(auto: Auto, trials: list[Trial]) -> None:
+    result = auto(trials[1:2])
+    told = result.metrics["selection"]
+    assert told["held_out"] == "each third of the only trial"
+    assert list(told["ranking"][0]["errors"]) == [f"zigzag 1, part {k}" for k in (1, 2, 3)]
+    assert result.trials == (trials[1],)
+
+
+def test_a_method_or_setting_that_is_named_is_kept(auto: Auto, trials: list[Trial]) -> None:
+    told = auto(trials[:2], method="ls-svm", C=1e6).metrics["selection"]
+    assert {row["method"] for row in told["ranking"]} == {"ls-svm"}
+    with pytest.raises(InputError, match="settings: epsilon found, which method 'tls-svm' does not know"):
+        auto(trials[:2], epsilon=0.1)
+
+
+def test_nothing_to_fit_is_refused(auto: Auto, trials: list[Trial]) -> None:
+    with pytest.raises(InputError, match='none is marked use = "fit"'):
+        auto([trials[0].with_(use="validate")])
+
+
+def test_the_fewest_coefficients_among_errors_that_differ_by_chance() -> None:
+    best, small = standing("abkowitz", 40, 0.10, 0.12, 0.11), standing("grey-box", 15, 0.10, 0.10, 0.14)
+    assert _simplest([best, small]) is small  # 0.003 +- 0.013
+    assert _simplest([best, standing("nomoto", 2, 0.13, 0.14, 0.15)]) is best  # 0.027 +- 0.003
+    assert _simplest([best, standing("cubic", 27, 0.102, 0.122, 0.112)]).structure == "cubic"  # 1.8 %
+    usual = standing("abkowitz", 40, 0.10, 0.12, 0.112)
+    other = standing("abkowitz", 40, 0.10, 0.12, 0.11, method="ls")
+    assert _simplest([other, usual]) is usual
