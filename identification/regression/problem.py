@@ -90,9 +90,7 @@ def pose(
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
 
 
-def _at_constant_speed(
-    trial: Trial, table: Structure, particulars: Particulars | Mapping[str, Any] | None
-) -> Trial:
+def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Trial:
     """A trial of heading and rudder at the service speed, for a structure of the yaw rate alone."""
     speed = (particulars or {}).get("speed")
     if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
