@@ -21,6 +21,7 @@ from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.wheel_over import own_turn
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
@@ -31,7 +32,7 @@ Floats = NDArray[np.float64]
 
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
-LAWS = ("los", "ilos", "alos")  # guidance
+LAWS = ("los", "ilos", "alos", "wheel-over", "preview-mpc")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 
@@ -168,7 +169,13 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
-        if kind != "los":
+        if kind in ("wheel-over", "preview-mpc"):
+            radius, reach = own_turn(task.ship)
+            own.append(Setting("reach_lengths", reach))
+            if not hasattr(task.task.settings, "turn_radius"):  # the path has no arcs of its own
+                own += [Setting("radius_lengths", radius), Setting("turn_lookahead_lengths", lookahead)]
+            own += [Setting("deviation_deg", 3.0)] * (kind == "preview-mpc")
+        elif kind != "los":
             own.append(Setting("integral_lengths", CRITICAL * lookahead))
         return [own]
     plain = design(kind, task).design
