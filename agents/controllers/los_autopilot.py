@@ -106,10 +106,10 @@ class Guided(Controller):
         reach = self.observation_scales[N_HEADING - 1]
         gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
         integral = np.clip(memory[..., -1] + gathered, -reach, reach)
-        seen = given[..., :N_HEADING]
-        seen[..., 0], seen[..., 1], seen[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
+        helm = given[..., :N_HEADING]
+        helm[..., 0], helm[..., 1], helm[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
         starts = None if inner is None else np.atleast_1d(begins)
-        action, inner = self.autopilot.predict(seen.astype(np.float32), inner, starts, deterministic)
+        action, inner = self.autopilot.predict(helm.astype(np.float32), inner, starts, deterministic)
         return action, (np.concatenate([kept, integral[..., None]], axis=-1), inner)
 
     def loop(self) -> Compensator:

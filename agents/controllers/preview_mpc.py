@@ -204,7 +204,7 @@ class _Simulated:
         begin = {"x": 0.0 * psi, "y": seen["cross_track"], "psi": psi, "u": seen["surge"], "v": seen["sway"]}
         for name, values in {**begin, "r": seen["yaw_rate"], "delta": seen["rudder"]}.items():
             self.engine.write(name, values)
-        self.north, self.east = _turned(*stream, -psi)
+        self.north, self.east = _turned(stream[0], stream[1], -psi)
         self.read()
 
     def read(self) -> None:
