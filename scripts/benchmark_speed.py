@@ -31,7 +31,7 @@ from identification import ArtificialBeeColony, RecursiveLeastSquares, Truncated
 from shipgym.checks import check_choice
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
-from shipgym.envs.registration import TASKS
+from shipgym.envs.registration import TASKS, env_id
 from shipgym.manoeuvres import zigzag
 from shipgym.sea import Current, Waves, Weather, Wind
 from shipgym.trials.sensors import Sensors
@@ -169,9 +169,8 @@ def native_speed(
 
 def native_against_python(task: str, n_envs: int = 64) -> Row:
     """The native vector environment against SyncVectorEnv of the same files run as plain Python."""
-    env_id = f"shipgym/{task}-v0"
-    native = native_speed(env_id, n_envs, model=MODEL)
-    (plain,) = run_python(SYNC_STEPS_IN_PYTHON, env_id, MODEL, str(n_envs), NUMBA_DISABLE_JIT="1")
+    native = native_speed(env_id(task), n_envs, model=MODEL)
+    (plain,) = run_python(SYNC_STEPS_IN_PYTHON, env_id(task), MODEL, str(n_envs), NUMBA_DISABLE_JIT="1")
     return Row(
         f"{n_envs} {task}, gymnasium.make_vec",
         f"{native / 1e6:.1f} M steps/s",
@@ -198,7 +197,7 @@ def learning(task: str) -> Row:
     """Frames per second of PPO with the shipped settings, on two cores, and what part of it is ours."""
     from learning_speed import ppo_speed  # here, because torch takes seconds to import
 
-    frames, share = ppo_speed(f"shipgym/{task}-v0")
+    frames, share = ppo_speed(env_id(task))
     return Row(
         f"PPO, 256 {task}, two cores",
         f"{frames / 1e3:.1f} k frames/s",
@@ -210,7 +209,7 @@ def learning(task: str) -> Row:
 
 def vector_speed(n_envs: int, task: str = "CourseKeeping", **options: Any) -> float:
     """Environment steps per second of a native vector environment of ours."""
-    return native_speed(f"shipgym/{task}-v0", n_envs, model=MODEL, **options)
+    return native_speed(env_id(task), n_envs, model=MODEL, **options)
 
 
 def vector_environment(task: str, n_envs: int, aim: str) -> Row:

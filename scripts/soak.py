@@ -22,14 +22,17 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import shipgym
-from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.envs.registration import TASKS, VARIANTS, env_id
 
 ROWS = 256
 CHECK_EVERY = 50  # steps between checks of infos and states
 WARM = 20  # steps after which memory must not grow
 MOST_GROWTH = 50.0  # MiB
 KINDS = ("random", "extreme", "adversarial")
-WILD = {"CourseKeeping": {"max_heading_error_deg": 180.0}, "PathFollowing": {"ground": 40.0}}
+WILD = {
+    "CourseKeeping": {"max_heading_error_deg": 180.0}, "PathFollowing": {"ground": 40.0},
+    "PathFollowing-v1": {"ground": 40.0},
+}  # fmt: skip
 SEAS: dict[str, Any] = {"sea": ["calm", "moderate", "rough"], "noise": 2.0, "measurement": "filtered"}
 
 
@@ -45,7 +48,7 @@ class Run:
     @property
     def name(self) -> str:
         """Its id, model and actions."""
-        return f"shipgym/{self.task}{self.variant}-v0, {self.model}, {self.kind}"
+        return f"{env_id(self.task, self.variant)}, {self.model}, {self.kind}"
 
     def make(self) -> Any:
         """Its vector environment; wild ones are in seas and sail on where others stop."""
@@ -53,7 +56,7 @@ class Run:
         steps = {"episode_steps": 150} if self.kind == "random" else {}
         options: dict[str, Any] = {"max_envelope_distance": 1e3, **WILD[self.task], **SEAS} if wild else {}
         return gymnasium.make_vec(
-            f"shipgym/{self.task}{self.variant}-v0",
+            env_id(self.task, self.variant),
             ROWS,
             model=self.model,
             autoreset_mode="SameStep" if wild else "NextStep",

@@ -68,12 +68,12 @@ def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json =
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:
     """Environments and models that are asked for."""
-    from shipgym.envs.registration import TASKS, VARIANTS
+    from shipgym.envs.registration import TASKS, VARIANTS, env_id
     from shipgym.ships import list_models
 
     if everything:
-        return [f"shipgym/{task}{variant}-v0" for task in TASKS for variant in VARIANTS] + list_models()
-    return wanted or [*(f"shipgym/{task}-v0" for task in TASKS), "mariner"]
+        return [env_id(task, variant) for task in TASKS for variant in VARIANTS] + list_models()
+    return wanted or [*map(env_id, TASKS), "mariner"]
 
 
 def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:

@@ -301,8 +301,9 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
 
 def check_observed(agent: Any, names: Sequence[str], scales: Sequence[float], where: str, meant: str) -> None:
     """Refuse observations that an agent was not made for; `meant` has {} for its own scale."""
-    n = len(agent.observation_names)
-    check_names(names[:n], agent.observation_names, where)
+    n, learned = len(agent.observation_names), getattr(agent, "env_id", None)
+    named = where if learned is None else f"{where}: not those that the agent learned with in {learned}"
+    check_names(names[:n], agent.observation_names, named)
     for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
         if abs(one - other) > SCALE_TOLERANCE * abs(other):
             raise InputError(

@@ -23,19 +23,13 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.controller import FORMAT, Action, Controller, check_observed
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
-from agents.policies.policy_extraction import sb3_fields
+from agents.policies.policy_extraction import sb3_fields, task_showing
 from agents.policies.weights_file import Tensors, as_json, write_policy
 from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-from shipgym.tasks.task import (
-    ACTIONS,
-    RUDDER_ORDERS,
-    Observed,
-    Task,
-    course_keeping_task,
-    path_following_task,
-)
+from shipgym.tasks.definition import read_definition
+from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Observed, Task
 
 Numbers = NDArray[np.float32]
 
@@ -236,13 +230,12 @@ class LearnedPolicy:
 
     def _observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What its environment shows of a ship."""
-        make = path_following_task if "cross_track" in self.observation_names else course_keeping_task
+        definition = read_definition(task_showing(self.observation_names))
         known = {"action": self.action, "roll": "roll" in self.observation_names, **self.env_options}
-        names = Task.option_names(make().definition)
-        asked = make(**{name: known[name] for name in SHOWING if name in known and name in names})
-        asked.check_fits(model)
-        shown: tuple[Observed, ...] = asked.observed(model)
-        return shown
+        names = [name for name in SHOWING if name in known and name in Task.option_names(definition)]
+        task = Task.of(definition, **{name: known[name] for name in names})
+        task.check_fits(model)
+        return task.observed(model)
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from agents.controllers.controller import Controller, model_hash
 from agents.policies.network import Layer, Network
 from agents.policies.weights_file import as_json
+from shipgym.envs.registration import env_id
 from shipgym.errors import InputError
 
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
@@ -95,16 +96,21 @@ def _environment(ships: Any) -> dict[str, Any]:
         )
     model, spec = ships.model, ships.spec
     kwargs = dict(spec.kwargs) if spec is not None else {}
-    kind = "PathFollowing" if "cross_track" in ships.observation_names else "CourseKeeping"
     return {
         "observation_names": tuple(ships.observation_names),
         "observation_scales": tuple(float(scale) for scale in ships.observation_scales),
         "action": ships.task.action,
-        "env_id": f"shipgym/{kind}-v0" if spec is None else spec.id,
+        "env_id": env_id(task_showing(ships.observation_names)) if spec is None else spec.id,
         "env_options": {name: as_json(value) for name, value in kwargs.items() if name not in RUNNING},
         "model_name": model.name,
         "model_sha256": model_hash(model),
     }
+
+
+def task_showing(names: Sequence[str]) -> str:
+    """The task of the package that shows these quantities."""
+    path = "PathFollowing-v1" if "next_turn_angle" in names else "PathFollowing"
+    return path if "cross_track" in names else "CourseKeeping"
 
 
 def _network(agent: Any) -> Network:

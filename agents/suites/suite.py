@@ -40,6 +40,7 @@ from shipgym.tasks.task import Task
 ENVIRONMENTS: Mapping[str, tuple[str, str]] = {
     "course-keeping": ("shipgym/CourseKeeping-v0", "CourseKeeping"),
     "path-following": ("shipgym/PathFollowing-v0", "PathFollowing"),
+    "path-following-v1": ("shipgym/PathFollowing-v1", "PathFollowing-v1"),
 }
 #: Seeds of the episodes that are scored; training and tuning use smaller ones.
 FIRST_SEED = 1_000_000
@@ -54,7 +55,7 @@ class BenchmarkTask:
     """One task of a suite."""
 
     name: str  # unique in its suite
-    environment: str  # course-keeping or path-following
+    environment: str  # one of `ENVIRONMENTS`
     model: str  # shipped model that is steered
     why: str = ""  # what the task is there for
     options: Mapping[str, Any] = field(default_factory=dict)  # keywords of the environment, `sea` among them

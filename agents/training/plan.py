@@ -19,7 +19,7 @@ from agents.training.settings import (
     read_settings_file,
 )
 from shipgym.checks import check_choice, check_keys, check_whole
-from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.envs.registration import TASKS, VARIANTS, env_id
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather, weather_column
@@ -188,7 +188,7 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
     Raises InputError for an unknown one, with the nearest known one.
     """
     ids = {
-        f"shipgym/{task}{variant}-v0": (short, dict(options))
+        env_id(task, variant): (short, dict(options))
         for short, task in zip(ENVIRONMENTS, TASKS, strict=True)
         for variant, options in VARIANTS.items()
     }

@@ -17,16 +17,22 @@ VARIANTS: dict[str, dict[str, Any]] = {
     "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
 }
-TASKS = ("CourseKeeping", "PathFollowing")
+#: Tasks by their names, a version in them where it is not the first.
+TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
+
+
+def env_id(task: str, variant: str = "") -> str:
+    """Id of a task's environment, or of a variant of it."""
+    name, _, version = task.partition("-")
+    return f"shipgym/{name}{variant}-{version or 'v0'}"
 
 
 def register_environments() -> None:
     """Register the environments with Gymnasium; a second call changes nothing."""
     for task in TASKS:
         for variant, options in VARIANTS.items():
-            name = f"shipgym/{task}{variant}-v0"
-            if name not in gymnasium.registry:
-                _register(name, {"task": task, **options})
+            if env_id(task, variant) not in gymnasium.registry:
+                _register(env_id(task, variant), {"task": task, **options})
 
 
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:

@@ -13,25 +13,11 @@ from typing import Annotated, NamedTuple
 from shipgym.engine.mathematics import wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import (
-    NO_NUMBERS,
-    Interval,
-    Numbers,
-    Random,
-    Readings,
-    Setting,
-    at_service_speed,
-    drawn,
-)
+    NO_NUMBERS, Interval, Numbers, Random, Readings, Setting, at_service_speed, drawn,
+)  # fmt: skip
 from shipgym.tasks.steering import (
-    Extras,
-    Helm,
-    SteeringReward,
-    Weights,
-    extras,
-    helm,
-    integrated,
-    steering_reward,
-)
+    Extras, Helm, SteeringReward, Weights, extras, helm, integrated, steering_reward,
+)  # fmt: skip
 
 NAME = "CourseKeeping"
 REPORTED = ("heading_error",)

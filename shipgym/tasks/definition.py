@@ -38,7 +38,11 @@ NEEDED = ("begin", "step", "observe")
 #: Names in `info` that are the engine's.
 TAKEN = ("reward", "terminated", "truncated", "envelope_distance", "extrapolating", "end")
 #: Registered tasks: name to module name.
-TASKS = {"CourseKeeping": "shipgym.tasks.course_keeping", "PathFollowing": "shipgym.tasks.path_following"}
+TASKS = {
+    "CourseKeeping": "shipgym.tasks.course_keeping",
+    "PathFollowing": "shipgym.tasks.path_following_v0",
+    "PathFollowing-v1": "shipgym.tasks.path_following",
+}
 
 
 def never_due(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> bool:

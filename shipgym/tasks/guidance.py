@@ -18,6 +18,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
+NO_TURN = 1e-6  # rad, below which a waypoint only divides a leg
+SHARPEST_TURN = np.radians(150.0)  # beyond it a path doubles back
 FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the earth
 
 
@@ -91,6 +93,41 @@ class Path:
     def length(self) -> float:
         """Length of the path, m."""
         return float(self.lengths.sum())
+
+    def check_turns(self, radius: float) -> None:
+        """Refuse a path that doubles back, or whose turns of a radius, m, take more than there is of a leg.
+
+        Raises InputError naming the waypoints.
+        """
+        turns = np.abs(self.turns)
+        for row in np.flatnonzero(turns > SHARPEST_TURN)[:1] + 1:
+            raise InputError(
+                f"waypoints: the path doubles back at row {row}, by {np.degrees(turns[row - 1]):.0f} deg, "
+                f"expected turns of {np.degrees(SHARPEST_TURN):.0f} deg at most"
+            )
+        corners = np.concatenate([[0], np.flatnonzero(turns > NO_TURN) + 1, [self.n_legs]])
+        tangents = radius * np.tan(0.5 * np.append(0.0, turns)[corners])
+        found = np.diff(np.append(0.0, np.cumsum(self.lengths))[corners])
+        needed = tangents[:-1] + tangents[1:]
+        for k in np.flatnonzero(found < needed * (1.0 - 1e-9))[:1]:
+            raise InputError(
+                f"waypoints: rows {corners[k]} and {corners[k + 1]} are {found[k]:.6g} m apart, expected at "
+                f"least {needed[k]:.6g} m, which turns with a radius of {radius:.6g} m take; set them "
+                "further apart, or set a smaller turn_radius"
+            )
+
+    def rounded(self, radius: float) -> Floats:
+        """The path with its turns as arcs of a radius, m: points 3 degrees apart on them, shape (n, 2)."""
+        points = [self.waypoints[:1]]
+        for number, turn in enumerate(self.turns[:-1]):
+            cut = radius * np.tan(0.5 * abs(turn))
+            course, corner = self.courses[number], self.waypoints[number + 1]
+            begin = corner - cut * np.array([np.cos(course), np.sin(course)])
+            angles = np.linspace(0.0, abs(turn), int(abs(turn) / np.radians(3.0)) + 2)
+            ahead, side = radius * np.sin(angles), np.sign(turn) * radius * (1.0 - np.cos(angles))
+            turned = np.array([[np.cos(course), np.sin(course)], [-np.sin(course), np.cos(course)]])
+            points.append(begin + np.stack([ahead, side], axis=-1) @ turned)
+        return np.concatenate([*points, self.waypoints[-1:]])
 
     def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
         """Where ships stand on given legs.

@@ -6,7 +6,7 @@ steering on a straight course; van Amerongen 1982, Adaptive steering of ships).
 
 from __future__ import annotations
 
-from math import fabs, radians
+from math import copysign, fabs, radians
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import clip, pick, sin_cos
@@ -54,6 +54,14 @@ class SteeringReward(NamedTuple):
     rudder_rate: float
     roll: float
     envelope: float
+
+
+class RudderWork(NamedTuple):
+    """How the rudder has been turned to and fro."""
+
+    direction: float  # in which it turned last: 1 to starboard, -1 to port, 0 not at all yet
+    furthest: float  # rad, in that direction
+    reversals: float  # how often it has turned back
 
 
 def integral_scale(ship: Ship, weights: Weights) -> float:
@@ -110,6 +118,17 @@ def integrated(integral: float, error: float, interval: Interval, ship: Ship, we
     reach = integral_scale(ship, weights)
     gathered = pick(fabs(error) > radians(weights.integral_zone_deg), 0.0, error * interval.dt)
     return clip(integral + gathered, -reach, reach)
+
+
+def worked(work: RudderWork, rudder: float, way_back: float) -> tuple[RudderWork, float]:
+    """Rudder work with the rudder where it is now, rad, and whether it has just come so far back, 1 or 0."""
+    behind = work.direction * (work.furthest - rudder)
+    begun = (work.direction == 0.0) & (fabs(rudder) > way_back)
+    turned = behind > way_back
+    direction = pick(begun, copysign(1.0, rudder), pick(turned, -work.direction, work.direction))
+    furthest = pick(begun | turned | (behind < 0.0), rudder, work.furthest)
+    reversals = pick(turned, 1.0, 0.0)
+    return RudderWork(direction, furthest, work.reversals + reversals), reversals
 
 
 def steering_reward(motion: Motion, interval: Interval, ship: Ship, weights: Weights) -> SteeringReward:

@@ -10,7 +10,7 @@ from agents.policies.policy import ORDERS, Memory, order_numbers
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.mariner import mariner
-from shipgym.tasks.task import course_keeping_task, path_following_task
+from shipgym.tasks.task import Task, course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 
 RNG = np.random.default_rng(1)
@@ -158,6 +158,9 @@ def test_another_environment_is_refused_with_the_difference():
         InputError, match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last"
     ):
         path_policy().predict(SEEN)
+    second = Task.of("PathFollowing-v1", corridor=0.5).observed(MARINER)
+    with pytest.raises(InputError, match=r"with in shipgym/PathFollowing-v0: observation 11 is 'next_"):
+        path_policy().check_fits([one.name for one in second], [one.scale for one in second])
     wider = path_following_task().observed(MARINER)
     with pytest.raises(InputError, match=r"scale of 'cross_track' is 160.9.*learned with 80.4"):
         path_policy().check_fits([one.name for one in wider], [one.scale for one in wider])

@@ -12,7 +12,7 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 import shipgym
 from shipgym import InputError
 from shipgym.envs.checker import check_vector_env
-from shipgym.envs.registration import TASKS, VARIANTS
+from shipgym.envs.registration import TASKS, VARIANTS, env_id
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHORT = {"episode_steps": 23}
@@ -29,7 +29,7 @@ def vector(name, num_envs=3, **options):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", [COURSE, PATH])
+@pytest.mark.parametrize("name", [COURSE, PATH, "shipgym/PathFollowing-v1"])
 def test_conformance_and_rows_that_are_single_environments(name, mode):
     check_vector_env(
         lambda: vector(name, 3, autoreset_mode=mode, **SHORT),
@@ -61,7 +61,7 @@ def test_rows_are_single_environments_with_every_option(name, options):
 def test_every_id_makes_both():
     for task in TASKS:
         for variant in VARIANTS:
-            name = f"shipgym/{task}{variant}-v0"
+            name = env_id(task, variant)
             many, one = gymnasium.make_vec(name, num_envs=2), gymnasium.make(name)
             assert many.single_observation_space == one.observation_space
             assert many.single_action_space == one.action_space
