@@ -65,7 +65,7 @@ class PreviewMPC(WheelOver):
         *,
         autopilot: Policy | None = None,
         task: Task | None = None,
-        horizon_lengths: float = 8.0,
+        horizon_lengths: float = 6.0,
         deviation_deg: float = 3.0,
         **settings: Any,
     ) -> Self:

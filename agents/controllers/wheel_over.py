@@ -21,17 +21,20 @@ import numpy as np
 
 from agents.controllers.controller import NUMBERS, Policy, Range
 from agents.controllers.los_autopilot import Guided
+from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.turning import turning_circle, turning_indices
 from shipgym.ships import ShipModel
+from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.task import Task, path_following_task
 
 TURN_LENGTHS, TURN_STEP = 60.0, 0.02  # of the simulated turn, ship lengths at service speed
 TURN_RUDDER = 0.3  # share of the rudder limit that a turn is planned with: 10.5 degrees of 35
 STEEPEST = np.radians(70.0)  # angle to a leg up to which a ship comes forward on it
+LATE = 0.25  # ship lengths
 COURSE_ERROR = ("course_error_sin", "course_error_cos")
 
 
@@ -84,7 +87,7 @@ class WheelOver(Guided):
         radius_lengths, reach_lengths : float, optional
             Radius of the turn and what she runs on before it, ship lengths; by default those of the model
             with three tenths of the rudder's limit (`own_turn`). On a path with arcs the reach is how far
-            ahead its course is taken.
+            ahead its course is taken, by default `own_lead`.
         crab_share : float
             Share of the angle of drift by the current that is countered.
 
@@ -95,7 +98,10 @@ class WheelOver(Guided):
             does not turn.
         """
         asked, length = task or path_following_task(), model.particulars["length"]
-        radius, reach = own_turn(model) if None in (radius_lengths, reach_lengths) else (0.0, 0.0)
+        arcs = float(getattr(asked.settings, "turn_radius", 0.0))
+        radius, reach = (arcs, own_lead(model, autopilot)) if arcs else (0.0, 0.0)
+        if not arcs and None in (radius_lengths, reach_lengths):
+            radius, reach = own_turn(model)
         given = {
             "lookahead": (lookahead_lengths, asked.lookahead),
             "turn_lookahead": (turn_lookahead_lengths, asked.lookahead),
@@ -107,7 +113,7 @@ class WheelOver(Guided):
             for name, (value, own) in given.items()
         }
         gains["crab_share"] = check_number(crab_share, "crab_share", at_least=0.0, at_most=2.0)
-        gains["path_radius"] = length * float(getattr(asked.settings, "turn_radius", 0.0))
+        gains["path_radius"] = length * arcs
         return cls.leading(model, autopilot, asked, gains, {})
 
     @property
@@ -188,3 +194,18 @@ def own_turn(model: ShipModel, share: float = TURN_RUDDER) -> tuple[float, float
         )
     radius = 0.5 * float(np.mean(np.abs(np.array(across, dtype=np.float64))))
     return radius, max(float(np.mean(np.array(ahead, dtype=np.float64))) - radius, 0.01)
+
+
+def own_lead(model: ShipModel, autopilot: Policy | None) -> float:
+    """How far ahead of her LQ (or its default) has to see the course of an arc to keep to it, ship lengths.
+
+    In a steady turn the heading lags by what makes the rudder for it, and her way by the drift angle; both in
+    proportion to the rate of turn as long as she is linear. What she is slow to begin with comes to a quarter
+    of a length more, as measured on the reference ships.
+    """
+    gains = (autopilot if isinstance(autopilot, LQ) else LQ.from_model(model)).gains
+    steering, rudder = linearise(model, straight_running(model))
+    sway, angle = np.linalg.solve(np.column_stack([steering[:, 0], np.ravel(rudder)]), -steering[:, 1])
+    lag = angle * (1.0 - gains["rudder"]) - gains["yaw_rate"] - gains["sway"] * sway
+    length, speed = model.particulars["length"], model.particulars["speed"]
+    return float(np.clip((lag / gains["heading_error"] * speed - sway) / length + LATE, 0.1, 10.0))
