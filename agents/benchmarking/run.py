@@ -126,8 +126,10 @@ def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...
         names = [name.strip() for name in names.split(",")]
     if not names:
         raise InputError("tasks: none found, expected at least one")
-    sets = {one: [task for task in found.tasks if one in (task.base, task.name)] for one in names}
-    return tuple(dict.fromkeys(task for one, some in sets.items() for task in some or [found.task(one)]))
+    sets = [
+        [task for task in found.tasks if one in (task.base, task.name)] or [found.task(one)] for one in names
+    ]
+    return tuple({task.name: task for tasks in sets for task in tasks}.values())
 
 
 def job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
