@@ -21,7 +21,7 @@ environment = "path-following"
 model = "mariner-tls-svm"
 ship = "mariner"
 options = { episode_steps = 120, n_legs = 2 }
-far = { acceptance = 0.5 }
+far = { gear = { time_constant = 8.0 } }
 """
 TASKS = ("turns", "turns-on-model", "turns-far")
 N = 3
