@@ -108,9 +108,10 @@ class BenchmarkTask:
         if not (self.behind or self.far):
             return self.parts
         options = {name: value for name, value in {**self.options, **self.far}.items() if name != "gear"}
-        ship, *more = read_options(ENVIRONMENTS[self.environment][1], self.behind or self.model, options)
+        given = ENVIRONMENTS[self.environment][1], self.behind or self.model, options
+        ship, task, randomisation = read_options(*given)
         gear = SteeringGear.from_mapping({**asdict(ship.steering), **self.far.get("gear", {})}, "far.gear")
-        return (replace(ship, steering=gear), *more)
+        return replace(ship, steering=gear), task, randomisation
 
     @property
     def handed_out(self) -> BenchmarkTask:
