@@ -4,6 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the lowest declared versions of all dependencies, installed and tried
+# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments; for every night
 # make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
@@ -15,7 +16,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak fuzz release-check mutate evidence docs clean
+.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -48,6 +49,9 @@ release-check: $(VENV)/dev-installed
 fuzz: $(VENV)/dev-installed
 	OMP_NUM_THREADS=1 $(BIN)/python scripts/fuzz.py
 
+ecosystem: $(VENV)/ecosystem-installed
+	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py
+
 mutate: $(VENV)/dev-installed
 	SHIPGYM_CACHE=$(CURDIR)/$(VENV)/mutated OMP_NUM_THREADS=1 $(BIN)/python scripts/mutate.py $(MODULES)
 
@@ -79,6 +83,13 @@ $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/docs-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PIP) -e ".[docs]"
+	touch $@
+
+# other people's libraries, in a virtual environment of their own
+$(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
+	$(PYTHON) -m venv $(VENV)/ecosystem
+	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
+	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt --no-build-isolation --no-deps pufferlib
 	touch $@
 
 clean:

@@ -15,8 +15,8 @@ from shipgym.tasks.definition import TASKS, read_definition
 from shipgym.tasks.settings import keywords
 
 FOLDER = Path(__file__).parents[1] / "docs" / "environments"
-PAGES = (FOLDER / "course_keeping.md", FOLDER / "path_following.md")
-MARKS = re.compile(r"<!-- settings: (\w+) -->\n.*?<!-- end of settings -->", re.DOTALL)
+PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following", "path_following_v0"))
+MARKS = re.compile(r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL)
 SIGNS = {"above": "above", "at_least": "at least", "at_most": "at most"}
 
 

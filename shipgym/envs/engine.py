@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from shipgym.checks import check_keys, check_table, check_whole, shown
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES, flat
@@ -47,6 +48,8 @@ class Engine:
         Whether a model that was found unstable when it was identified may be used.
     threads : int
         Number of threads that share the lanes; the results do not depend on it.
+    model_index : int, optional
+        The one of the ships that are drawn from that all episodes have.
 
     Raises
     ------
@@ -63,7 +66,12 @@ class Engine:
         randomisation: Randomisation | None = None,
         allow_unstable: bool = False,
         threads: int = 1,
+        model_index: int | None = None,
     ) -> None:
+        self.remade: Callable[..., Engine] = partial(
+            Engine, models, num_envs, randomisation=randomisation, allow_unstable=allow_unstable,
+            threads=threads,
+        )  # fmt: skip
         _check_count(num_envs, "num_envs")
         _check_count(threads, "threads")
         fleet = [models] if isinstance(models, ShipModel) else list(models)
@@ -83,6 +91,9 @@ class Engine:
         if drawn and len(fleet) > 1:
             raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
         self.windy = any(not sea.calm for _, sea in self.pool)
+        if model_index is not None:
+            check_whole(model_index, "model_index", at_least=0, at_most=len(self.pool) - 1)
+            self.pool = [self.pool[model_index]] * len(self.pool)
         sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
         if task.sensors is not None:
             sensors = Sensors(task.sensors)
@@ -116,17 +127,9 @@ class Engine:
             self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names)
         )
         words = addresses(
-            [
-                self._states,
-                self._keys,
-                self._settings,
-                self._pool,
-                self._ships,
-                self._rows,
-                self._which,
-                self._actions,
-            ]
-        )
+            [self._states, self._keys, self._settings, self._pool, self._ships, self._rows, self._which,
+             self._actions]
+        )  # fmt: skip
         self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in self._threads.shares]
         self._worlds = [
             np.array([*words, *[0] * 9, *share, *addresses([result])], dtype=np.int64)
@@ -389,6 +392,46 @@ class Engine:
             f"{self.steps[lane]:g}, expected a finite number; look for a division by zero or a root of a "
             "negative number (shipgym.check_task helps)"
         )
+
+    def get_state(self) -> dict[str, Any]:
+        """All that `set_state` needs to go on from here, copies by name."""
+        shown, gear = self.shown, self._voyages.state
+        rows = [f"{name}.{path}" for name, place in gear.rows.items() for path in place.present]
+        made_for = {"task": self.task.name, "model": self.model.name, "num_envs": self.num_envs, "rows": rows}
+        outputs = {name: getattr(shown, name).copy() for name in ("observations", "outcomes", "flags")}
+        return {"made_for": made_for, **self.memory(), **outputs}
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `get_state` of an engine made alike gave.
+
+        Raises
+        ------
+        InputError
+            For a state of another task, version, ship or number of lanes, or one with a number that is not
+            finite; nothing is changed then.
+        """
+        own = self.get_state()
+        check_keys(check_table(state, "state"), tuple(own), "state", required=own)
+        for name, expected in own["made_for"].items():
+            if (found := state["made_for"].get(name)) != expected:
+                raise InputError(
+                    f"state: {name} {shown(found)} found, expected {shown(expected)}: a state fits an "
+                    "environment made by the same arguments in the same version"
+                )
+        for name, expected in own.items():
+            if name != "made_for" and np.shape(state[name]) != np.shape(expected):
+                found = f"of shape {np.shape(state[name])}"
+                raise InputError(f"state: {name} {found} found, expected {np.shape(expected)}")
+        if self._voyages.shared and not np.array_equal(state["ships"], self._ships, equal_nan=True):
+            raise InputError(f"state: of another ship than this {self.model.name!r}, expected the same")
+        lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(-1, len(self._states[0]) // LANES)
+        for lane, row in np.argwhere(~np.isfinite(lanes[: self.num_envs]))[:1]:
+            name = (*own["made_for"]["rows"], *["plan"] * row)[row]
+            raise InputError(f"state: {name} in row {lane} is not finite, expected a number")
+        self.remember(state)
+        self.show_anew()
+        for name in ("observations", "outcomes", "flags"):
+            getattr(self.shown, name)[:] = state[name]
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""

@@ -8,7 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice
@@ -24,6 +24,7 @@ except ImportError:
     ) from None
 
 Indices = None | int | Sequence[int]
+Vectors = VectorEnv[Any, Any, Any]
 
 #: What all rows have in common, by the names of the single environment.
 SHARED = ("dt", "metadata", "model", "observation_names", "observation_scales", "render_mode", "spec", "task")
@@ -84,8 +85,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
     Parameters
     ----------
-    env : str or ShipVectorEnv
-        An environment's id, or a native vector environment with the autoreset mode SAME_STEP.
+    env : str or VectorEnv
+        An environment's id, or a native vector environment with the autoreset mode SAME_STEP, also within
+        Gymnasium's wrappers of vector environments.
     num_envs : int, optional
         Number of ships; by default 1, or that of the given environment.
     seed : int, optional
@@ -104,22 +106,23 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def __init__(
         self,
-        env: str | ShipVectorEnv,
+        env: str | Vectors,
         num_envs: int | None = None,
         *,
         seed: int | None = None,
         info_names: Sequence[str] = (),
         **options: Any,
     ) -> None:
-        self.vector_env = _native(env, num_envs, options)
+        self.vector_env: Any = _native(env, num_envs, options)
+        self._ships: ShipVectorEnv = self.vector_env.unwrapped
         n = self.vector_env.num_envs
-        self._rows = [Row(self.vector_env, number) for number in range(n)]
+        self._rows = [Row(self._ships, number) for number in range(n)]
         super().__init__(n, self.vector_env.single_observation_space, self.vector_env.single_action_space)
         self.metadata: dict[str, Any] = dict(self.vector_env.metadata)
         self.spec = self.vector_env.spec
         self.info_names = tuple(info_names)
         for name in self.info_names:
-            check_choice(name, self.vector_env.task.info_names, "info_names")
+            check_choice(name, self._ships.task.info_names, "info_names")
         self._infos: list[dict[str, Any]] = [{} for _ in range(n)]
         self._touched: list[int] = []  # rows whose dictionary is to be emptied
         self._returns, self._lengths = np.zeros(n), np.zeros(n, dtype=np.int64)
@@ -137,6 +140,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         self._reset_options()
         if options:
             raise InputError(f"options: {options[0]!r} found, expected none; name them when it is made")
+        observations: NDArray[np.float32]
         observations, infos = self.vector_env.reset(seed=None if None in self._seeds else self._seeds)
         self._reset_seeds()
         self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
@@ -192,12 +196,12 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their actions, copies by name; after a `reset`."""
         own = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
-        return own | self.vector_env.memory()
+        return own | self._ships.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from the `memory` of an environment made with the same arguments, in place of a `reset`."""
         self._returns[:], self._lengths[:] = memory["returns"], memory["lengths"]
-        self.vector_env.remember(memory)
+        self._ships.remember(memory)
         self.reset_infos = [{} for _ in range(self.num_envs)]
         self._infos, self._touched = [{} for _ in range(self.num_envs)], []
 
@@ -245,11 +249,11 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
     return {
         name: values[row].item()
         for name, values in infos.items()
-        if not name.startswith(("_", "final_"))
+        if not name.startswith(("_", "final_")) and not isinstance(values, dict)
     }  # fmt: skip
 
 
-def _native(env: str | ShipVectorEnv, num_envs: int | None, options: dict[str, Any]) -> ShipVectorEnv:
+def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -> Any:
     """The native vector environment by its id, or as given."""
     if isinstance(env, str):
         if "autoreset_mode" in options:
@@ -265,10 +269,10 @@ def _native(env: str | ShipVectorEnv, num_envs: int | None, options: dict[str, A
                 f"num_envs, options: {sorted(options) or num_envs} found beside an environment that is made "
                 "already; give them where it is made, or give its id"
             )
-    if not isinstance(made, ShipVectorEnv):
+    if not isinstance(getattr(made, "unwrapped", None), ShipVectorEnv):
         raise InputError(
             f"env: {made!r} found, expected the id of an environment of shipgym or what gymnasium.make_vec "
-            "makes of it; wrap with stable-baselines3's wrappers afterwards"
+            "makes of it, also wrapped"
         )
     if made.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
         raise InputError(

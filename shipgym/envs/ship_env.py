@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat
@@ -11,11 +11,12 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_keys
+from shipgym.checks import did_you_mean, quoted
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_array, as_numbers, episode_key
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.envs.randomisation import Randomisation
+from shipgym.envs.remade import Remade, refuse_step
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import read_sensors
 from shipgym.ships import ShipModel, load_model
@@ -31,10 +32,23 @@ FLOAT32 = np.dtype(np.float32)
 ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
 
 
+class UnknownKeywordError(InputError, TypeError):
+    """A keyword that an environment does not take; libraries probe for it by its being a TypeError."""
+
+    def __init__(self, message: str, known: Sequence[str] = ()) -> None:
+        if known:  # made anew by Gymnasium, it has the message alone
+            hint = f"{did_you_mean(message, known)} Known keys: {quoted(known)}; it is"
+            wrong = f"unexpected keyword argument '{message}'"
+            message = f"environment options: unknown key '{message}'.{hint} an {wrong}"
+        super().__init__(message)
+
+
 def read_options(
-    task: Any, model: str | Path | ShipModel, options: Mapping[str, Any]
+    task: Any, model: str | Path | ShipModel, options: Mapping[str, Any], taken: Sequence[str] = ()
 ) -> tuple[ShipModel, Task, Randomisation]:
     """The ship, the task and what is randomised, by an environment's keywords.
+
+    `taken`: keywords that its caller takes beside them, for messages.
 
     Raises
     ------
@@ -44,8 +58,10 @@ def read_options(
     definition = read_definition(task, options.get("reward"))
     sensors = options.get("sensors")
     own = Task.option_names(definition, None if sensors is None else read_sensors(sensors))
-    known = [*ENV_OPTIONS, *own, *Randomisation.names()]
-    check_keys(options, known, "environment options")
+    known = [*taken, "reward", *own, *Randomisation.names()]
+    unknown = [name for name in options if name not in known]
+    if unknown:
+        raise UnknownKeywordError(unknown[0], known)
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
     if not isinstance(model, str | Path | ShipModel):
@@ -67,7 +83,7 @@ def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
     return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
 
 
-class ShipEnv(gymnasium.Env[Observation, Any]):
+class ShipEnv(Remade, gymnasium.Env[Observation, Any]):
     """One ship under a task; the environments differ by their task alone.
 
     The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The observation holds the
@@ -105,24 +121,41 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         allow_unstable: bool = False,
         **options: Any,
     ) -> None:
+        arguments = locals()
         self.render_mode = render_mode
         self._artist = _artist(render_mode)
-        self.model, self.task, randomisation = read_options(task, model, options)
+        self.model, self.task, randomisation = read_options(task, model, options, ENV_OPTIONS)
         seen, commands = spaces(self.task, self.model)
         self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
-        self._engine = Engine(self.model, 1, self.task, randomisation, allow_unstable)
-        self._seen, self._outcomes = self._engine.shown.observations[0], self._engine.shown.outcomes[:, 0]
-        self._step_of_one = self._engine.step_of_one()
         self._advance: Callable[[], int] = refuse_step
-        self._command = self._engine.command[:, 0]
+        self._use(Engine(self.model, 1, self.task, randomisation, allow_unstable))
         self._discrete = self.task.action == "rudder-discrete"
         self._names = self.task.info_names
         self._flags = [(name, k) for k, name in enumerate(self._names) if name in self.task.flags]
         self._key = 0
         self._episode = -1
+        self._made(arguments)
+
+    def _use(self, engine: Engine) -> None:
+        self._engine = engine
+        self._seen, self._outcomes = engine.shown.observations[0], engine.shown.outcomes[:, 0]
+        self._step_of_one = engine.step_of_one()
+        self._command = engine.command[:, 0]
+
+    def _going(self) -> bool:
+        return self._advance is not refuse_step
+
+    def _counters(self) -> dict[str, Any]:
+        return {"key": self._key, "episode": self._episode}
+
+    def _recall(self, engine: Engine, state: Mapping[str, Any]) -> None:
+        self._use(engine)
+        self._key, self._episode, self._advance = state["key"], state["episode"], self._step_of_one
+        if self._artist is not None:
+            self._artist.begin(engine)
 
     @property
     def dt(self) -> float:
@@ -150,7 +183,8 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         seed : int, optional
             Fixes this episode and all that follow it.
         options : dict, optional
-            None are known.
+            Until the next reset: `waypoints` of the path, or of several; `model_index`, the one of the ships
+            that episodes are drawn from. Or, alone, `state`: go on from what `get_state` gave.
 
         Returns
         -------
@@ -161,11 +195,12 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         Raises
         ------
         InputError
-            If there are options.
+            For other options, or a value that does not fit.
         """
         super().reset(seed=seed)
-        if options:
-            raise InputError(f"options: {options!r} found, expected none")
+        if (state := self._take(options)) is not None:
+            self.set_state(state)
+            return self._seen.copy(), self._info(self._outcomes[STEP_OUTCOME:].tolist())
         if seed is not None or self._episode < 0:
             self._key = episode_key(self.np_random)
             self._episode = -1
@@ -250,11 +285,6 @@ class ShipEnv(gymnasium.Env[Observation, Any]):
         self._advance = refuse_step
         if self._artist is not None:
             self._artist.close()
-
-
-def refuse_step() -> int:
-    """The step of an environment that was not reset yet, or is closed: raises InputError."""
-    raise InputError("step: no episode has begun, or the environment was closed; call reset first")
 
 
 def _one_order(action: Any) -> int:

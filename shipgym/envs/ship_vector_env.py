@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import Engine, as_array, episode_key, episode_keys
 from shipgym.envs.outputs import named_rows
-from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, read_options, refuse_step, spaces
+from shipgym.envs.remade import Remade, refuse_step
+from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, ENV_OPTIONS, read_options, spaces
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import RUDDER_ORDERS
@@ -25,10 +26,11 @@ Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
 Infos = dict[str, Any]
 
+VECTOR_OPTIONS = ("num_envs", *ENV_OPTIONS, "autoreset_mode", "threads", "max_episode_steps")
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 
-class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
+class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
     """Many ships under a task; row i is the single environment reset with `seed + i`, bit for bit.
 
     Parameters
@@ -45,6 +47,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         When the next episode of a row begins.
     threads : int
         Number of threads that share the rows; the results do not depend on it.
+    max_episode_steps : int, optional
+        Gymnasium's name of `episode_steps`.
     **options
         As for the single environment.
 
@@ -63,10 +67,18 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         allow_unstable: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
+        max_episode_steps: int | None = None,
         **options: Any,
     ) -> None:
+        arguments = locals()
         mode = _mode(autoreset_mode)
-        self.model, self.task, randomisation = read_options(task, model, options)
+        if max_episode_steps is not None:
+            steps = options.setdefault("episode_steps", max_episode_steps)
+            if steps != max_episode_steps:
+                raise InputError(
+                    f"max_episode_steps: {max_episode_steps!r} found beside episode_steps {steps!r}"
+                )
+        self.model, self.task, randomisation = read_options(task, model, options, VECTOR_OPTIONS)
         self._engine = Engine(self.model, num_envs, self.task, randomisation, allow_unstable, threads)
         self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
         self.render_mode = render_mode
@@ -80,12 +92,28 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         self.observation_scales = np.array([quantity.scale for quantity in observed])
         self._names, self._flags = self.task.info_names, self._engine.flag_names
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
-        self._mode = mode
+        self._mode = self.autoreset_mode = mode  # the latter is read by TorchRL
         self._own_reward = not self.task.definition.shipped
         self._discrete = self.task.action == "rudder-discrete"
         self._begun = False  # and not closed since
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
         self._keys: NDArray[np.uint64] | None = None
+        self._made(arguments)
+
+    def _use(self, engine: Engine) -> None:
+        self._engine = engine
+
+    def _going(self) -> bool:
+        return self._begun
+
+    def _counters(self) -> dict[str, Any]:
+        return {"row_keys": np.array(self._keys), "some_over": self._some_over}
+
+    def _recall(self, engine: Engine, state: Mapping[str, Any]) -> None:
+        self._engine, self._begun = engine, True
+        self._keys, self._some_over = state["row_keys"].copy(), bool(state["some_over"])
+        for artist in self._artists:
+            artist.begin(engine)
 
     @property
     def dt(self) -> float:
@@ -102,7 +130,8 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         seed : int or sequence of int or None, optional
             Row i has the seed `seed + i`, or number i of the sequence. Without one the next episodes begin.
         options : dict, optional
-            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the others go on.
+            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the others go on. Or, for all
+            rows, those of the single environment.
 
         Returns
         -------
@@ -118,6 +147,9 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._mask(options)
         episodes = self._engine.episodes + np.uint64(1)
+        if mask.all() and (state := self._take(options, "reset_mask")) is not None:
+            self.set_state(state)
+            return self._engine.shown.observations, self._infos()
         if self._keys is None:
             self._keys = self._drawn_keys()
             episodes[:] = 0
@@ -151,12 +183,13 @@ class ShipVectorEnv(VectorEnv[Observation, Any, Floats]):
         return np.array([episode_key(self.np_random) for _ in range(self.num_envs)], dtype=np.uint64)
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
-        check_keys(options or {}, ["reset_mask"], "options")
         mask = (options or {}).get("reset_mask", self._engine.all_lanes)
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
             raise InputError(f"options: reset_mask {mask!r} found, expected a bool array of {self.num_envs}")
         if not mask.any():
             raise InputError("options: reset_mask is False in all rows, expected one at least to begin anew")
+        if not mask.all():
+            check_keys(options or {}, ["reset_mask"], "options with a reset_mask of some rows")
         return mask
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
-from shipgym.engine.records import leaves
+from shipgym.engine.records import flat, leaves
 from shipgym.envs.engine import Engine
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
@@ -110,7 +110,7 @@ def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
     def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
         if lane < plain.num_envs:
             beyond.looked_at += 1
-            for path, value, per_scale in zip(paths, _numbers(record), _numbers(scale), strict=True):
+            for path, value, per_scale in zip(paths, flat(record), flat(scale), strict=True):
                 low, high = beyond.bounds[path]
                 if path in shown and not low - BEYOND <= value * per_scale <= high + BEYOND:
                     beyond.setdefault(path, []).append(value * per_scale)
@@ -119,15 +119,6 @@ def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
     parts = {**made.parts, "store_observation": Part(noted, code=lambda: None, key="noted")}
     plain._run = plain_loop(episodes.run, parts)
     return engine, plain, beyond
-
-
-def _numbers(record: Any) -> Iterator[float]:
-    """Numbers of a record and of those within it."""
-    for value in record:
-        if isinstance(value, tuple):
-            yield from _numbers(value)
-        else:
-            yield float(value)
 
 
 def _orders(engine: Engine, step: int) -> Floats:

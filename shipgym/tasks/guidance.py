@@ -116,19 +116,6 @@ class Path:
                 "further apart, or set a smaller turn_radius"
             )
 
-    def rounded(self, radius: float) -> Floats:
-        """The path with its turns as arcs of a radius, m: points 3 degrees apart on them, shape (n, 2)."""
-        points = [self.waypoints[:1]]
-        for number, turn in enumerate(self.turns[:-1]):
-            cut = radius * np.tan(0.5 * abs(turn))
-            course, corner = self.courses[number], self.waypoints[number + 1]
-            begin = corner - cut * np.array([np.cos(course), np.sin(course)])
-            angles = np.linspace(0.0, abs(turn), int(abs(turn) / np.radians(3.0)) + 2)
-            ahead, side = radius * np.sin(angles), np.sign(turn) * radius * (1.0 - np.cos(angles))
-            turned = np.array([[np.cos(course), np.sin(course)], [-np.sin(course), np.cos(course)]])
-            points.append(begin + np.stack([ahead, side], axis=-1) @ turned)
-        return np.concatenate([*points, self.waypoints[-1:]])
-
     def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
         """Where ships stand on given legs.
 

@@ -38,7 +38,7 @@ EPISODE_STEPS = 1500
 
 START_OFFSET = 0.5  # of the corridor: furthest start from the path
 START_HEADING = pi / 12.0  # largest angle to the path at the start, rad
-START_DRAW = 1 << 20  # number of the start's random numbers, apart from those of the path
+START_DRAW, PATH_DRAW = 1 << 20, 1 << 21  # numbers of random numbers, apart from those of a drawn path
 PREVIEW = 20.0  # ship lengths along the path within which turns are observed
 WORST_PROGRESS = 2.0  # cost of a step against the path
 STANDSTILL = 1e-6  # of the speed: no course over ground
@@ -208,7 +208,7 @@ def listed(waypoints: Any) -> Numbers:
     several = isinstance(waypoints, list | tuple) and len(waypoints) and np.ndim(waypoints[0]) == 2
     paths = [Path(path).waypoints for path in (waypoints if several else [waypoints])]
     most = max(map(len, paths))
-    filled = [[*path[:-1], *np.linspace(*path[-2:], most - len(path) + 2)[1:]] for path in paths]
+    filled = [[*path[:-1], *np.linspace(path[-2], path[-1], most - len(path) + 2)[1:]] for path in paths]
     return np.append(float(most), np.ravel(filled))
 
 
@@ -217,12 +217,13 @@ def plan_length(settings: Settings) -> int:
     return 2 * (int(settings.waypoints[0]) if len(settings.waypoints) else int(settings.n_legs) + 1)
 
 
-def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers, first: int) -> int:
-    """Write the waypoints of an episode, listed from a number on, or drawn; returns how many draws that is."""
+def lay_path(ship: Ship, settings: Any, random: Random, plan: Numbers) -> int:
+    """Write the waypoints of an episode, listed or drawn; returns how many random numbers that took."""
     north, east, course, draws = 0.0, 0.0, drawn(random, 0, -pi, pi), 1
-    largest = np.radians(settings.max_turn_deg)
+    largest, n_paths = np.radians(settings.max_turn_deg), (len(settings.waypoints) - 1) // len(plan)
+    first = 1 + len(plan) * int(drawn(random, PATH_DRAW, 0.0, max(1.0, float(n_paths))))
     for number in range(len(plan) // 2):
-        if len(settings.waypoints) > 0:
+        if n_paths > 0:
             at = first + 2 * number
             north, east = settings.waypoints[at], settings.waypoints[at + 1]
         plan[2 * number], plan[2 * number + 1] = north, east
@@ -314,9 +315,7 @@ def part_of(turn: float, way: float, radius: float) -> float:
 
 def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tuple[Motion, State]:
     """Near the first waypoint and about along the first leg."""
-    n_paths = (len(settings.waypoints) - 1) // len(plan)
-    chosen = int(drawn(random, START_DRAW + 2, 0.0, max(1.0, float(n_paths))))
-    lay_path(ship, settings, random, plan, 1 + chosen * len(plan))
+    lay_path(ship, settings, random, plan)
     leg = leg_from(0, 0.0, settings.turn_radius * ship.length, plan)
     motion = start(leg, leg.course, ship, settings, random, START_DRAW)
     at, work = fix(motion.x, motion.y, leg, ship, settings), RudderWork(0.0, 0.0, 0.0)
@@ -382,7 +381,7 @@ def step(
     after = State(
         leg, at.course, integral, error, at.cross, sailed, pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0),
         pick(aground, 1.0, 0.0), work, state.rudder_travel + travel,
-        60.0 * work.reversals / (interval.steps * interval.dt),
+        60.0 * work.reversals / (max(interval.steps, 1.0) * interval.dt),
     )  # fmt: skip
     return after, reward, aground, arrived
 

@@ -14,15 +14,14 @@ Guidance by line of sight: Fossen 2011, Handbook of Marine Craft Hydrodynamics a
 from __future__ import annotations
 
 from math import fabs, pi, sqrt
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, clip, pick, wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import NO_NUMBERS, Flag, Interval, Numbers, Random, Readings, Seen, Setting
-from shipgym.tasks.guidance import Path
 from shipgym.tasks.path_following import (  # noqa: F401 - some are names of the contract
-    EPISODE_STEPS, WORST_PROGRESS, Corridor, Ground, LegLengths, Legs, Lookahead, MaxTurn, Range, lay_path,
-    over_ground, start, worst_cost,
+    EPISODE_STEPS, WORST_PROGRESS, Corridor, Ground, LegLengths, Legs, Lookahead, MaxTurn, Paths, Range,
+    lay_path, listed, over_ground, plan_length, start, worst_cost,
 )  # fmt: skip
 from shipgym.tasks.path_following import check_path as check  # noqa: F401
 from shipgym.tasks.steering import (
@@ -48,12 +47,7 @@ class Settings(NamedTuple):
     corridor: Corridor = 1.0
     ground: Ground = 4.0
     weights: Weights = Weights()
-    waypoints: Annotated[
-        Numbers,
-        Setting(
-            "North and east, m, of a path that is always the same, shape (n, 2); by default one is drawn."
-        ),
-    ] = NO_NUMBERS
+    waypoints: Paths = NO_NUMBERS
 
 
 class State(NamedTuple):
@@ -110,16 +104,6 @@ class Fix(NamedTuple):
     course: float  # rad, to steer
 
 
-def listed(waypoints: Any) -> Numbers:
-    """North and east of waypoints by turns, m."""
-    return Path(waypoints).waypoints.ravel()
-
-
-def plan_length(settings: Settings) -> int:
-    """The plan holds the waypoints, north and east by turns."""
-    return int(2.0 * last_leg(settings) + 4.0)
-
-
 def leg_from(number: int, before: float, plan: Numbers) -> State:
     """A leg of the path, with nothing sailed on it."""
     north, east = plan[2 * number], plan[2 * number + 1]
@@ -145,7 +129,7 @@ def fix(x: float, y: float, state: State, ship: Ship, settings: Settings) -> Fix
 
 def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tuple[Motion, State]:
     """Near the first waypoint and about along the first leg."""
-    draws = lay_path(ship, settings, random, plan, 0)
+    draws = lay_path(ship, settings, random, plan)
     leg = leg_from(0, 0.0, plan)
     motion = start(leg, leg.leg_course, ship, settings, random, draws)
     return motion, on_leg(motion, leg, leg, 0.0, ship, settings)
@@ -171,8 +155,7 @@ def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: 
 
 def last_leg(settings: Settings) -> float:
     """Number of the last leg."""
-    given = len(settings.waypoints) // 2
-    return given - 2.0 if given > 0 else settings.n_legs - 1.0
+    return settings.waypoints[0] - 2.0 if len(settings.waypoints) > 0 else settings.n_legs - 1.0
 
 
 def on_event(

@@ -63,6 +63,20 @@ def test_dividing_a_leg_changes_nothing(path, cost):
     np.testing.assert_allclose(costs, costs[0], rtol=1e-6)
 
 
+def rounded(path, radius):
+    """The path with its turns as arcs: points 3 degrees apart on them."""
+    points = [path.waypoints[:1]]
+    for number, turn in enumerate(path.turns[:-1]):
+        cut = radius * np.tan(0.5 * abs(turn))
+        course, corner = path.courses[number], path.waypoints[number + 1]
+        begin = corner - cut * np.array([np.cos(course), np.sin(course)])
+        angles = np.linspace(0.0, abs(turn), int(abs(turn) / np.radians(3.0)) + 2)
+        ahead, side = radius * np.sin(angles), np.sign(turn) * radius * (1.0 - np.cos(angles))
+        turned = np.array([[np.cos(course), np.sin(course)], [-np.sin(course), np.cos(course)]])
+        points.append(begin + np.stack([ahead, side], axis=-1) @ turned)
+    return np.concatenate([*points, path.waypoints[-1:]])
+
+
 def on_path(radius, plan):
     """The state at the first waypoint."""
     return State(leg_from(0, 0.0, radius, plan), *[0.0] * 8, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0)
@@ -70,7 +84,7 @@ def on_path(radius, plan):
 
 def followed(path, radius, places):
     """States of a ship that goes along a path, at some ways along it, and these ways."""
-    line, plan = path.rounded(radius), path.waypoints.ravel()
+    line, plan = rounded(path, radius), path.waypoints.ravel()
     way = np.append(0.0, np.cumsum(np.hypot(*np.diff(line, axis=0).T)))
     ways, asked = places * way[-1], Settings(turn_radius=radius / LENGTH)
     states, state = [], on_path(radius, plan)
