@@ -62,7 +62,8 @@ mutate: $(VENV)/dev-installed
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
-	$(BIN)/python scripts/oracle.py --again --from-agents
+	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite --no-page
+	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 
 docs: $(VENV)/docs-installed

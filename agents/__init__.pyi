@@ -14,11 +14,13 @@ from .controllers.lq import LQ as LQ
 from .controllers.lqg import LQG as LQG
 from .controllers.mpc import MPC as MPC
 from .controllers.pid import PID as PID
+from .controllers.preview_mpc import PreviewMPC as PreviewMPC
 from .controllers.registry import controller_kinds as controller_kinds
 from .controllers.registry import register_controller as register_controller
 from .controllers.robustness import MarginUncertainty as MarginUncertainty
 from .controllers.robustness import margin_uncertainty as margin_uncertainty
 from .controllers.scheduled_lq import ScheduledLQ as ScheduledLQ
+from .controllers.wheel_over import WheelOver as WheelOver
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .policies.shield import Shielded as Shielded
 from .policies.shield import interventions as interventions

@@ -21,6 +21,7 @@ from agents.controllers.adaptive_lq import has_sway
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
+from agents.controllers.wheel_over import own_lead, own_turn
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
@@ -31,7 +32,7 @@ Floats = NDArray[np.float64]
 
 EVALUATIONS, EPISODES, FIRST_SEED = 40, 32, 500_000
 LEAST_GAIN_MARGIN, LEAST_PHASE_MARGIN = 1.5, 20.0  # factor, degrees
-LAWS = ("los", "ilos", "alos")  # guidance
+LAWS = ("los", "ilos", "alos", "wheel-over", "preview-mpc")  # guidance
 FIRST_STEP = 0.4  # of the simplex, in natural logarithms
 REFUSED = 1e12  # cost of settings with which no controller can be designed
 
@@ -129,25 +130,31 @@ def tune(
 ) -> Tuned:
     """Search the settings of a classical controller on a task.
 
-    `kind`: of those `tunable`; `settings`: those found for LQ, which guidance laws lead; by default its
-    design's own; `evaluations`, `episodes`: budget.
+    `kind`: of those `tunable`; `settings`: those found for LQ, which guidance laws lead where they cost less
+    than its design's own; `evaluations`, `episodes`: budget.
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
-    autopilot = {} if settings is None else dict(settings.get("lq", {}))
-    engine = task.engine(episodes)
+    engine = task.handed_out.engine(episodes)
 
     def cost(asked: Mapping[str, float]) -> float:
         try:
-            controller = design(kind, task, {**_prefixed(autopilot, kind), **asked})
+            controller = design(kind, task, asked)
             if not is_sane(controller):
                 return REFUSED
             return float(episode_costs(controller, engine, seeds).mean())
         except InputError:  # no such design, or one that commands no number
             return REFUSED
 
-    found = search(cost, search_spaces(kind, task), evaluations)
-    return replace(found, settings={**_prefixed(autopilot, kind), **found.settings})
+    spaces = search_spaces(kind, task)
+    found_for_lq = _prefixed({} if settings is None else settings.get("lq", {}), kind)
+    start = {one.name: one.start for one in spaces[0]}
+    autopilot = min(({}, found_for_lq), key=lambda one: cost({**one, **start})) if found_for_lq else {}
+    left = evaluations - 2 * bool(found_for_lq)
+    found = search(lambda asked: cost({**autopilot, **asked}), spaces, left)
+    return replace(
+        found, settings={**autopilot, **found.settings}, evaluations=evaluations - left + found.evaluations
+    )
 
 
 def _prefixed(autopilot: Mapping[str, float], kind: str) -> dict[str, float]:
@@ -168,7 +175,16 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
             raise no_path(kind, task)
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
-        if kind != "los":
+        if kind in ("wheel-over", "preview-mpc"):
+            if hasattr(task.task.settings, "turn_radius"):  # the path has arcs of its own
+                own.append(Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0))
+            else:
+                radius, reach = own_turn(task.ship)
+                own += [Setting("reach_lengths", reach), Setting("radius_lengths", radius)]
+                own.append(Setting("turn_lookahead_lengths", lookahead))
+            own.append(Setting("crab_share", 1.0, 0.3, 1.5))
+            own += [Setting("deviation_deg", 3.0)] * (kind == "preview-mpc")
+        elif kind != "los":
             own.append(Setting("integral_lengths", CRITICAL * lookahead))
         return [own]
     plain = design(kind, task).design

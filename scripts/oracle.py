@@ -1,8 +1,6 @@
 """What a task leaves to gain: rudder sequences found by sampling on the true ship in the weather to come.
 
-    python scripts/oracle.py                          # what is missing in the suite's two files of costs
-    python scripts/oracle.py --tasks mariner-calm --again
-    python scripts/oracle.py --from-agents            # runs paths from the pretrained agents too
+    from oracle import run_oracle                     # `scripts/best_known.py --search` uses it
 
 No autopilot can steer like it. It knows the state without noise and every gust before it blows, tries
 hundreds of rudder sequences on copies of the ship, and takes the best: the cross-entropy method over a
@@ -15,41 +13,25 @@ the true state, so that ships unstable on their course are held while the change
 Sources: Rubinstein & Kroese 2004, The Cross-Entropy Method; Williams, Aldrich & Theodorou 2017, Model
 predictive path integral control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model in
 parallel); Bertsekas 2019, Reinforcement Learning and Optimal Control, 2.4 (rollout: improving a base policy).
-
-The files are written after every task: stopped at any moment, it goes on where it was. The reference costs
-are those of the tuned controllers (`scripts/tune_controllers.py`) and of the oracle; the oracle's costs of
-all scored episodes are in a file of their own. It runs again where more episodes are asked for, or where
-another controller has become the best and costs less than it. Where it runs fewer episodes than are scored,
-its cost is that of the best classical controller over all of them times the oracle's part of that
-controller's cost on those it ran.
 """
 
 from __future__ import annotations
 
-import argparse
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.agent_file import find_agent, load_agent
-from agents.benchmarking.contestants import file_hash
 from agents.controllers.controller import Controller, Policy
-from agents.controllers.designs import design
 from agents.controllers.lq import LQ
 from agents.controllers.pid import PID
-from agents.rollouts.rollout import episode_costs, rollout
-from agents.suites.reference import load_tuned
-from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, suite_file
+from agents.rollouts.rollout import rollout
 from shipgym.checks import check_number, check_whole
 from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import INTEGRAL_ZONE
@@ -401,88 +383,3 @@ def _drawn(random: np.random.Generator, candidates: int, n_knots: int) -> Floats
     drawn = random.standard_normal((half, n_knots))
     drawn *= np.geomspace(LEAST_SCALE, 1.0, half)[:, None]
     return np.concatenate([drawn, -drawn])[:candidates]
-
-
-def main() -> None:
-    """Run what is missing and say what came out."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--suite", default=DEFAULT_SUITE)
-    parser.add_argument("--tasks", default="", help="names, separated by commas; by default all")
-    parser.add_argument("--oracle-episodes", type=int, default=ORACLE_EPISODES)
-    parser.add_argument("--again", action="store_true", help="also what is there already")
-    parser.add_argument("--from-agents", action="store_true", help="better the oracle from pretrained agents")
-    asked = parser.parse_args()
-    suite = load_suite(asked.suite)
-    tasks = [suite.task(name) for name in asked.tasks.split(",") if name] or list(suite.tasks)
-    for task in tasks:
-        refer(task, asked)
-        if asked.from_agents and task.environment == "path-following":
-            run_from_agent(task, asked.suite)
-
-
-def refer(task: BenchmarkTask, asked: argparse.Namespace) -> None:
-    """Run the tuned controllers and the oracle on the scored seeds."""
-    path = suite_file(asked.suite, "reference")
-    found = _written(path)
-    tuned = load_tuned(asked.suite)[task.name]
-    best = min(tuned, key=lambda kind: float(tuned[kind]["cost"]))
-    known = found.get(task.name, {})
-    enough = known.get("oracle_episodes", 0) >= asked.oracle_episodes and not asked.again
-    if enough and known["best_classical"]["name"] == best:
-        return
-    began = time.process_time()
-    engine = task.engine(len(task.seeds))
-    start, pid = (design(kind, task, tuned[kind]["settings"]) for kind in (best, "pid"))
-    cost = float(episode_costs(start, engine, task.seeds).mean())
-    if enough and known["oracle"] <= cost:  # what it found from another start can still be sailed
-        oracle = {name: known[name] for name in ("oracle", "oracle_episodes")}
-    else:
-        oracle = run(task, start, cost, asked)
-    found[task.name] = {
-        "pid": float(episode_costs(pid, engine, task.seeds).mean()),
-        "best_classical": {"name": best, "cost": cost},
-        **oracle,
-    }
-    write_json(found, path)
-    print(f"{task.name:20s} {found[task.name]}   {time.process_time() - began:.0f} s", flush=True)
-
-
-def run(task: BenchmarkTask, start: Controller, cost: float, asked: argparse.Namespace) -> dict[str, Any]:
-    """The oracle's cost over all scored seeds, and how many it ran, whose costs are kept if all."""
-    seeds = task.seeds[: asked.oracle_episodes]
-    found = run_oracle(task.ship, task.task, seeds, start, OracleSettings(), task.parts[2])
-    if len(seeds) == len(task.seeds):
-        path = suite_file(asked.suite, "oracle")
-        write_json({**_written(path), task.name: found.costs.tolist()}, path)
-    part = float(found.costs.mean() / found.start_costs.mean())
-    return {"oracle": part * cost, "oracle_episodes": len(seeds)}
-
-
-def run_from_agent(task: BenchmarkTask, suite: str) -> None:
-    """Run the oracle from what the task's pretrained agent does; the cheaper of each episode is kept.
-
-    The reference names the agent's file, so that the same agent is not run from again.
-    """
-    costs, known = _written(suite_file(suite, "oracle")), _written(suite_file(suite, "reference"))
-    if known[task.name]["oracle_episodes"] < len(task.seeds):
-        raise SystemExit(f"{task.name}: the oracle ran too few episodes, run all of them first")
-    agent_hash = file_hash(find_agent(f"{task.name}-ppo"))
-    if known[task.name].get("agent_sha256") == agent_hash:
-        return
-    before = np.array(costs[task.name])
-    agent = load_agent(f"{task.name}-ppo")
-    found = run_oracle(task.ship, task.task, task.seeds, agent, OracleSettings(), task.parts[2])
-    after = np.minimum(before, found.costs)
-    known[task.name] |= {"oracle": float(after.mean()), "agent_sha256": agent_hash}
-    write_json({**costs, task.name: after.tolist()}, suite_file(suite, "oracle"))
-    write_json(known, suite_file(suite, "reference"))
-    print(f"{task.name:20s} oracle {before.mean():.2f} -> {after.mean():.2f}", flush=True)
-
-
-def _written(path: Path) -> dict[str, Any]:
-    """What was written so far."""
-    return dict(read_json(path, "result file", "delete it")) if path.exists() else {}
-
-
-if __name__ == "__main__":
-    main()

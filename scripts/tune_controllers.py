@@ -4,7 +4,7 @@
     python scripts/tune_controllers.py --tasks mariner-calm --again
 
 The file is written after every controller and task: stopped at any moment, it goes on where it was.
-`scripts/oracle.py` then makes the suite's reference costs.
+Where a task has a ship behind its model, they are tuned on the model; `scripts/best_known.py` keeps costs.
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ def main() -> None:
     asked = parser.parse_args()
     suite = load_suite(asked.suite)
     tasks = [suite.task(name) for name in asked.tasks.split(",") if name] or list(suite.tasks)
+    tasks = [task.handed_out for task in tasks if task.on == "ship"]
     for task in tasks:
         tune_task(task, asked)
 
@@ -49,7 +50,7 @@ def tune_task(task: BenchmarkTask, asked: argparse.Namespace) -> None:
         settings = {name: one["settings"] for name, one in own.items()}
         best = tune(kind, task, settings, asked.evaluations, asked.episodes)
         own[kind] = asdict(best)
-        budget = {"evaluations": EVALUATIONS, "episodes": EPISODES, "first_seed": FIRST_SEED}
+        budget = {"evaluations": asked.evaluations, "episodes": asked.episodes, "first_seed": FIRST_SEED}
         write_json({"suite": asked.suite, **budget, "tasks": found}, suite_file(asked.suite, "tuned"))
         spent = time.process_time() - began
         costs = f"{best.start_cost:9.2f} -> {best.cost:9.2f}"

@@ -5,7 +5,7 @@ A contestant is named on the command line as
     pid                        a classical controller, designed for each task's ship with `from_model`
     tuned-pid                  the same with the settings that direct search found for each task of the suite
     tuned-best                 of these the one that costs least in each task
-    oracle                     what a task leaves to gain: the costs that are kept with the suite
+    best-known                 the lowest cost that anything reached in each episode, kept with the suite
     ppo                        the pretrained agents of `agents/pretrained`
     runs/agent.json            a file of an agent or controller
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
@@ -34,7 +34,7 @@ from pathlib import Path
 from typing import Any
 
 from agents.agent_file import load_agent
-from agents.controllers.controller import Controller, Policy
+from agents.controllers.controller import Controller, Policy, model_hash
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
 from agents.engines.job import working_folder
@@ -46,7 +46,7 @@ from shipgym.files import LARGEST_TENSORS, read_bytes
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
-ORACLE = "oracle"
+BEST_KNOWN = "best-known"
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,9 +68,15 @@ class Contestant:
 
         Raises InputError if it cannot be made for this task, or was made for other observations.
         """
-        made = tuple(_made(self.source, task, suite))
+        handed, where = task.handed_out, f"'{self.name}' on task '{task.name}'"
+        made = tuple(_made(self.source, handed, suite))
         for policy in made:
-            check_fits(policy, task.task, task.ship, f"'{self.name}' on task '{task.name}'")
+            check_fits(policy, handed.task, handed.ship, where)
+            if task.behind and getattr(policy, "model_sha256", "") == model_hash(task.sailed[0]):
+                raise InputError(
+                    f"{where}: was designed on the ship, '{task.behind}', expected on the model that it is "
+                    f"handed, '{task.model}'"
+                )
         return made
 
     def fingerprint(self, task: BenchmarkTask) -> dict[str, str]:
@@ -188,7 +194,7 @@ def _check_object(source: Any, name: str) -> None:
 
 def _known() -> tuple[str, ...]:
     """Names of contestants."""
-    return (*controller_kinds(), *LEARNED, ORACLE, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+    return (*controller_kinds(), *LEARNED, BEST_KNOWN, *(TUNED + kind for kind in ("best", *CLASSICAL)))
 
 
 def _check_text(text: str) -> None:
@@ -240,14 +246,15 @@ def _matches(pattern: str) -> list[Path]:
 
 def _files(text: str, task: BenchmarkTask) -> list[Path]:
     """Files from which a contestant is made for a task."""
+    name = task.handed_out.name
     if text in LEARNED:
-        return pretrained(task.name, text)
+        return pretrained(name, text)
     if names_code(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
-    if text in controller_kinds() or text == ORACLE or text.startswith(TUNED):
+    if text in controller_kinds() or text == BEST_KNOWN or text.startswith(TUNED):
         return []
-    return [path for one in text.split("+") for path in _matches(one.replace("{task}", task.name))]
+    return [path for one in text.split("+") for path in _matches(one.replace("{task}", name))]
 
 
 def pretrained(task: str, algorithm: str) -> list[Path]:

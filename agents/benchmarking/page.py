@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.page_figures import (
     costs_figure,
     histories_figure,
@@ -98,7 +98,7 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
         "agents.benchmarking/page.html",
         about=result.summary,
         names=result.ranking,
-        oracle=ORACLE,
+        best_known=BEST_KNOWN,
         styles=styles(result.ranking),
         wins={name: wins.count(name) for name in result.ranking},
         failures=_failures(result),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.results import BenchmarkResult
 from shipgym.envs.episode import Episode
 from shipgym.plots import INK, MUTED, axis, compact, graph_objects, label, layout, line, subplots, translucent
@@ -27,17 +27,19 @@ COLOURS = (
 DASHES = ("solid", "dash", "dot")
 MARGIN = {"l": 58, "r": 14, "t": 14, "b": 44}
 LOGARITHMIC = 20.0  # ratio of the largest to the smallest cost from which on their axis is logarithmic
+SHOWN = {True: (-1.5, 1.5), False: (0.0, 4.0)}  # scores, and relative costs; further ones stand at the edge
+SCORED = "wheel-over from the model 0, best known 1"
 SAMPLES = 240  # of a line at most
 
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
-    """Colour and dashes of each contestant; those of the oracle are dark and solid."""
-    others = [name for name in names if name != ORACLE]
+    """Colour and dashes of each contestant; those of the best known are dark and solid."""
+    others = [name for name in names if name != BEST_KNOWN]
     found = {
         name: (COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)])
         for k, name in enumerate(others)
     }
-    return {name: (INK, "solid") if name == ORACLE else found[name] for name in names}
+    return {name: (INK, "solid") if name == BEST_KNOWN else found[name] for name in names}
 
 
 def scores_figure(result: BenchmarkResult) -> Figure:
@@ -51,20 +53,20 @@ def scores_figure(result: BenchmarkResult) -> Figure:
             continue
         value = score["value"]
         low, high = (value if score[end] is None else score[end] for end in ("low", "high"))
+        low, at, high = np.clip((low, value, high), *SHOWN[scored]).tolist()
+        beyond = "triangle-left" if value < at else "triangle-right" if value > at else "circle"
         figure.add_trace(
             go.Scatter(
-                x=[value], y=[entry["name"]], name=entry["name"], mode="markers",
-                marker={"color": style[entry["name"]][0], "size": 10},
-                error_x={"array": [high - value], "arrayminus": [value - low], "thickness": 2.2},
-                hovertemplate="%{x:.3f}<extra>%{y}</extra>",
+                x=[at], y=[entry["name"]], name=entry["name"], mode="markers", customdata=[value],
+                marker={"color": style[entry["name"]][0], "size": 10, "symbol": beyond},
+                error_x={"array": [high - at], "arrayminus": [at - low], "thickness": 2.2},
+                hovertemplate="%{customdata:.3f}<extra>%{y}</extra>",
             )
         )  # fmt: skip
     if scored:
         for value, dash in ((0.0, "dot"), (1.0, "dot")):
             figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": dash})
-    title = (
-        "score: best PID 0, oracle 1" if scored else "cost relative to the lowest, geometric mean over tasks"
-    )
+    title = f"score: {SCORED}" if scored else "cost relative to the lowest, geometric mean over tasks"
     figure.update_layout(_layout(30 * len(result.ranking) + 70, hovermode="closest"))
     label(figure, title, axis(autorange="reversed", automargin=True, showgrid=True))
     return figure
@@ -81,7 +83,7 @@ def profile_figure(profile: Mapping[str, Any], names: Sequence[str]) -> Figure:
         figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": "dot"})
     figure.update_layout(_layout(380))
     shares_axis = axis("episodes that score more, %", range=[-2, 102])
-    label(figure, "score of an episode: best PID 0, oracle 1", shares_axis)
+    label(figure, f"score of an episode: {SCORED}", shares_axis)
     return figure
 
 

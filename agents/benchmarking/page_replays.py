@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.page_figures import styles
 from agents.benchmarking.replays import SAME_COST, EpisodeId, Rerun, cost_of
 from agents.benchmarking.results import BenchmarkResult
@@ -29,11 +29,11 @@ REWARD_DECIMALS = 4
 
 def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
     """Names of those who ran a task and are usable at sea, as they are ranked."""
-    return [name for name in result.ranking if name in result.summary["tasks"][task] and name != ORACLE]
+    return [name for name in result.ranking if name in result.summary["tasks"][task] and name != BEST_KNOWN]
 
 
 def bests_of(result: BenchmarkResult, task: str) -> list[str]:
-    """Names of the lowest mean cost in a task, several where equal to rounding; the oracle does not count."""
+    """Names of the lowest mean cost in a task, several where equal to rounding, of those that sail."""
     costs = {
         name: result.summary["tasks"][task][name]["cost"]["value"] for name in contestants_of(result, task)
     }

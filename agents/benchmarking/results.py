@@ -31,7 +31,7 @@ from shipgym.files import make_folder, read_json, write_json
 
 Floats = NDArray[np.float64]
 
-FORMAT, KIND = 1, "shipgym-benchmark"
+FORMAT, KIND = 2, "shipgym-benchmark"
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
 FIELDS = ("format", "kind", *SHAPE)
 PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control", "osqp")
@@ -103,8 +103,8 @@ class BenchmarkResult:
         return saved
 
 
-def check_new(folder: Path, resume: bool) -> Path:
-    """Refuse a folder that cannot take results, or that holds some and is not to be gone on with.
+def check_new(folder: Path, resume: bool, suite: str) -> Path:
+    """Refuse a folder that cannot take results, or holds some, unless of this suite and to be gone on with.
 
     Raises InputError saying what to do.
     """
@@ -119,6 +119,13 @@ def check_new(folder: Path, resume: bool) -> Path:
         raise InputError(
             f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
         )
+    if (
+        ours
+        and resume
+        and (folder / RESULTS).is_file()
+        and load_results(folder).summary["suite"]["name"] != suite
+    ):
+        raise InputError(f"{folder}: holds results of another suite than '{suite}'; choose a new folder")
     if found and not ours:
         raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder")
     return folder
@@ -153,7 +160,7 @@ def gathered(
         "seeds": {"first": FIRST_SEED, "count": episodes},
         "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
     }
-    found = summary_of(suite, [task.name for task in tasks], [one.name for one in who], done)
+    found = summary_of(suite, tasks, [one.name for one in who], done)
     rows = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
     code = tuple(one.source for one in who if one.is_text and names_code(one.source))
     return BenchmarkResult({**about, **found, "episodes": rows}, table, code)
@@ -178,6 +185,8 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
         "model": task.model,
         "model_sha256": model_hash(task.ship),
         "why": task.why,
+        "on": task.on,
+        "ship": task.behind,
     }
 
 

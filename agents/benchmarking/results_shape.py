@@ -1,4 +1,4 @@
-"""What stands where in `results.json`, format 1, and that it is checked when read."""
+"""What stands where in `results.json`, format 2, and that it is checked when read."""
 
 from __future__ import annotations
 
@@ -11,7 +11,14 @@ from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whol
 TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
 PERHAPS = (int, float, NoneType)
 INTERVAL: Shape = {"value": PERHAPS, "low": PERHAPS, "high": PERHAPS}
-TASK: Shape = {"environment": TEXT, "model": TEXT, "model_sha256": TEXT, "why": TEXT}
+TASK: Shape = {
+    "environment": TEXT,
+    "model": TEXT,
+    "model_sha256": TEXT,
+    "why": TEXT,
+    "on": TEXT,
+    "ship": TEXT,
+}
 CONTESTANT: Shape = {  # files: SHA-256 by path; refused: why, by task
     "source": (str, NoneType), "files": {ANY_KEY: TEXT}, "runs": COUNT, "refused": {ANY_KEY: TEXT},
 }  # fmt: skip
@@ -21,16 +28,17 @@ FOUND: Shape = {
     "policy_sha256": [(str, NoneType)], "microseconds_per_action": PERHAPS,
     "metrics": {ANY_KEY: {"mean": PERHAPS, "median": PERHAPS, "p95": PERHAPS}},
 }  # fmt: skip
-RANKED: Shape = {
-    "name": TEXT, "score": INTERVAL, "relative_cost": PERHAPS, "tasks": COUNT, "lost": COUNT, "failed": COUNT,
+ENTRY: dict[str, Shape] = {
+    "score": INTERVAL, "relative_cost": PERHAPS, "tasks": COUNT, "lost": COUNT, "failed": COUNT,
 }  # fmt: skip
+RANKED: Shape = {"name": TEXT, **ENTRY, "elsewhere": {ANY_KEY: ENTRY}}  # the last by set of episodes
 SHAPE: dict[str, Shape] = {
     "versions": {ANY_KEY: TEXT},  # and the processor: bit for bit on equal ones only
     "suite": {"name": TEXT, "sha256": TEXT, "tasks": {ANY_KEY: TASK}},
     "seeds": {"first": COUNT, "count": COUNT},
     "contestants": {ANY_KEY: CONTESTANT},
     "tasks": {ANY_KEY: {ANY_KEY: FOUND}},  # by task and contestant
-    "reference": {ANY_KEY: {"pid": NUMBER, "oracle": NUMBER}},  # costs that are scores of 0 and 1, by task
+    "reference": {ANY_KEY: {"zero": NUMBER, "best": NUMBER}},  # costs that are scores of 0 and 1, by task
     "ranking": [RANKED],  # best first
     "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},  # probability that one costs less than another
     "profile": {"thresholds": [NUMBER], "shares": {ANY_KEY: [NUMBER]}},

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.benchmarking.contestants import ORACLE, Contestant, check_agents, contestants, policy_hash
+from agents.benchmarking.contestants import BEST_KNOWN, Contestant, check_agents, contestants, policy_hash
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
 from agents.engines.jobs import check_engine, run_jobs
 from agents.output import in_use
 from agents.rollouts.metrics import evaluate
-from agents.suites.reference import oracle_costs
+from agents.suites.reference import best_costs
 from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
 from shipgym.checks import ANY_KEY, Shape, check_number, check_shape, check_whole
 from shipgym.errors import InputError
@@ -79,7 +79,7 @@ def benchmark(
     check_engine(engine, workers, address)
     for one in who:
         check_agents(one, chosen)
-    folder = None if out is None else check_new(Path(out), resume)
+    folder = None if out is None else check_new(Path(out), resume, suite)
     jobs = [job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
     with nullcontext() if folder is None else in_use(folder):
         found = run_jobs(
@@ -118,7 +118,7 @@ def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]
 
 
 def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...]:
-    """Tasks of a suite by name, each once."""
+    """Tasks of a suite by name, each once; the name of a task with a ship is that of all its sets."""
     found = load_suite(suite)
     if names is None:
         return found.tasks
@@ -126,7 +126,10 @@ def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...
         names = [name.strip() for name in names.split(",")]
     if not names:
         raise InputError("tasks: none found, expected at least one")
-    return tuple(found.task(name) for name in dict.fromkeys(names))
+    sets = [
+        [task for task in found.tasks if one in (task.base, task.name)] or [found.task(one)] for one in names
+    ]
+    return tuple({task.name: task for tasks in sets for task in tasks}.values())
 
 
 def job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
@@ -155,8 +158,8 @@ def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) 
     `episodes` (arrays by name), `failure`, `seconds_per_action` and `policy_sha256`.
     """
     try:
-        if one.source == ORACLE:
-            costs = oracle_costs(task, suite)[:episodes]
+        if one.source == BEST_KNOWN:
+            costs = best_costs(task, suite)[:episodes]
             return {"refused": "", "runs": [_run({"cost": costs}, "", np.nan, None)]}
         policies = one.policies(task, suite)
     except InputError as error:

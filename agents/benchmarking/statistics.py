@@ -1,8 +1,8 @@
 """Statistics of scores: rliable's, with the episodes as a second source of chance.
 
-A score is the share of the way from the best constant-gain PID (0) to the oracle (1). Costs of episodes have
-the shape (n_runs, n_episodes), runs being training runs of a learned agent; a controller that is not trained
-has one. `task` and `who` are the numbers of a task and of a contestant.
+A score is the share of the way from wheel-over designed on the model (0) to the best known cost (1). Costs of
+episodes have the shape (n_runs, n_episodes), runs being training runs of a learned agent; a controller that
+is not trained has one. `task` and `who` are the numbers of a task and of a contestant.
 
 The bootstrap is stratified: in every task runs and, within them, episodes are drawn with replacement.
 All contestants get the same draws of episodes, because all sailed the same ones: differences are paired.
@@ -123,13 +123,10 @@ def weighted_interquartile_mean(values: Floats, weights: NDArray[np.int64]) -> F
     return found
 
 
-def score(cost: ArrayLike, pid: ArrayLike, oracle: ArrayLike) -> Floats:
-    """Share of the way from the best constant-gain PID, 0, to the oracle, 1.
-
-    NaN where they do not differ, or the oracle is the worse.
-    """
-    zero = np.asarray(pid, dtype=np.float64)
-    way, made = zero - np.asarray(oracle, dtype=np.float64), zero - np.asarray(cost, dtype=np.float64)
+def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
+    """Share of the way from wheel-over designed on the model, 0, to the best known cost, 1; NaN if none."""
+    start = np.asarray(zero, dtype=np.float64)
+    way, made = start - np.asarray(best, dtype=np.float64), start - np.asarray(cost, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
         share: Floats = np.where(way > 0.0, made / way, np.nan)
     return share
@@ -144,13 +141,12 @@ def aggregate_score(
 ) -> Interval:
     """Interquartile mean of the scores of all runs and tasks.
 
-    `costs`: of each task, shape (n_runs, n_episodes); `references`: costs of the best constant-gain PID and
-    of the oracle in each task.
+    `costs`: of each task, shape (n_runs, n_episodes); `references`: costs that are 0 and 1 in each task.
     """
     found, drawn = [], []
-    for task, cost, (pid, oracle) in zip(tasks, costs, references, strict=True):
-        found.append(score(cost.mean(axis=1), pid, oracle))
-        drawn.append(score(draws.means(cost, task, who), pid, oracle))
+    for task, cost, known in zip(tasks, costs, references, strict=True):
+        found.append(score(cost.mean(axis=1), *known))
+        drawn.append(score(draws.means(cost, task, who), *known))
     value = float(interquartile_mean(np.concatenate(found)))
     return interval(value, interquartile_mean(np.concatenate(drawn, axis=1), axis=1))
 

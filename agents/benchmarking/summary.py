@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.benchmarking.contestants import ORACLE
+from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.statistics import (
     Draws,
     Interval,
@@ -21,7 +21,7 @@ from agents.benchmarking.statistics import (
     score,
 )
 from agents.suites.reference import reference_costs
-from agents.suites.suite import N_EPISODES
+from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
 
 Floats = NDArray[np.float64]
 #: By contestant and task what `agents.benchmarking.run.results_of` answers.
@@ -31,11 +31,14 @@ THRESHOLDS = np.linspace(-1.0, 1.5, 51)  # scores of the performance profile
 NOTHING: dict[str, float | None] = {"value": None, "low": None, "high": None}
 
 
-def summary_of(suite: str, tasks: Sequence[str], names: Sequence[str], done: Done) -> dict[str, Any]:
+def summary_of(
+    suite: str, tasks: Sequence[BenchmarkTask], names: Sequence[str], done: Done
+) -> dict[str, Any]:
     """The fields `tasks`, `reference`, `ranking`, `improvement` and `profile` of the results.
 
-    `suite`: its name; `tasks`, `names`: of the tasks that were run, and of the contestants; `done`: see
-    `agents.benchmarking.run.results_of`.
+    `suite`: its name; `tasks`: those that were run; `names`: of the contestants; `done`: see
+    `agents.benchmarking.run.results_of`. Ranking, improvements and profiles are of the episodes on the ship;
+    what each contestant came to on the model and far from the design stands beside its place, `elsewhere`.
     """
     return _Summary(suite, tasks, names, done).fields()
 
@@ -43,18 +46,20 @@ def summary_of(suite: str, tasks: Sequence[str], names: Sequence[str], done: Don
 class _Summary:
     """Costs of everybody in all tasks, and the draws of the bootstrap that are common to them."""
 
-    def __init__(self, suite: str, tasks: Sequence[str], names: Sequence[str], done: Done) -> None:
-        self.tasks, self.names, self.done = list(tasks), list(names), done
+    def __init__(self, suite: str, tasks: Sequence[BenchmarkTask], names: Sequence[str], done: Done) -> None:
+        self.tasks, self.names, self.done = [task.name for task in tasks], list(names), done
+        #: Numbers of the tasks of each set of episodes.
+        self.sets = {on: [k for k, task in enumerate(tasks) if task.on == on] for on in SETS}
         #: By numbers of contestant and task, each of shape (n_runs, n_episodes).
         self.costs: dict[tuple[int, int], Floats] = {
             (who, k): np.stack([run["episodes"]["cost"] for run in done[name, task]["runs"]])
             for who, name in enumerate(names)
-            for k, task in enumerate(tasks)
+            for k, task in enumerate(self.tasks)
             if done[name, task]["runs"]
         }
         n_episodes = next((cost.shape[1] for cost in self.costs.values()), 1)
         known = reference_costs(suite) if n_episodes == N_EPISODES else {}  # which are of all scored episodes
-        self.reference = {k: known[task] for k, task in enumerate(tasks) if task in known}
+        self.reference = {k: known[task] for k, task in enumerate(self.tasks) if task in known}
         self.draws = Draws(len(tasks), n_episodes)
 
     def fields(self) -> dict[str, Any]:
@@ -63,7 +68,7 @@ class _Summary:
         return {
             "tasks": by_task,
             "reference": {
-                self.tasks[k]: {"pid": pid, "oracle": oracle} for k, (pid, oracle) in self.reference.items()
+                self.tasks[k]: {"zero": zero, "best": best} for k, (zero, best) in self.reference.items()
             },
             "ranking": self._ranking(by_task),
             "improvement": self._improvements(),
@@ -74,7 +79,8 @@ class _Summary:
         """What each contestant did in one task."""
         taking_part = {who: cost for (who, k), cost in self.costs.items() if k == number}
         lowest = min(
-            (cost.mean() for who, cost in taking_part.items() if self.names[who] != ORACLE), default=np.nan
+            (cost.mean() for who, cost in taking_part.items() if self.names[who] != BEST_KNOWN),
+            default=np.nan,
         )
         found = {}
         for who, cost in taking_part.items():
@@ -101,25 +107,33 @@ class _Summary:
 
         By score if every task has its references, else by the geometric mean of their costs over the lowest.
         """
-        entries = []
-        for who, name in enumerate(self.names):
-            part = [k for k in range(len(self.tasks)) if (who, k) in self.costs]
-            scored = [k for k in part if np.isfinite(score(0.0, *self.reference.get(k, (0.0, 0.0))))]
-            found = [by_task[self.tasks[k]][name] for k in part]
-            relative = [one["relative_cost"] for one in found if one["relative_cost"]]
-            entries.append(
-                {
-                    "name": name,
-                    "score": self._aggregate(who, scored),
-                    "scored_tasks": len(scored),
-                    "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
-                    "tasks": len(part),
-                    "lost": sum(one["lost"] for one in found),
-                    "failed": sum(one["failed"] for one in found),
-                }
-            )
-        by_score = len(self.reference) == len(self.tasks)
-        return sorted(entries, key=lambda entry: _place(entry, by_score))
+        found = [
+            {
+                "name": name,
+                **self._entry(who, "ship", by_task),
+                "elsewhere": {
+                    on: self._entry(who, on, by_task) for on in SETS if on != "ship" and self.sets[on]
+                },
+            }
+            for who, name in enumerate(self.names)
+        ]
+        by_score = all(k in self.reference for k in self.sets["ship"])
+        return sorted(found, key=lambda entry: _place(entry, by_score))
+
+    def _entry(self, who: int, on: str, by_task: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+        """What a contestant came to in the tasks of a set."""
+        part = [k for k in self.sets[on] if (who, k) in self.costs]
+        scored = [k for k in part if np.isfinite(score(0.0, *self.reference.get(k, (0.0, 0.0))))]
+        found = [by_task[self.tasks[k]][self.names[who]] for k in part]
+        relative = [one["relative_cost"] for one in found if one["relative_cost"]]
+        return {
+            "score": self._aggregate(who, scored),
+            "scored_tasks": len(scored),
+            "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
+            "tasks": len(part),
+            "lost": sum(one["lost"] for one in found),
+            "failed": sum(one["failed"] for one in found),
+        }
 
     def _aggregate(self, who: int, tasks: Sequence[int]) -> dict[str, float | None]:
         """Score over some tasks."""
@@ -130,7 +144,10 @@ class _Summary:
 
     def _improvements(self) -> dict[str, dict[str, Any]]:
         """Probability that one costs less than another, for all pairs."""
-        of = [{k: cost for (i, k), cost in self.costs.items() if i == who} for who in range(len(self.names))]
+        ship = self.sets["ship"]
+        of = [
+            {k: self.costs[who, k] for k in ship if (who, k) in self.costs} for who in range(len(self.names))
+        ]
         return {
             one: {
                 other: improvement(of[i], of[k], self.draws, (i, k)).to_dict()
@@ -147,7 +164,7 @@ class _Summary:
             scores = [
                 score(self.costs[who, k], *known).ravel()
                 for k, known in self.reference.items()
-                if (who, k) in self.costs
+                if (who, k) in self.costs and k in self.sets["ship"]
             ]
             every = np.concatenate([np.zeros(0), *scores])
             every = every[np.isfinite(every)]

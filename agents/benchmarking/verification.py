@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from agents.benchmarking.contestants import remade
-from agents.benchmarking.results import BenchmarkResult, load_results, versions
+from agents.benchmarking.results import REMEDY, BenchmarkResult, load_results, versions
 from agents.benchmarking.run import job_of, run_job
+from agents.benchmarking.submission import KIND, read_submission
 from agents.controllers.designs import CLASSICAL
 from agents.engines.jobs import run_jobs
 from agents.suites.suite import load_suite, suite_hash
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
+from shipgym.files import read_json
 
 N_SAMPLED = 8
 #: Largest relative difference of an episode's cost with another processor, other versions, or a learned
@@ -59,15 +61,16 @@ def verify(
 ) -> list[Check]:
     """Run a sample of a benchmark again and compare.
 
-    `path`: folder of the results, or their `results.json`. `sample`: pairs of a contestant and a task; all
-    their episodes are run, at most all pairs there are. `seed`: of the sample. `tolerance`: largest relative
-    difference of an episode's cost. By default 0, and 1e-6 for a learned policy or where processor or
-    versions differ from those the file was written with. `workers`: as in `benchmark`. `allow_code`:
-    functions, `module:function`, that may be run where the file names them; contestants of others, and of
-    files that are not those that took part, do not pass. Raises InputError if the files are broken, written
-    on another suite of the name, or hold nothing that can be run again: contestants given as objects.
+    `path`: folder of the results, their `results.json`, or a submission. `sample`: pairs of a contestant and
+    a task; all their episodes are run, at most all pairs there are. `seed`: of the sample. `tolerance`:
+    largest relative difference of an episode's cost. By default 0, and 1e-6 for a learned policy or where
+    processor or versions differ from those the file was written with. `workers`: as in `benchmark`.
+    `allow_code`: functions, `module:function`, that may be run where the file names them; contestants of
+    others, and of files that are not those that took part, do not pass. Raises InputError if the files are
+    broken, written on another suite of the name, or hold nothing that can be run again: contestants given as
+    objects.
     """
-    result = load_results(path)
+    result = _read(Path(path))
     check_whole(sample, "sample", at_least=1)
     if tolerance is not None:
         check_number(tolerance, "tolerance", at_least=0.0)
@@ -89,6 +92,16 @@ def verify(
     for (name, task), again in zip(jobs, found, strict=True):
         checks[name, task] = _compared(result, name, task, again, tolerance)
     return list(checks.values())
+
+
+def _read(path: Path) -> BenchmarkResult:
+    """Results of a folder, or a submission."""
+    if (
+        path.is_file()
+        and (content := read_json(path, "file of benchmark results", REMEDY)).get("kind") == KIND
+    ):
+        return read_submission(content, str(path))
+    return load_results(path)
 
 
 def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str, str]]:
@@ -135,6 +148,7 @@ def _compared(
         np.array_equal(run["episodes"][figure], result.figures(name, task, figure)[k], equal_nan=True)
         for k, run in enumerate(again["runs"])
         for figure in run["episodes"]
+        if figure in result.episodes
     )
     difference = float(np.max(np.abs(costs - cost) / np.maximum(np.abs(cost), 1e-12)))
     if not exact and difference == 0.0:  # of another figure than the cost

@@ -38,7 +38,16 @@ Page = Annotated[
 ]
 Results = Annotated[
     Path | None,
-    typer.Option(metavar="RESULTS", help="Instead, run a sample of these results again and compare."),
+    typer.Option(
+        metavar="RESULTS",
+        help="Instead, run a sample of these results, or of a submission, again and compare.",
+    ),
+]
+Submit = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE", help="Also write the last contestant's costs as a submission, one JSON file."
+    ),
 ]
 Tolerance = Annotated[
     float | None,
@@ -64,6 +73,7 @@ def benchmark_command(
     resume: Resume = False,
     episodes: Episodes = 100,
     page: Page = True,
+    submit: Submit = None,
     verify: Results = None,
     sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
     tolerance: Tolerance = None,
@@ -80,6 +90,7 @@ def benchmark_command(
     if allow_code or tolerance is not None:
         fail("--allow-code and --tolerance are for --verify alone, leave them out", 2)
     from agents.benchmarking.run import benchmark
+    from agents.benchmarking.submission import submit as write_submission
     from agents.cli.terminal import progress_bars
     from agents.controllers.designs import CLASSICAL
 
@@ -93,6 +104,8 @@ def benchmark_command(
                 None if tasks is None else tasks.split(","), out, workers, engine, progress,
                 address=address, resume=resume, episodes=episodes,
             )  # fmt: skip
+            if submit is not None:
+                write_submission(result, list(result.summary["contestants"])[-1], submit)
             _remove_page(out)  # of other results, where these were gone on with
             if page:
                 _write_page(result, out, workers, progress)

@@ -31,7 +31,7 @@ def ranking_table(result: BenchmarkResult) -> Table:
         times = [
             by_name[name]["microseconds_per_action"]
             for by_name in summary["tasks"].values()
-            if name in by_name and by_name[name]["microseconds_per_action"] is not None  # the oracle has none
+            if name in by_name and by_name[name]["microseconds_per_action"] is not None  # best known
         ]
         failed = entry["failed"]
         table.add_row(

@@ -112,13 +112,15 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
-    #: What it observes, and names of its gains where they are not those of `feedback`.
+    #: What it observes, also in other tasks, and names of its gains where not those of `feedback`.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
+    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it reads of the ship beside her heading, where that does not follow from `feedback`.
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
+    has_ship: ClassVar[bool] = False  # whether the file holds its design model, its `ship`, too
     #: Arrays that the file holds beside the gains: names of fields, and their axes: a length, or its name.
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {}
     #: What it needs of `design`, with its range; also ranges of gains that are not any number.

@@ -13,6 +13,7 @@ Format 1:
     margins              {name: value or null for no limit}
     design               {name: value}: how it was designed
     autopilot            a controller of this format; only of guidance
+    ship                 the design model (`shipgym.ships.model_file`); only of guidance that simulates it
     arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
 """
 
@@ -40,6 +41,7 @@ from shipgym.checks import (
     shown,
 )
 from shipgym.errors import InputError
+from shipgym.ships import ShipModel
 
 REMEDY = "design the controller again or take another copy"
 RUDDER, ANY = Range(-np.pi, np.pi), Range(-np.inf, np.inf)  # rad; any finite number
@@ -47,7 +49,7 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-MORE_FIELDS = ("arrays", "autopilot")  # of kinds that have any
+MORE_FIELDS = ("arrays", "autopilot", "ship")  # of kinds that have any
 POLICIES = ("learned", "shielded")  # whose files are described in `agents.policies.policy_file`
 
 
@@ -65,19 +67,23 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     check_keys(content, (*FIELDS, *MORE_FIELDS), where)
     _check_all_there(content, FIELDS, where)
     design = controller_class(content["kind"])
-    has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot}
+    has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot, "ship": design.has_ship}
     expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
     check_keys(content, expected, where)
     _check_all_there(content, expected, where)
     model = check_table(content["model"], f"{where}: model")
     check_keys(model, ("name", "sha256"), f"{where}: model")
-    _check_observations(content["observation_names"], design.observes, where)
+    given = content["observation_names"]
+    names = next((some for some in design.alternatives if list(some) == given), design.observes)
+    _check_observations(given, names, where)
     more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
     if design.has_autopilot:
         at = f"{where}: autopilot"
         more["autopilot"] = read_controller(check_table(content["autopilot"], at), at)
         if more["autopilot"].has_autopilot:
             raise InputError(f"{at}: '{more['autopilot'].kind}' found, expected one that keeps a heading")
+    if design.has_ship:
+        more["ship"] = ShipModel.from_dict(check_table(content["ship"], f"{where}: ship"), f"{where}: ship")
     gains = dict.fromkeys(design.gain_names or tuple(design.feedback), NUMBERS)
     needed = {name: one for name, one in design.ranges.items() if name not in gains}
     of_gains = {name: design.ranges.get(name, one) for name, one in gains.items()}
@@ -87,11 +93,11 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
             neutral_rudder=_number(content["neutral_rudder"], RUDDER, f"{where}: neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], NUMBERS, f"{where}: neutral_sway"),
             margins=_margins(content["margins"], f"{where}: margins"),
-            observation_scales=read_scales(content["observation_scales"], design.observes, where),
+            observation_scales=read_scales(content["observation_scales"], names, where),
             model_name=check_text(model.get("name"), f"{where}: model.name"),
             model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
             design=_design(content["design"], needed, f"{where}: design"),
-            observation_names=design.observes,
+            observation_names=names,
             **more,
         )
 

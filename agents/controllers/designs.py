@@ -17,9 +17,9 @@ from shipgym.ships import ShipModel
 
 CLASSICAL = BUILT_IN  # in an order in which those come first that others build on
 #: Of these, no bases for policies unless asked for by name, being slow: MPC, which needs an extra too, solves
-#: for one ship after another, and adaptive LQ estimates while the policy learns; an action takes them 64 and
-#: 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
-NO_BASES = ("mpc", "lq-adaptive")
+#: for one ship after another, preview MPC simulates, and adaptive LQ estimates while the policy learns; an
+#: action takes MPC and adaptive LQ 64 and 3 us where LQG needs 0.8 (mariner-rough, 256 ships).
+NO_BASES = ("mpc", "lq-adaptive", "preview-mpc")
 INNER = "lq_"  # before settings of the LQ that a guidance law leads
 
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from agents.controllers.controller import NUMBERS, Action, Controller, Policy, Range
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Floats, begun, checked_observation
+from agents.controllers.memory import Floats, begun, checked_observation, heading_error
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -43,14 +43,107 @@ class Guided(Controller):
     """
 
     observes: ClassVar[tuple[str, ...]] = (*OBSERVATION_NAMES, "cross_track")
-    gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead", "integral")
+    gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead")
     has_autopilot: ClassVar[bool] = True
+    remembers: ClassVar[int] = 1  # numbers of each ship, beside the integral of the heading error
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges, "lookahead": Range(1e-6, NUMBERS.largest),
-        "task_lookahead": Range(1e-6, NUMBERS.largest), "integral": Range(0.0, NUMBERS.largest),
+        **Controller.ranges, **dict.fromkeys(gain_names, Range(1e-6, NUMBERS.largest))
     }  # fmt: skip
 
     autopilot: Policy  # steers by the first eight observations, those of course keeping
+
+    @classmethod
+    def leading(
+        cls, model: ShipModel, autopilot: Policy | None, task: Task, gains: Mapping[str, float],
+        design: Mapping[str, float],
+    ) -> Self:  # fmt: skip
+        """The guidance with these gains, SI units, of an autopilot, by default LQ, along a task's paths.
+
+        `design`: how they were found. Raises InputError if the autopilot was designed for another ship.
+        """
+        dt = task.interval(model)
+        pilot = LQ.from_model(model, dt=dt) if autopilot is None else autopilot
+        known = isinstance(pilot, Controller)
+        like = pilot if isinstance(pilot, Controller) else LQ.from_model(model, dt=dt)
+        like.check_fits_model(model)
+        scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
+        names = next((some for some in cls.alternatives if scales.keys() >= {*some}), cls.observes)
+        return cls(
+            gains={**gains, "task_lookahead": task.lookahead * model.particulars["length"]},
+            neutral_rudder=like.neutral_rudder,
+            neutral_sway=like.neutral_sway,
+            margins=like.margins if known else Margins(np.inf, np.inf, np.inf, np.inf),
+            observation_scales=tuple(scales[name] for name in names),
+            model_name=like.model_name,
+            model_sha256=like.model_sha256,
+            design={"dt": dt, **design},
+            observation_names=names,
+            autopilot=pilot,
+            **({"ship": model} if cls.has_ship else {}),
+        )
+
+    @abstractmethod
+    def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
+        """Course to steer against that of the leg, and what is remembered of it next.
+
+        `seen`: what is observed, and the `heading_error`, SI units, each of shape (n,); `memory`: zeros where
+        an episode begins, shape (n, remembers). Returns `course`: rad, shape (n,); `memory`.
+        """
+
+    def predict(
+        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
+    ) -> tuple[Action, Any]:
+        """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
+        given = checked_observation(observation, self.observation_names).copy()
+        own, inner = (None, None) if state is None else state
+        memory, begins = begun(own, episode_start, given.shape[:-1], self.remembers + 1)
+        first = (given[..., : len(self.observation_names)] * self.observation_scales).T
+        seen = dict(zip(self.observation_names, first, strict=True))
+        seen["heading_error"] = heading_error(seen)
+        wanted, kept = self.course(seen, memory[..., :-1])
+        shown = -np.arctan2(seen["cross_track"], self.gains["task_lookahead"])
+        error = wrapped(seen["heading_error"] + wanted - shown)
+        reach = self.observation_scales[N_HEADING - 1]
+        gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
+        integral = np.clip(memory[..., -1] + gathered, -reach, reach)
+        helm = given[..., :N_HEADING]
+        helm[..., 0], helm[..., 1], helm[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
+        starts = None if inner is None else np.atleast_1d(begins)
+        action, inner = self.autopilot.predict(helm.astype(np.float32), inner, starts, deterministic)
+        return action, (np.concatenate([kept, integral[..., None]], axis=-1), inner)
+
+    def loop(self) -> Compensator:
+        """Of the heading autopilot: guidance is slower by far."""
+        return self._heading_autopilot("its margins").loop()
+
+    def check_fits_model(self, model: ShipModel) -> None:
+        """Refuse a ship that the autopilot was not designed for."""
+        if isinstance(self.autopilot, Controller):
+            self.autopilot.check_fits_model(model)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the file holds, of guidance and autopilot."""
+        return {**super().to_dict(), "autopilot": self._heading_autopilot("a file").to_dict()}
+
+    def _heading_autopilot(self, what: str) -> Controller:
+        if not isinstance(self.autopilot, Controller):
+            raise InputError(
+                f"autopilot: {type(self.autopilot).__name__} found, expected a controller of shipgym "
+                f"for {what}"
+            )
+        return self.autopilot
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LineOfSight(Guided):
+    """Steer for the point of the leg that lies the lookahead ahead (Fossen 2011, 10.3.2).
+
+    A steady current sets the ship off the path.
+    """
+
+    kind: ClassVar[str] = "los"
+    gain_names: ClassVar[tuple[str, ...]] = (*Guided.gain_names, "integral")
+    ranges: ClassVar[Mapping[str, Range]] = {**Guided.ranges, "integral": Range(0.0, NUMBERS.largest)}
 
     @classmethod
     def from_model(
@@ -92,115 +185,44 @@ class Guided(Controller):
         if integral_lengths is None:
             integral_lengths = CRITICAL * lookahead_lengths
         check_number(integral_lengths, "integral_lengths", above=0.0)
-        pilot = LQ.from_model(model, dt=asked.interval(model)) if autopilot is None else autopilot
-        known = isinstance(pilot, Controller)
-        like = pilot if isinstance(pilot, Controller) else LQ.from_model(model, dt=asked.interval(model))
-        like.check_fits_model(model)
-        scales = {quantity.name: quantity.scale for quantity in asked.observed(model)}
-        return cls(
-            gains={
-                "lookahead": lookahead_lengths * length,
-                "task_lookahead": asked.lookahead * length,
-                "integral": 1.0 / (integral_lengths * length_time(model)),
-            },
-            neutral_rudder=like.neutral_rudder,
-            neutral_sway=like.neutral_sway,
-            margins=like.margins if known else Margins(np.inf, np.inf, np.inf, np.inf),
-            observation_scales=tuple(scales[name] for name in cls.observes),
-            model_name=like.model_name,
-            model_sha256=like.model_sha256,
-            design={"dt": asked.interval(model), "integral_lengths": float(integral_lengths)},
-            observation_names=cls.observes,
-            autopilot=pilot,
-        )
+        gains = {
+            "lookahead": lookahead_lengths * length,
+            "integral": 1.0 / (integral_lengths * length_time(model)),
+        }
+        return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral_lengths)})
 
-    @abstractmethod
-    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
-        """Course to steer against that of the leg, and what is remembered of the drift next.
-
-        `cross_track`: m, positive to starboard of the leg, shape (n,); `drift`: what was remembered, shape
-        (n,). Returns `course`: rad, shape (n,); `drift`: shape (n,).
-        """
-
-    def predict(
-        self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
-    ) -> tuple[Action, Any]:
-        """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
-        given = checked_observation(observation, self.observes).copy()
-        own, inner = (None, None) if state is None else state
-        memory, begins = begun(own, episode_start, given.shape[:-1], 2)
-        cross = given[..., N_HEADING] * self.observation_scales[N_HEADING]
-        wanted, drift = self.course(cross, memory[..., 0])
-        shown = -np.arctan2(cross, self.gains["task_lookahead"])
-        error = wrapped(np.arctan2(given[..., 0], given[..., 1]) + wanted - shown)
-        reach = self.observation_scales[N_HEADING - 1]
-        gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
-        integral = np.clip(memory[..., 1] + gathered, -reach, reach)
-        seen = given[..., :N_HEADING]
-        seen[..., 0], seen[..., 1], seen[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
-        starts = None if inner is None else np.atleast_1d(begins)
-        action, inner = self.autopilot.predict(seen.astype(np.float32), inner, starts, deterministic)
-        return action, (np.stack([drift, integral], axis=-1), inner)
-
-    def loop(self) -> Compensator:
-        """Of the heading autopilot: guidance is slower by far."""
-        return self._heading_autopilot("its margins").loop()
-
-    def check_fits_model(self, model: ShipModel) -> None:
-        """Refuse a ship that the autopilot was not designed for."""
-        if isinstance(self.autopilot, Controller):
-            self.autopilot.check_fits_model(model)
-
-    def to_dict(self) -> dict[str, Any]:
-        """What the file holds, of guidance and autopilot."""
-        return {**super().to_dict(), "autopilot": self._heading_autopilot("a file").to_dict()}
-
-    def _heading_autopilot(self, what: str) -> Controller:
-        if not isinstance(self.autopilot, Controller):
-            raise InputError(
-                f"autopilot: {type(self.autopilot).__name__} found, expected a controller of shipgym "
-                f"for {what}"
-            )
-        return self.autopilot
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class LineOfSight(Guided):
-    """Steer for the point of the leg that lies the lookahead ahead (Fossen 2011, 10.3.2).
-
-    A steady current sets the ship off the path.
-    """
-
-    kind: ClassVar[str] = "los"
-
-    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+    def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
         """See `Guided.course`; nothing is remembered."""
-        course: Floats = -np.arctan2(cross_track, self.gains["lookahead"])
-        return course, drift
+        course: Floats = -np.arctan2(seen["cross_track"], self.gains["lookahead"])
+        return course, memory
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class IntegralLineOfSight(Guided):
+class IntegralLineOfSight(LineOfSight):
     """Line of sight with an integral of the cross-track error, which ends at 0 in a steady current."""
 
     kind: ClassVar[str] = "ilos"
 
-    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+    def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
         """See `Guided.course`; the integral is remembered, m."""
-        zero = np.zeros_like(cross_track)
-        where = PathPosition(along=zero, cross_track=cross_track, course=zero, to_go=zero)
+        zero = np.zeros_like(seen["cross_track"])
+        where = PathPosition(along=zero, cross_track=seen["cross_track"], course=zero, to_go=zero)
         gain, dt = self.gains["integral"], self.design["dt"]
-        return integral_line_of_sight(where, self.gains["lookahead"], drift, gain, dt)
+        drift = memory[..., 0]
+        course, drift = integral_line_of_sight(where, self.gains["lookahead"], drift, gain, dt)
+        return course, drift[..., None]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AdaptiveLineOfSight(Guided):
+class AdaptiveLineOfSight(LineOfSight):
     """Line of sight less an estimate of the crab angle (Fossen 2023), which a steady current brings to 0."""
 
     kind: ClassVar[str] = "alos"
 
-    def course(self, cross_track: Floats, drift: Floats) -> tuple[Floats, Floats]:
+    def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
         """See `Guided.course`; the estimated crab angle is remembered, rad."""
-        lookahead = self.gains["lookahead"]
+        lookahead, cross_track = self.gains["lookahead"], seen["cross_track"]
         rate = self.gains["integral"] * cross_track / np.hypot(lookahead, cross_track)
-        return -drift - np.arctan2(cross_track, lookahead), drift + self.design["dt"] * rate
+        drift = memory[..., 0]
+        course: Floats = -drift - np.arctan2(cross_track, lookahead)
+        return course, (drift + self.design["dt"] * rate)[..., None]

@@ -20,6 +20,8 @@ _HOMES = {
     "los": "agents.controllers.los_autopilot:LineOfSight",
     "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
     "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
+    "wheel-over": "agents.controllers.wheel_over:WheelOver",
+    "preview-mpc": "agents.controllers.preview_mpc:PreviewMPC",
 }
 #: Controllers of this package, imported when they are first used.
 BUILT_IN = tuple(_HOMES)

@@ -141,7 +141,7 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
         policy = _shielded(inner, tensors, f"{prefix}policy.", at)
     else:
         policy = read_controller(inner, at)
-    limits = _table(content["limits"], "limits", where)
+    limits = {"turn_lengths": 0.0, **_table(content["limits"], "limits", where)}  # older files have none
     known = [one.name for one in fields(Limits)]
     check_keys(limits, known, f"{where}: limits")
     numbers = {name: check_number(limits.get(name), f"{where}: limits.{name}") for name in known}

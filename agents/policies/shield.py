@@ -7,7 +7,8 @@ It uses observations alone and takes over
   limit);
 * where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
   towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
-  count, however large;
+  count, however large, and within `Limits.turn_lengths` of a planned turn that is observed any heading up to
+  the course beyond it is on course;
 * where the policy's command is not a number.
 
 It hands back after the ship has been within `Limits.back_deg` of her course and within
@@ -27,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import FORMAT, Action, Controller, Policy
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Flags, Floats, begun
+from agents.controllers.memory import Flags, Floats, begun, heading_error
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
@@ -38,6 +39,7 @@ from shipgym.tasks.task import OBSERVATION_NAMES, control_interval
 # what is remembered of each ship
 STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)
 N_WATCHED = 7
+TURNS = (("turn_distance", "turn_angle"), ("next_turn_distance", "next_turn_angle"))  # as tasks name them
 
 
 @dataclass(frozen=True)
@@ -54,6 +56,7 @@ class Limits:
     runaway_deg: float = 10.0  # how far the ship may turn away from her course, degrees
     back_deg: float = 5.0  # heading error within which it may hand back, degrees
     calm_lengths: float = 1.0  # how long both must hold before it does, in times to travel one ship length
+    turn_lengths: float = 8.0  # before a planned turn at which it may begin, ship lengths; 0: it is not known
 
     def __post_init__(self) -> None:
         check_number(self.envelope_out, "limits.envelope_out", at_least=1.0)
@@ -64,7 +67,8 @@ class Limits:
         check_number(self.runaway_deg, "limits.runaway_deg", above=0.0, at_most=180.0)
         check_number(self.back_deg, "limits.back_deg", above=0.0, below=self.runaway_deg, hint=hint)
         check_number(self.out_lengths, "limits.out_lengths", at_least=0.0)
-        check_number(self.calm_lengths, "limits.calm_lengths", at_least=0.0)
+        for name in ("calm_lengths", "turn_lengths"):
+            check_number(getattr(self, name), f"limits.{name}", at_least=0.0)
 
 
 class ShieldState(NamedTuple):
@@ -202,7 +206,9 @@ class Shielded:
         limits, n = self.limits, len(OBSERVATION_NAMES)
         si = observation[..., :n].astype(np.float64) * self.fallback.observation_scales[:n]
         seen = dict(zip(OBSERVATION_NAMES, np.moveaxis(si, -1, 0), strict=True))
-        error = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+        error = heading_error(seen)
+        turn = self._planned_turn(observation)
+        error = error - np.clip(error, np.minimum(-turn, 0.0), np.maximum(-turn, 0.0))
         near = np.abs(error) <= np.radians(limits.back_deg)
         turn = 0.5 * self.dt * (seen["yaw_rate"] + watch[..., LAST_RATE])
         watch[..., LAST_RATE] = seen["yaw_rate"]
@@ -222,6 +228,17 @@ class Shielded:
         watch[..., STEERED] = now
         watch[..., COUNT] += now & ~steered
         watch[..., INTERVALS] += now
+
+    def _planned_turn(self, observation: NDArray[Any]) -> Any:
+        """Angle of a turn that may begin, rad; 0 where none is near or none is observed."""
+        names, scales = self.observation_names, self.observation_scales
+        which = next((one for one in TURNS if {*one} <= {*names}), None)
+        if which is None:
+            return 0.0
+        at = [names.index(name) for name in which]
+        distance, angle = (observation[..., k].astype(np.float64) * scales[k] for k in at)
+        length = scales[names.index("surge")] / scales[names.index("yaw_rate")]
+        return np.where(distance <= self.limits.turn_lengths * length, angle, 0.0)
 
     def _intervals(self, lengths: float) -> float:
         """Control intervals in times to travel one ship length; one at least."""

@@ -1,10 +1,12 @@
-"""What is kept with a suite: costs that scores refer to, and settings found for its classical controllers.
+"""What is kept with a suite: the best known costs, and settings found for its classical controllers.
 
-Files of `agents/suites`, which take hours to make (`scripts/tune_controllers.py`, `scripts/oracle.py`):
+Files of `agents/suites`:
 
-    SUITE-reference.json    by task: cost of the best constant-gain PID and of the oracle, `pid` and `oracle`
-    SUITE-oracle.json       by task: the oracle's cost of each scored episode, in the order of the seeds
-    SUITE-tuned.json        tasks: by task and controller `settings`, `cost`, `start_cost`, `evaluations`
+    SUITE-best.json     by task: `zero`, mean cost of wheel-over designed on the model; of each scored
+                        episode the lowest cost that anything reached, `costs`, and by what, `by`
+                        (`scripts/best_known.py`)
+    SUITE-tuned.json    tasks: by task and controller `settings`, `cost`, `start_cost`, `evaluations`
+                        (`scripts/tune_controllers.py`)
 """
 
 from __future__ import annotations
@@ -15,48 +17,48 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.suites.suite import N_EPISODES, BenchmarkTask, suite_file
-from shipgym.checks import check_number, check_table
+from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
 from shipgym.errors import InputError
 from shipgym.files import read_json
 
-REMEDY = "take another copy"
+BEST: Shape = {ANY_KEY: {"zero": (int, float), "costs": [(int, float)], "by": [(str,)]}}
+
+
+def best_known(suite: str) -> dict[str, dict[str, Any]]:
+    """The best known costs by task, as in the file; empty where the suite has no such file.
+
+    Raises InputError naming the field of the file at fault.
+    """
+    path = suite_file(suite, "best")
+    if not path.exists():
+        return {}
+    found = read_json(path, "file of best known costs", "take another copy")
+    check_shape(found, BEST, str(path))
+    for task, one in found.items():
+        if not len(one["costs"]) == len(one["by"]) == N_EPISODES:
+            raise InputError(f"{path}: {task}: expected costs of {N_EPISODES} episodes, and by what")
+    return dict(found)
 
 
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
-    """Costs that are scores of 0 and 1, by task: of the best constant-gain PID and of the oracle.
-
-    Empty where the suite has no such file. Raises InputError naming the field of the file at fault.
-    """
-    path = suite_file(suite, "reference")
-    if not path.exists():
-        return {}
-    found = {}
-    for task, value in read_json(path, "file of reference costs", REMEDY).items():
-        costs = check_table(value, f"{path}: {task}")
-        pid, oracle = (check_number(costs.get(name), f"{path}: {task}.{name}") for name in ("pid", "oracle"))
-        found[task] = (pid, oracle)
-    return found
+    """Mean costs that are scores of 0 and 1, by task: wheel-over's from the model, and the best known."""
+    return {
+        task: (float(one["zero"]), float(np.mean(one["costs"]))) for task, one in best_known(suite).items()
+    }
 
 
-def oracle_costs(task: BenchmarkTask, suite: str) -> NDArray[np.float64]:
-    """The oracle's cost of each scored episode, shape (100,).
-
-    Raises InputError if there are none for this task, or the file is broken.
-    """
-    path = suite_file(suite, "oracle")
-    costs = read_json(path, "file of the suite", REMEDY).get(task.name) if path.exists() else None
-    if costs is None:
-        raise InputError(f"no costs of the oracle are kept for task '{task.name}' of suite '{suite}'")
-    if not isinstance(costs, list) or len(costs) != N_EPISODES:
-        raise InputError(f"{path}: {task.name}: expected a list of {N_EPISODES} costs; {REMEDY}")
-    return np.array([check_number(cost, f"{path}: {task.name}[{k}]") for k, cost in enumerate(costs)])
+def best_costs(task: BenchmarkTask, suite: str) -> NDArray[np.float64]:
+    """The best known cost of each scored episode, shape (100,); an InputError if there is none."""
+    known = best_known(suite)
+    if task.name not in known:
+        raise InputError(f"no best known costs are kept for task '{task.name}' of suite '{suite}'")
+    return np.array(known[task.name]["costs"], dtype=np.float64)
 
 
 def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
-    """Settings of the classical controllers found for each task by direct search.
+    """Settings of the classical controllers found for each task by direct search, by task and controller.
 
-    Returns them by task and controller, as in the file (format in the module's docstring). Raises InputError
-    if the suite has none, or the file is broken.
+    Raises InputError if the suite has none, or the file is broken.
     """
     path = suite_file(suite, "tuned")
     content = read_json(path, "file of tuned settings", "make it again with scripts/tune_controllers.py")

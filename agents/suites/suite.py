@@ -10,15 +10,20 @@ A suite is a TOML file of `agents/suites`:
     why = "sanity: ..."                     # what the task is there for
     sea = "rough"                           # optional: a sea state, or a table `[tasks.NAME.sea]` as weather
                                             # has it: current, wind, waves
+    ship = "mariner"                        # optional: the ship behind an identified model
     [tasks.mariner-calm.options]            # optional: any other keywords of the environment
     course_change_deg = 30.0
+    [tasks.mariner-calm.far]                # with a ship: keywords, and `gear`, far from the design
+
+A task with a ship is three (`SETS`): contestants are made for the model and evaluated on the ship, on the
+model, and on the ship far from what they were made for.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any
@@ -26,7 +31,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, did_you_mean, quoted
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_table,
+    check_text,
+    data_only,
+    did_you_mean,
+    placed,
+    quoted,
+)
 from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.ship_env import read_options
@@ -34,6 +48,7 @@ from shipgym.errors import InputError
 from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
+from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.task import Task
 
 #: Environments by their names in suites and on the command line: id, and task.
@@ -47,7 +62,9 @@ FIRST_SEED = 1_000_000
 N_EPISODES = 100
 DEFAULT_SUITE = "shipgym-v1"
 FOLDER = Path(__file__).parent
-FIELDS = ("environment", "model", "why", "sea", "options")
+FIELDS = ("environment", "model", "why", "sea", "options", "ship", "far")
+#: Sets of episodes of a task with a ship, and what their names end in.
+SETS: Mapping[str, str] = {"ship": "", "model": "-on-model", "far": "-far"}
 
 
 @dataclass(frozen=True)
@@ -59,10 +76,21 @@ class BenchmarkTask:
     model: str  # shipped model that is steered
     why: str = ""  # what the task is there for
     options: Mapping[str, Any] = field(default_factory=dict)  # keywords of the environment, `sea` among them
+    behind: str = ""  # shipped model of the ship that is steered, if not `model`; contestants are not told
+    far: Mapping[str, Any] = field(default_factory=dict)  # keywords that differ in the episodes, and `gear`
+    on: str = "ship"  # which of `SETS`
+    base: str = ""  # name of the task that contestants are made for, if another
 
     def __post_init__(self) -> None:
         check_choice(self.environment, ENVIRONMENTS, f"task '{self.name}': environment")
-        _ = self.parts
+        shown, steered = (task.observed(ship) for ship, task, _ in (self.parts, self.sailed))
+        for one, other in zip(shown, steered, strict=True):
+            if (one.name, one.scale) != (other.name, other.scale):
+                raise InputError(
+                    f"task '{self.name}': ship: '{one.name}' of '{self.behind}' is shown in units of "
+                    f"{other.scale:g}, of '{self.model}' in {one.scale:g}; expected a ship of the same "
+                    f"particulars"
+                )
 
     @property
     def env_id(self) -> str:
@@ -74,9 +102,25 @@ class BenchmarkTask:
         """Ship, task and domain randomisation of the environment."""
         return read_options(ENVIRONMENTS[self.environment][1], self.model, self.options)
 
+    @cached_property
+    def sailed(self) -> tuple[ShipModel, Task, Randomisation]:
+        """The same of its episodes, which contestants are evaluated in."""
+        if not (self.behind or self.far):
+            return self.parts
+        options = {name: value for name, value in {**self.options, **self.far}.items() if name != "gear"}
+        given = ENVIRONMENTS[self.environment][1], self.behind or self.model, options
+        ship, task, randomisation = read_options(*given)
+        gear = SteeringGear.from_mapping({**asdict(ship.steering), **self.far.get("gear", {})}, "far.gear")
+        return replace(ship, steering=gear), task, randomisation
+
+    @property
+    def handed_out(self) -> BenchmarkTask:
+        """What contestants are made for: the design model, without the ship."""
+        return replace(self, name=self.base or self.name, behind="", far={}, on="ship", base="")
+
     @property
     def ship(self) -> ShipModel:
-        """The ship that is steered."""
+        """The model that contestants are made for, steered itself if there is no ship behind it."""
         return self.parts[0]
 
     @property
@@ -90,8 +134,8 @@ class BenchmarkTask:
         return FIRST_SEED + np.arange(N_EPISODES)
 
     def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
-        """Many ships at once under this task, by default with its own ship."""
-        ship, task, randomisation = self.parts
+        """Many ships at once in its episodes, by default its own ship."""
+        ship, task, randomisation = self.sailed
         return Engine(ship if model is None else model, num_envs, task, randomisation, threads=threads)
 
 
@@ -155,8 +199,31 @@ def parse_suite(text: str, where: str) -> Suite:
     tasks = check_table(content.get("tasks"), f"{where}: tasks")
     return Suite(
         check_text(content.get("name"), f"{where}: name"),
-        tuple(_task(name, table, f"{where}: tasks.{name}") for name, table in tasks.items()),
+        tuple(task for name, table in tasks.items() for task in _sets(name, table, f"{where}: tasks.{name}")),
     )
+
+
+def _sets(name: str, value: Any, where: str) -> list[BenchmarkTask]:
+    """A task, and if it has a ship behind its model that on the model and that far from the design."""
+    task = _task(name, value, where)
+    if not task.behind:
+        return [replace(task, far={})]
+    far = _options(check_table(value.get("far", {}), f"{where}.far"), f"{where}.far")
+    changes: dict[str, dict[str, Any]] = {"ship": {}, "model": {"behind": ""}, "far": {"far": far}}
+    with placed(where):
+        return [
+            replace(task, name=name + SETS[on], on=on, base=name, **changes[on])
+            for on in SETS
+            if on != "far" or far
+        ]
+
+
+def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Keywords of an environment; a sea may be a table."""
+    options = dict(table)
+    if isinstance(options.get("sea"), Mapping):
+        options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
+    return options
 
 
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
@@ -165,11 +232,12 @@ def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     for needed in ("environment", "model"):
         check_text(table.get(needed), f"{where}.{needed}")
     data_only(table, where)
-    options = dict(check_table(table.get("options", {}), f"{where}.options"))
-    if "sea" in table:
-        sea = table["sea"]
-        options["sea"] = sea if isinstance(sea, str) else Weather.from_dict(sea, f"{where}.sea")
-    try:
-        return BenchmarkTask(name, table["environment"], table["model"], table.get("why", ""), options)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+    sea = {"sea": table["sea"]} if "sea" in table else {}
+    options = _options({**check_table(table.get("options", {}), f"{where}.options"), **sea}, where)
+    behind = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
+    if table.get("far") and not behind:
+        raise InputError(f"{where}.far: found without a ship, expected `ship`, the one behind the model")
+    with placed(where):
+        return BenchmarkTask(
+            name, table["environment"], table["model"], table.get("why", ""), options, behind
+        )

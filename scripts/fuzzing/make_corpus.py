@@ -101,7 +101,8 @@ def controllers(folder: Path) -> None:
     folder.joinpath("controller").mkdir()
     for kind in BUILT_IN:
         made: Any = controller_class(kind)
-        given = {"autopilot": agents.PID.from_model(SHIP)} if made.has_autopilot else {}
+        led = agents.LQ if made.has_ship else agents.PID
+        given = {"autopilot": led.from_model(SHIP)} if made.has_autopilot else {}
         made.from_model(SHIP, **given).save(folder / "controller" / f"{kind}.json")
 
 

@@ -12,6 +12,7 @@ from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
 from agents.controllers.designs import design
+from agents.suites.reference import reference_costs
 from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
@@ -168,16 +169,18 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
                 }
             }
         },
-        "oracle": {"mariner-calm": [float(k) for k in range(100)]},
-        "reference": {"mariner-calm": {"pid": 30.0, "oracle": 0.5}},
+        "best": {"mariner-calm": {"zero": 30.0, "costs": [float(k) for k in range(2)], "by": ["lq", "ppo"]}},
     }
     for name, content in kept.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
+    with pytest.raises(InputError, match=r"best\.json: mariner-calm: expected costs of 100 episodes"):
+        reference_costs("shipgym-v1")
     look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
     assert look.summary["reference"] == {}  # costs of all episodes say nothing of the first two
-    monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
-    result = benchmark("tuned-best,tuned-lq,tuned-mpc,oracle", tasks=TASKS, episodes=2)
+    for place in ("agents.benchmarking.summary", "agents.suites.reference"):
+        monkeypatch.setattr(f"{place}.N_EPISODES", 2)
+    result = benchmark("tuned-best,tuned-lq,tuned-mpc,best-known", tasks=TASKS, episodes=2)
     own = benchmark(
         {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}, tasks=TASKS, episodes=2
     )
@@ -188,11 +191,11 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
     refused = result.summary["contestants"]["tuned-mpc"]["refused"]["mariner-calm"]
     assert "no tuned settings of 'mpc'" in refused
     found = result.summary["tasks"]["mariner-calm"]
-    assert found["oracle"]["score"]["value"] == 1.0  # its first two costs are 0 and 1
+    assert found["best-known"]["score"]["value"] == 1.0  # its first two costs are 0 and 1
     cost = found["tuned-lq"]["cost"]["value"]
     assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
-    assert result.ranking == ["oracle", "tuned-best", "tuned-lq", "tuned-mpc"]
-    assert ranking_table(result).row_count == 4  # the oracle, which acts in no time, too
+    assert result.ranking == ["best-known", "tuned-best", "tuned-lq", "tuned-mpc"]
+    assert ranking_table(result).row_count == 4  # the best known, which acts in no time, too
 
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():

@@ -318,6 +318,10 @@ def test_figures_are_drawn_when_they_come_into_sight_and_runs_can_be_hidden(open
     opened.wait(f"{boxes} === 2")
 
 
+def test_all_figures_are_drawn_for_who_prints_without_scrolling(opened):
+    opened.wait("document.querySelectorAll('.late:not(.drawn)').length === 0")
+
+
 def test_tabs_show_one_task_at_a_time(opened):
     shown = "[...document.querySelectorAll('[role=tabpanel]')].filter((p) => !p.hidden).map((p) => p.id)"
     assert opened.run(shown) == ["task-mariner-calm"]

@@ -33,7 +33,7 @@ def test_weighted_interquartile_means_are_scipys_of_the_samples(values, seed):
     np.testing.assert_allclose(weighted_interquartile_mean(array, weights), expected, atol=1e-9)
 
 
-def test_scores_are_the_way_from_pid_to_oracle():
+def test_scores_are_the_way_from_wheel_over_to_the_best_known():
     assert score([30.0, 25.0, 20.0, 40.0], 30.0, 20.0).tolist() == [0.0, 0.5, 1.0, -1.0]
     assert np.isnan(score(1.0, 2.0, 2.0))
 

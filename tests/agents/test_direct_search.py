@@ -147,5 +147,5 @@ def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
         best = min(found[task.name], key=lambda kind: float(found[task.name][kind]["cost"]))
         for kind in {"base"} if best == "mpc" and find_spec("osqp") is None else {"base", "best"}:
             assert is_sane(tuned(kind, task, suite.name))
-        assert set(found[task.name]) == set(tunable(task))
+        assert set(found[task.name]) == set(tunable(task)) - {"preview-mpc"}  # not searched: slow
         assert all(one["cost"] <= one["start_cost"] for one in found[task.name].values())

@@ -76,14 +76,14 @@ def test_steps_and_costs_are_those_of_each_autopilot():
 
 
 def result(**summary):
-    costs = {"pid": np.array([[1.0, 2.0]]), "oracle": np.array([[0.5, 25.0]])}
+    costs = {"pid": np.array([[1.0, 2.0]]), "best-known": np.array([[0.5, 25.0]])}
     entries = [
-        {"name": "oracle", "score": {"value": 1.0, "low": None, "high": None}, "relative_cost": 1.0},
+        {"name": "best-known", "score": {"value": 1.0, "low": None, "high": None}, "relative_cost": 1.0},
         {"name": "pid", "score": {"value": 0.25, "low": 0.125, "high": 0.5}, "relative_cost": 1.5},
         {"name": "lq", "score": {"value": None, "low": None, "high": None}, "relative_cost": None},
     ]
     return SimpleNamespace(
-        ranking=["oracle", "pid", "lq"],
+        ranking=["best-known", "pid", "lq"],
         summary={"reference": "x", "ranking": entries, "tasks": {"calm": costs}} | summary,
         figures=lambda name, task: costs[name],
     )
@@ -91,11 +91,11 @@ def result(**summary):
 
 def test_scores_are_drawn_with_their_intervals():
     figure = page_figures.scores_figure(result())
-    assert [trace.name for trace in figure.data] == ["oracle", "pid"]
+    assert [trace.name for trace in figure.data] == ["best-known", "pid"]
     pid = only(figure, "pid")
     assert (pid.x[0], pid.error_x.array[0], pid.error_x.arrayminus[0]) == (0.25, 0.25, 0.125)
-    oracle = only(figure, "oracle")
-    assert (oracle.x[0], oracle.error_x.array[0], oracle.error_x.arrayminus[0]) == (1.0, 0.0, 0.0)
+    best = only(figure, "best-known")
+    assert (best.x[0], best.error_x.array[0], best.error_x.arrayminus[0]) == (1.0, 0.0, 0.0)
     assert sorted(shape.x0 for shape in figure.layout.shapes) == [0.0, 1.0]
     assert figure.layout.xaxis.title.text.startswith("score")
     unscored = page_figures.scores_figure(result(reference=None))
@@ -104,9 +104,19 @@ def test_scores_are_drawn_with_their_intervals():
     assert unscored.layout.xaxis.title.text.startswith("cost relative")
 
 
+def test_one_that_failed_stands_at_the_edge_and_does_not_flatten_the_scale():
+    lost = {"name": "pid", "score": {"value": -240.0, "low": -300.0, "high": -1.0}, "relative_cost": 90.0}
+    figure = page_figures.scores_figure(result(ranking=[lost]))
+    (mark,) = figure.data
+    assert (mark.x[0], mark.marker.symbol, mark.customdata[0]) == (-1.5, "triangle-left", -240.0)
+    (mark,) = page_figures.scores_figure(result(ranking=[lost], reference=None)).data
+    assert (mark.x[0], mark.marker.symbol) == (4.0, "triangle-right")
+
+
 def test_costs_have_a_logarithmic_axis_where_they_differ_much():
     figure = page_figures.costs_figure(result(), "calm")
-    assert [(box.name, list(box.x)) for box in figure.data] == [("oracle", [0.5, 25.0]), ("pid", [1.0, 2.0])]
+    boxes = [(box.name, list(box.x)) for box in figure.data]
+    assert boxes == [("best-known", [0.5, 25.0]), ("pid", [1.0, 2.0])]
     assert figure.layout.xaxis.type == "log"
     marks = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0]
     np.testing.assert_allclose(figure.layout.xaxis.tickvals, marks)
@@ -122,9 +132,9 @@ def test_profiles_are_shares_in_per_cent_and_styles_differ():
     figure = page_figures.profile_figure(profile, ["pid", "lq"])
     (curve,) = figure.data
     assert (curve.name, list(curve.x), list(curve.y)) == ("pid", [0.0, 0.5, 1.0], [100.0, 50.0, 25.0])
-    names = ["oracle", *(f"c{k}" for k in range(2 * len(page_figures.COLOURS)))]
+    names = ["best-known", *(f"c{k}" for k in range(2 * len(page_figures.COLOURS)))]
     styles = page_figures.styles(names)
-    assert styles["oracle"] == (page_figures.INK, "solid")
+    assert styles["best-known"] == (page_figures.INK, "solid")
     assert len(set(styles.values())) == len(names)
     assert styles["c0"] == (page_figures.COLOURS[0], page_figures.DASHES[0])
 

@@ -1,19 +1,13 @@
 """The oracle: copies of ships share their future, and what is found never costs more than the start."""
 
-import argparse
-
 import numpy as np
-import oracle
 import pytest
 from oracle import OracleSettings, run_oracle
 
 from agents import LQ, PID
-from agents.suites import reference
-from agents.suites.suite import BenchmarkTask
 from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
-from shipgym.files import read_json, write_json
 from shipgym.ships import load_model
 from shipgym.tasks.task import course_keeping_task, path_following_task
 
@@ -109,41 +103,3 @@ def test_it_does_not_know_a_course_change_before_it_is_ordered() -> None:
 def test_it_steers_by_the_rudder_alone() -> None:
     with pytest.raises(InputError, match="expected 'rudder'"):
         run_oracle(MARINER, course_keeping_task(action="rudder-discrete"), SEEDS)
-
-
-CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 30})
-ASKED = argparse.Namespace(suite="any", oracle_episodes=100, again=False)
-
-
-def test_it_runs_again_only_where_the_new_best_costs_less_than_it(tmp_path, monkeypatch):
-    started = []
-
-    def file(suite, what):
-        return tmp_path / f"{suite}-{what}.json"
-
-    def run(task, start, cost, asked):
-        started.append((start.kind, cost))
-        return {"oracle": 0.9 * cost, "oracle_episodes": 100}
-
-    def refer(**costs):
-        found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
-        write_json({"tasks": {"calm": found}}, file("any", "tuned"))
-        oracle.refer(CALM, ASKED)
-        return read_json(file("any", "reference"), "reference file", "")["calm"]
-
-    monkeypatch.setattr(oracle, "run", run)
-    for place in (oracle, reference):
-        monkeypatch.setattr(place, "suite_file", file)
-    first = refer(pid=1.0, lq=2.0)
-    assert first["best_classical"] == {"name": "pid", "cost": first["pid"]}
-    assert refer(pid=1.0, lq=2.0) == first
-    assert [kind for kind, _ in started] == ["pid"]
-    second = refer(pid=1.0, lq=0.5)  # lq is now the best, and costs more than 0.9 times pid
-    assert second["best_classical"]["name"] == "lq"
-    assert second["best_classical"]["cost"] != first["pid"]
-    assert second["oracle"] == first["oracle"]
-    assert len(started) == 1
-    write_json({"calm": {**second, "oracle": 1.1 * first["pid"]}}, file("any", "reference"))
-    third = refer(pid=0.1, lq=0.5)
-    assert started[1:] == [("pid", first["pid"])]
-    assert third["oracle"] == first["oracle"]

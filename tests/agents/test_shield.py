@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents import LQ, PID, Shielded, check_controller, interventions
+from agents import LQ, PID, Shielded, WheelOver, check_controller, interventions
 from agents.policies.shield import Limits
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
@@ -138,6 +138,28 @@ def test_a_new_course_is_no_running_away():
     assert interventions(state).count == 0
 
 
+def test_an_early_turn_that_is_planned_is_no_running_away_and_a_turn_the_wrong_way_is():
+    task = path_following_task(max_turn_deg=90.0, acceptance=1.0)
+    early = WheelOver.from_model(MARINER, task=task)
+    found = {}
+    for lengths in (0.0, 8.0):
+        limits = Limits(turn_lengths=lengths)
+        *_, states = sailed(Shielded.from_model(MARINER, early, limits=limits), task=task, steps=900)
+        found[lengths] = interventions(states[-1]).count.sum()
+    assert found[0.0] > 0
+    assert found[8.0] == 0
+
+    class Away(WheelOver):
+        """Turns before waypoints, to the other side."""
+
+        def course_along(self, cross, turns):
+            return super().course_along(cross, [turns[0], -turns[1]])
+
+    wrong = Shielded.from_model(MARINER, Away(**vars(early)))
+    *_, states = sailed(wrong, task=task, steps=900)
+    assert interventions(states[-1]).count.sum() > 0
+
+
 def test_counts_begin_anew_with_an_episode():
     _, _, states = sailed(Shielded.from_model(MARINER, Always(-1.0)), steps=100)
     assert interventions(states[-1]).count.all()
@@ -205,7 +227,7 @@ def test_another_ship_is_refused():
 
 
 def test_a_shield_waits_a_quarter_and_a_whole_ship_length():
-    assert Limits() == Limits(1.5, 1.1, 0.25, 10.0, 5.0, 1.0)
+    assert Limits() == Limits(1.5, 1.1, 0.25, 10.0, 5.0, 1.0, 8.0)
     wrong = {"envelope_out": 0.9, "envelope_back": 1.5, "runaway_deg": 181.0, "back_deg": 10.0}
     for name, value in wrong.items():
         with pytest.raises(InputError, match=rf"limits\.{name}: {value:g} found"):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from agents.suites.suite import list_suites, load_suite, parse_suite, suite_file, suite_hash
+from agents.suites.suite import FOLDER, list_suites, load_suite, parse_suite, suite_file, suite_hash
 from shipgym import InputError, Weather
 
 TEXT = """
@@ -69,10 +69,42 @@ def test_shipped_suites_are_known_by_name():
     assert load_suite().name == "shipgym-v1"
     assert len(suite_hash()) == 64
     assert suite_hash() == suite_hash("shipgym-v1")
-    assert suite_file("shipgym-v1", "reference").name == "shipgym-v1-reference.json"
-    assert suite_file("shipgym-v1", "reference").is_file()
+    assert suite_file("shipgym-v1", "best").name == "shipgym-v1-best.json"
+    assert suite_file("shipgym-v1", "best").is_file()
     for call in (load_suite, suite_hash):
-        with pytest.raises(InputError, match="suite: 'shipgym-v2' found"):
-            call("shipgym-v2")
+        with pytest.raises(InputError, match="suite: 'shipgym-v3' found"):
+            call("shipgym-v3")
     with pytest.raises(InputError, match=r"of suite 'shipgym-v1': .*Did you mean 'mariner-calm'"):
         load_suite().task("mariner-clam")
+
+
+V2 = load_suite("shipgym-v2")
+
+
+def test_a_task_with_a_ship_is_evaluated_on_her_on_the_model_and_far_from_the_design():
+    assert {task.on for task in V2.tasks} == {"ship", "model", "far"}
+    for name in ("failing-gear", "strong-current"):
+        ship, model, far = (V2.task(name + end) for end in ("", "-on-model", "-far"))
+        assert (ship.handed_out, far.handed_out) == (model.handed_out, model.handed_out)
+        assert ship.ship.name == model.sailed[0].name == ship.model
+        assert ship.sailed[0].name == far.sailed[0].name == ship.behind
+    assert V2.task("failing-gear-far").engine(1).model.steering.time_constant == 8.0
+    assert V2.task("failing-gear").engine(1).model.steering.time_constant == 1.0
+    assert V2.task("strong-current-far").sailed[1].weather.current.speed == 4.0
+
+
+def test_every_model_has_the_ship_behind_it_named_in_its_file():
+    for task in V2.tasks:
+        if task.on == "ship":
+            assert task.ship.provenance["truth"] == task.behind
+
+
+def test_what_contestants_are_handed_does_not_name_the_ship():
+    handed = V2.task("two-zigzags-far").handed_out
+    assert (handed.behind, dict(handed.far), handed.sailed[0].name) == ("", {}, "container-two-zigzags")
+
+
+def test_a_ship_of_other_particulars_than_the_model_is_refused():
+    text = (FOLDER / "shipgym-v2.toml").read_text().replace('ship = "kvlcc2"', 'ship = "tanker"')
+    with pytest.raises(InputError, match=r"tasks.strong-current: .*expected a ship of the same particulars"):
+        parse_suite(text, "suite")

@@ -1,0 +1,127 @@
+"""A suite with ships behind its models, and submissions: what is handed out, written and refused."""
+
+import json
+
+import numpy as np
+import pytest
+
+from agents import LQ, WheelOver, benchmark, load_results
+from agents.benchmarking import results, run, submission
+from agents.benchmarking.contestants import Contestant
+from agents.benchmarking.submission import submit
+from agents.benchmarking.verification import verify
+from agents.suites import suite
+from agents.suites.suite import load_suite, parse_suite
+from shipgym.errors import InputError
+
+TEXT = """
+name = "small"
+[tasks.turns]
+environment = "path-following"
+model = "mariner-tls-svm"
+ship = "mariner"
+options = { episode_steps = 120, n_legs = 2 }
+far = { gear = { time_constant = 8.0 } }
+"""
+TASKS = ("turns", "turns-on-model", "turns-far")
+N = 3
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch, tmp_path):
+    """A suite of one task, all of whose three episodes are scored."""
+    (tmp_path / "suites").mkdir()
+    (tmp_path / "suites" / "small.toml").write_text(TEXT)
+    monkeypatch.setattr(suite, "FOLDER", tmp_path / "suites")
+    for place in (suite, run, submission):
+        monkeypatch.setattr(place, "N_EPISODES", N)
+    monkeypatch.setattr(submission, "SEEDS", {"first": suite.FIRST_SEED, "count": N})
+    load_suite.cache_clear()
+    yield
+    load_suite.cache_clear()
+
+
+def ran(out=None, who="wheel-over,lq"):
+    return benchmark(who, suite="small", out=out, episodes=N)
+
+
+def test_the_ranking_is_of_the_ship_and_the_rest_stands_beside_it(tmp_path):
+    found = ran(tmp_path / "out")
+    assert found.tasks == TASKS
+    assert found.summary == load_results(tmp_path / "out").summary
+    for entry in found.summary["ranking"]:
+        assert entry["tasks"] == 1
+        assert {on: one["tasks"] for on, one in entry["elsewhere"].items()} == {"model": 1, "far": 1}
+    assert found.summary["suite"]["tasks"]["turns-far"]["ship"] == "mariner"
+    costs = [found.figures("wheel-over", task).mean() for task in TASKS]
+    assert len(set(costs)) == 3
+
+
+def test_contestants_are_handed_the_model_only():
+    task = load_suite("small").task("turns-far")
+    handed = []
+    Contestant("mine", lambda one: handed.append(one) or LQ.from_model(one.ship)).policies(task, "small")
+    assert (handed[0].name, handed[0].behind, handed[0].far) == ("turns", "", {})
+    assert handed[0].ship.name == handed[0].sailed[0].name == "mariner-tls-svm"
+    cheat = Contestant("cheat", lambda handed: WheelOver.from_model(task.sailed[0], task=handed.task))
+    with pytest.raises(InputError, match="'cheat' on task 'turns-far': was designed on the ship, 'mariner'"):
+        cheat.policies(task, "small")
+
+
+def test_a_submission_is_verified(tmp_path):
+    found = ran()
+    submit(found, "wheel-over", tmp_path / "mine.json")
+    checks = verify(tmp_path / "mine.json")
+    assert {check.task for check in checks} == set(TASKS)
+    assert all(check.exact for check in checks)
+    content = json.loads((tmp_path / "mine.json").read_text())
+    content["costs"]["turns"][0][1] *= 0.9
+    (tmp_path / "mine.json").write_text(json.dumps(content))
+    assert [check.task for check in verify(tmp_path / "mine.json") if not check.passed] == ["turns"]
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("seeds", {"first": 7, "count": N}, "seeds: .* found, expected .*1000000"),
+        ("suite", {"name": "small", "sha256": "0"}, "suite.sha256: 0 found, expected"),
+        ("versions", {"shipgym": "0.0.1"}, "versions.shipgym: 0.0.1 found, expected"),
+        ("costs", {"turns": [[1.0, 2.0, 3.0]]}, "costs: tasks: .* found, expected .*turns-far"),
+        ("costs", {task: [[1.0]] for task in TASKS}, r"costs: episodes: \{1\} found, expected \{3\}"),
+        ("costs", {task: [["1"]] for task in TASKS}, "costs"),
+        ("kind", "shipgym-other", "kind 'shipgym-other' found"),
+    ],
+)
+def test_a_submission_of_other_seeds_suite_or_versions_is_refused(field, value, said, tmp_path):
+    path = tmp_path / "mine.json"
+    submit(ran(), "lq", path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | {field: value}))
+    with pytest.raises(InputError, match=said) as caught:
+        verify(path)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_what_nobody_else_can_make_or_was_not_run_through_is_not_submitted(tmp_path):
+    given = ran(who={"mine": lambda task: LQ.from_model(task.ship)})
+    with pytest.raises(InputError, match="submit: 'mine': an object found"):
+        submit(given, "mine", tmp_path / "mine.json")
+    some = benchmark("lq", suite="small", tasks=["turns-far"], episodes=N)
+    with pytest.raises(InputError, match="no results in turns, turns-on-model found"):
+        submit(some, "lq", tmp_path / "mine.json")
+
+
+def test_a_folder_of_another_suite_and_results_of_the_first_format_are_refused(tmp_path):
+    ran(tmp_path / "out", "lq")
+    (tmp_path / "suites" / "other.toml").write_text(TEXT.replace("small", "other"))
+    with pytest.raises(InputError, match="holds results of another suite than 'other'"):
+        benchmark("lq", suite="other", out=tmp_path / "out", resume=True, episodes=N)
+    file = tmp_path / "out" / results.RESULTS
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"format": 1}))
+    with pytest.raises(InputError, match="format"):
+        load_results(tmp_path / "out")
+
+
+def test_a_far_set_without_a_ship_is_refused():
+    with pytest.raises(InputError, match=r"tasks.turns.far: found without a ship"):
+        parse_suite(TEXT.replace('ship = "mariner"\n', ""), "suite")
+    assert np.all([task.base == "turns" for task in parse_suite(TEXT, "suite").tasks])

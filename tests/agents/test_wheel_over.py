@@ -1,0 +1,77 @@
+"""Wheel-over: turns begun by the ship's own turning circle, a current countered, guards at sharp turns."""
+
+import numpy as np
+import pytest
+
+from agents import LineOfSight, WheelOver, check_controller, load_agent
+from agents.controllers.wheel_over import STEEPEST, bend, own_turn
+from agents.rollouts.metrics import evaluate
+from agents.suites.suite import BenchmarkTask, load_suite
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle, turning_indices
+from shipgym.ships import load_model
+from shipgym.tasks.task import path_following_task
+
+MARINER, KVLCC2 = load_model("mariner"), load_model("kvlcc2")
+SHARP = load_suite("shipgym-v1").task("kvlcc2-sharp-turns")
+
+
+def test_radius_and_reach_are_those_of_the_turning_circle():
+    radius, reach = own_turn(MARINER, share=20.0 / np.degrees(MARINER.steering.limit))
+    for side in (20.0, -20.0):
+        turn = turning_indices(turning_circle(MARINER, side, 1500.0), MARINER.particulars["length"])
+        assert abs(turn.tactical_diameter_lengths) == pytest.approx(2.0 * radius, rel=0.05)
+        assert turn.advance_lengths == pytest.approx(radius + reach, rel=0.1)
+
+
+def test_it_steers_the_next_leg_within_the_tangent_and_the_reach_and_mirrors():
+    guide = WheelOver.from_model(MARINER, radius_lengths=3.0, reach_lengths=1.0)
+    length = MARINER.particulars["length"]
+    turn, zero = np.radians(60.0), np.zeros(1)
+    begin = (3.0 * np.tan(turn / 2.0) + 1.0) * length
+    before, after = (guide.course_along(zero, [zero + begin + d, zero + turn])[0] for d in (1.0, -1.0))
+    assert before == 0.0
+    lookahead = guide.gains["turn_lookahead"]
+    assert after == pytest.approx(turn - np.arctan2((begin - 1.0) * np.sin(turn), lookahead))
+    cross, ahead = np.linspace(-100.0, 100.0, 9), np.linspace(0.0, 1500.0, 9)
+    for angle in (0.5, 1.2, 2.4):
+        port = guide.course_along(-cross, [ahead, zero - angle])
+        assert np.array_equal(port, -guide.course_along(cross, [ahead, zero + angle]))
+
+
+def test_beyond_90_degrees_it_goes_forward_on_the_leg_until_that_ends():
+    guide, turn = WheelOver.from_model(KVLCC2), np.full(50, np.radians(150.0))
+    to_go = np.linspace(0.0, 10.0, 50) * KVLCC2.particulars["length"]
+    assert guide.course_along(np.zeros(50), [to_go, turn]).max() <= STEEPEST
+
+
+@pytest.mark.parametrize("options", [{"acceptance": 0.5}, {"max_turn_deg": 140.0}])
+def test_sharp_turns_and_a_small_acceptance_radius_lose_no_ship(options):
+    far = BenchmarkTask("far", SHARP.environment, SHARP.model, "", {**SHARP.options, **options})
+    figures, _ = evaluate(WheelOver.from_model(far.ship, task=SHARP.task), far, range(32))
+    assert figures["grounded"].sum() == 0.0
+    assert figures["success"].all()
+
+
+def test_without_any_search_it_costs_less_than_the_best_of_the_old_classical_ones_after_theirs():
+    """Tuned line of sight cost 559.0 on this task (docs/benchmark.md of version 1)."""
+    figures, _ = evaluate(WheelOver.from_model(SHARP.ship, task=SHARP.task), SHARP, SHARP.seeds[:16])
+    plain, _ = evaluate(LineOfSight.from_model(SHARP.ship, task=SHARP.task), SHARP, SHARP.seeds[:16])
+    assert figures["cost"].mean() < 0.7 * plain["cost"].mean()
+
+
+def test_the_course_of_a_path_bends_by_its_arcs():
+    ahead = [np.array([100.0]), np.array([-1.0]), np.array([500.0]), np.array([0.5])]
+    for distance, course in ((100.0, 0.0), (150.0, -0.25), (300.0, -1.0), (600.0, -0.5), (900.0, -0.5)):
+        assert bend(distance, ahead, 200.0)[0] == pytest.approx(course)
+
+
+def test_it_is_a_controller_and_a_file(tmp_path):
+    task = path_following_task(noise=1.0)
+    guide = WheelOver.from_model(MARINER, task=task)
+    check_controller(guide, MARINER, task, n_steps=20)
+    guide.save(tmp_path / "guide.json")
+    again = load_agent(tmp_path / "guide.json", MARINER)
+    assert (again.kind, again.gains) == ("wheel-over", guide.gains)
+    with pytest.raises(InputError, match="crab_share: 3 found, expected"):
+        WheelOver.from_model(MARINER, crab_share=3.0)
