@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.los_autopilot import Guided
+from agents.controllers.los_autopilot import Guided, LineOfSight
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
 from shipgym.files import read_toml
+from shipgym.tasks import path_following, path_following_v0
 from shipgym.tasks.contract import Seen
 from shipgym.tasks.guidance import wrapped
-from shipgym.tasks.path_following import Observation
 from shipgym.tasks.steering import INTEGRAL_ZONE, Extras, Helm
 from shipgym.tasks.task import rounded_interval
 
@@ -44,7 +44,9 @@ def _reads(agent: Any) -> set[str]:
 def bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
     notes = [
-        note for record in (Helm, Extras, Observation) for note in field_types(record, notes=True).items()
+        note
+        for record in (Helm, Extras, path_following_v0.Observation, path_following.Observation)
+        for note in field_types(record, notes=True).items()
     ]
     seen = [(name, one) for name, note in notes for one in getattr(note, "__metadata__", ())]
     return {name: (one.low, one.high) for name, one in seen if isinstance(one, Seen)}
@@ -64,6 +66,11 @@ class Autopilot:
     """
 
     def __init__(self, agent: Any) -> None:
+        if isinstance(agent, Guided) and not isinstance(agent, LineOfSight):
+            raise InputError(
+                f"autopilot: '{agent.kind}' found, which needs the waypoints of its path; expected 'los', "
+                "'ilos' or 'alos', or an autopilot that keeps a heading"
+            )
         names = {"set_point", "heading", *_reads(agent)}
         if getattr(agent, "action", "rudder") == "rudder-shaft" or not names <= INPUTS.keys():
             raise InputError(
@@ -77,7 +84,7 @@ class Autopilot:
         self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
         if isinstance(agent, Controller):
             self.dt = float(agent.design["dt"])
-        self.begins, self.drift, self.integral, self.last_command = True, np.zeros(1), 0.0, 0.0
+        self.begins, self.drift, self.integral, self.last_command = True, np.zeros((1, 1)), 0.0, 0.0
         self.memory: Any = (
             np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Controller) else None
         )
@@ -86,7 +93,9 @@ class Autopilot:
         """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""
         error = wrapped(given["set_point"] - given["heading"])
         if isinstance(self.agent, Guided):
-            course, self.drift = self.agent.course(np.array([given["cross_track"]]), self.drift)
+            course, self.drift = self.agent.course(
+                {"cross_track": np.array([given["cross_track"]])}, self.drift
+            )
             error = wrapped(error + course[0])
         reach = self.scales["heading_error_integral"]
         gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt

@@ -19,7 +19,7 @@ from shipgym.trials.units import UNITS
 LONGEST_LINE = 512  # bytes; 82 are the standard's
 BAUD = 4800  # of the standard
 TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
-TO_SI = {name: factor for units in UNITS.values() for name, factor in units.items()}
+TO_SI = {**UNITS["length"], **UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
 STEER_TO = {"L": 1.0, "R": -1.0}  # sign of the cross-track error
 EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
