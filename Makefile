@@ -93,7 +93,7 @@ $(VENV)/docs-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
-	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt --no-build-isolation --no-deps pufferlib
+	-$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt pufferlib
 	touch $@
 
 clean:
