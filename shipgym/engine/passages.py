@@ -31,16 +31,7 @@ def ship_of(numbers: Any) -> Any:
 
 def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
     """The ship with another steering gear, without lag."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=limit,
-        rudder_rate=rate,
-        gear_frequency=0.0,
-        shaft=ship.shaft,
-        water_depth=ship.water_depth,
-        scale_speed=ship.scale_speed,
-    )
+    return Ship(ship.length, ship.speed, limit, rate, 0.0, ship.shaft, ship.water_depth, ship.scale_speed)
 
 
 def in_depth(ship: Ship, water_depth: float) -> Ship:
@@ -57,21 +48,9 @@ def in_depth(ship: Ship, water_depth: float) -> Ship:
     )
 
 
-def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
+def replaced(m: Motion, psi: float, delta: float, n: float) -> Motion:
     """A state with another heading, rudder angle and shaft speed."""
-    return Motion(
-        x=motion.x,
-        y=motion.y,
-        psi=psi,
-        u=motion.u,
-        v=motion.v,
-        r=motion.r,
-        p=motion.p,
-        phi=motion.phi,
-        q=motion.q,
-        delta=delta,
-        n=n,
-    )
+    return Motion(m.x, m.y, psi, m.u, m.v, m.r, m.p, m.phi, m.q, delta, n)
 
 
 def advanced(

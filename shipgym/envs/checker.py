@@ -1,6 +1,7 @@
 """A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
 from collections.abc import Callable
+from contextlib import ExitStack, closing
 from typing import Any
 
 import gymnasium
@@ -42,11 +43,8 @@ def check_vector_env(
         Naming the first promise that is not kept, what was found and what is expected.
     """
     for check in (_check_spaces, _check_reset, _check_steps, _check_seeds, _check_actions, _check_autoreset):
-        env = make()
-        try:
+        with closing(make()) as env:
             check(env, n_steps)
-        finally:
-            env.close()
     if make_single is not None:
         _check_rows(make, make_single, n_steps)
 
@@ -238,15 +236,13 @@ def _check_rows(
     make_single: Callable[[], gymnasium.Env[Any, Any]],
     n_steps: int,
 ) -> None:
-    env = make()
-    singles = [make_single() for _ in range(env.num_envs)]
-    mode = autoreset_mode(env)
-    try:
+    with closing(make()) as env, ExitStack() as stack:
+        singles = [stack.enter_context(closing(make_single())) for _ in range(env.num_envs)]
+        mode = autoreset_mode(env)
         env.action_space.seed(SEED)
         observations, _ = env.reset(seed=SEED)
         for i, single in enumerate(singles):
-            expected, _ = single.reset(seed=SEED + i)
-            _expect_row(i, observations[i], expected)
+            _expect_row(i, observations[i], single.reset(seed=SEED + i)[0])
         ended = np.zeros(env.num_envs, dtype=np.bool_)
         for _ in range(n_steps):
             actions = env.action_space.sample()
@@ -259,10 +255,6 @@ def _check_rows(
             ended = terminated | truncated
             if mode is AutoresetMode.DISABLED and np.any(ended):
                 break
-    finally:
-        env.close()
-        for single in singles:
-            single.close()
 
 
 def _row(single: gymnasium.Env[Any, Any], action: Any, ended: bool, mode: AutoresetMode) -> tuple[Any, ...]:

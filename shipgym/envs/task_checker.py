@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
+from shipgym.checks import Findings
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
-from shipgym.engine.records import leaves
+from shipgym.engine.records import flat, leaves
 from shipgym.envs.engine import Engine
 from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
-
-Floats = NDArray[np.float64]
 
 STEPS, PLAIN_STEPS = 400, 40
 LANES, PLAIN_LANES = 70, 3  # more than a tile
@@ -27,34 +26,8 @@ BEYOND = 1e-6  # of a bound, what rounding makes
 OFTEN = 0.05  # part of the observations beyond their bounds that is worth a remark
 
 
-@dataclass(frozen=True)
-class TaskCheck:
-    """What a check of a task found.
-
-    Attributes
-    ----------
-    name : str
-        Of the task, or its file.
-    problems : tuple of str
-        What makes it unfit to be used, each with its place; empty for a sound task.
-    remarks : tuple of str
-        What is unusual, and may be right.
-    """
-
-    name: str
-    problems: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether there are no problems."""
-        return not self.problems
-
-    def __str__(self) -> str:
-        """Verdict, then a line for each problem and remark."""
-        verdict = "sound" if self.ok else f"{len(self.problems)} problem(s)"
-        lines = [f"{self.name}: {verdict}", *(f"  problem: {problem}" for problem in self.problems)]
-        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+class TaskCheck(Findings):
+    """What a check of a task found; its name is that of the task, or its file."""
 
 
 def check_task(task: Any, **options: Any) -> TaskCheck:
@@ -110,7 +83,7 @@ def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
     def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
         if lane < plain.num_envs:
             beyond.looked_at += 1
-            for path, value, per_scale in zip(paths, _numbers(record), _numbers(scale), strict=True):
+            for path, value, per_scale in zip(paths, flat(record), flat(scale), strict=True):
                 low, high = beyond.bounds[path]
                 if path in shown and not low - BEYOND <= value * per_scale <= high + BEYOND:
                     beyond.setdefault(path, []).append(value * per_scale)
@@ -119,15 +92,6 @@ def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
     parts = {**made.parts, "store_observation": Part(noted, code=lambda: None, key="noted")}
     plain._run = plain_loop(episodes.run, parts)
     return engine, plain, beyond
-
-
-def _numbers(record: Any) -> Iterator[float]:
-    """Numbers of a record and of those within it."""
-    for value in record:
-        if isinstance(value, tuple):
-            yield from _numbers(value)
-        else:
-            yield float(value)
 
 
 def _orders(engine: Engine, step: int) -> Floats:

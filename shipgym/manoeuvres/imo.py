@@ -34,9 +34,8 @@ class Criterion:
 
     value: float | None  # of the model, in `unit`; None where the manoeuvre never got so far
     limit: float  # largest value allowed
-    passed: (
-        bool | None
-    )  # None where it is not decided, or the ship's equations do not allow the test: see `note`
+    # None where it is not decided, or the ship's equations do not allow the test: see `note`
+    passed: bool | None
     unit: str  # "ship lengths" or "deg"
     source: str  # paragraph of the annex of MSC.137(76)
     # the value over models drawn from the covariance of an identified ship
@@ -69,16 +68,8 @@ class Criterion:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON knows it."""
-        fields: dict[str, Any] = {
-            "manoeuvre": self.manoeuvre,
-            "value": self.value,
-            "measured": self.measured,
-            "limit": self.limit,
-            "decided": self.decided,
-            "passed": self.passed,
-            "unit": self.unit,
-            "source": self.source,
-        }
+        names = ("manoeuvre", "value", "measured", "limit", "decided", "passed", "unit", "source")
+        fields: dict[str, Any] = {name: getattr(self, name) for name in names}
         if self.note:
             fields["note"] = self.note
         if self.drawn is not None and len(self.drawn.values):
@@ -198,9 +189,9 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
         angle = float(np.degrees(np.percentile(np.abs(rudder(trial)), 75)))
         if trial.kind == "zigzag":
             heading, indices = switch_heading_deg(trial) or 0.0, zigzag_indices(trial, length)
-            for usual in (
-                one for one in STANDARD_DEG if max(abs(angle - one), abs(heading - one)) <= ANGLE_DEG
-            ):
+            for usual in STANDARD_DEG:
+                if max(abs(angle - usual), abs(heading - usual)) > ANGLE_DEG:
+                    continue
                 values[f"overshoot_1_{usual:.0f}_{usual:.0f}"] = indices.overshoot_1_deg
                 if usual == STANDARD_DEG[0]:
                     values["overshoot_2_10_10"] = indices.overshoot_2_deg
@@ -219,11 +210,7 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
     """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
     full = min(TURN_DEG, model.steering.rudder_limit_deg)
-    return (
-        f"{full:g} deg turn"
-        if manoeuvre == "turning circle"
-        else manoeuvre.replace("zigzag ", "") + " zigzag"
-    )
+    return f"{full:g} deg turn" if manoeuvre == "turning circle" else f"{manoeuvre.split()[-1]} zigzag"
 
 
 def _outside(model: ShipModel, test: Manoeuvre) -> bool:

@@ -180,23 +180,9 @@ def acceleration(
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A ship whose propeller is in its equations.
-    start_ratio : float
-        Speed and shaft speed at the start, by those at service.
-    duration : float, optional
-        s; by default 40 times the time to travel one ship length.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
-
-    Raises
-    ------
-    InputError
-        For a ship without a shaft, or a number out of range.
-    UnstableModelError
-        If the ship runs away.
+    `start_ratio` is speed and shaft speed at the start by those at service; the duration, s, is by default 40
+    times the time to travel one ship length; the rest as in `pull_out`. Raises InputError for a ship whose
+    propeller is not in its equations or a number out of range, UnstableModelError if the ship runs away.
     """
     shaft_of(model)
     check_number(start_ratio, "start_ratio", above=0.0, below=1.0, hint="part of the service speed")

@@ -5,6 +5,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.shared_structure import SharedStructure
+from shipgym.ships.term_table import inertia as prime_inertia
 
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
@@ -44,18 +45,12 @@ def _prime_mass(model: ManoeuvringModel) -> float:
 
 def _particulars(model: ManoeuvringModel) -> Floats:
     p = model.particulars.completed()
-    unit, L = _prime_mass(model), p.length
-    if isinstance(model.dynamics, SharedStructure):
-        arms = np.array([1.0, 1.0, L])
-        added = model.dynamics.inertia(model.coefficients, p) * np.outer(arms, arms)
-        return unit * np.hstack([added, np.zeros((3, 1))])
-    m, static = p.mass_prime, p.mass_prime * p.xg_prime
-    prime = np.zeros((3, 4))
-    prime[0, 0] = m - p.require("X_udot")
-    prime[1, 1], prime[1, 2] = m - p.require("Y_vdot"), (static - p.require("Y_rdot")) * L
-    prime[2, 1] = (static - p.require("N_vdot")) * L
-    prime[2, 2] = (p.inertia_prime - p.require("N_rdot")) * L * L
-    return unit * prime
+    table, arms = model.dynamics, np.array([1.0, 1.0, p.length])
+    if isinstance(table, SharedStructure):
+        prime = table.inertia(model.coefficients, p)
+    else:
+        prime = prime_inertia(p)
+    return _prime_mass(model) * np.hstack([prime * arms * arms[:, None], np.zeros((3, 1))])
 
 
 def _container(model: ManoeuvringModel) -> Floats:
