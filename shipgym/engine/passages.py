@@ -12,8 +12,7 @@ from typing import Any
 
 from shipgym.engine.motion import HAS_SEA, Motion, Push, Ship, sail
 from shipgym.engine.places import (
-    begin_sea, evolve, load_coefficients, load_motion, load_sea, load_sea_parameters, load_ship, push,
-    store_motion, store_sea,
+    begin_sea, evolve, load_motion, load_sea, load_sea_parameters, push, store_motion, store_sea,
 )  # fmt: skip
 
 #: What is recorded of the sea beside the state: first-order motion, current, wind.
@@ -22,11 +21,6 @@ SEA_CHANNELS = (
 )  # fmt: skip
 NO_LIMIT = 1e300
 BEGIN_WORDS = EVOLVE_WORDS = 0  # parts: steps of the random numbers' state
-
-
-def ship_of(numbers: Any) -> Any:
-    """Ship and coefficients from the vector of her numbers."""
-    return load_ship(numbers, 0), load_coefficients(numbers, 0)
 
 
 def with_gear(ship: Ship, limit: float, rate: float) -> Ship:

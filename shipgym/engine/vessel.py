@@ -62,7 +62,7 @@ class Vessel:
 
 
 def read_ship(ships: Any) -> Any:
-    """The ship of all lanes, read once before a loop."""
+    """Ship and coefficients of one ship, or of all lanes, read once before a loop."""
     return load_ship(ships, 0), load_coefficients(ships, 0)
 
 

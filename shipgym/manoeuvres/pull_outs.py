@@ -42,23 +42,10 @@ def pull_out(
 ) -> Trial:
     """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, at service speed and the matching shaft speed.
-    rudder_deg : float
-        Rudder of the turn, degrees; negative turns to port.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
-
-    Raises
-    ------
-    InputError
-        For a rudder of 0 or beyond the rudder's limit.
-    UnstableModelError
-        If the ship runs away.
+    The ship is at service speed and the matching shaft speed, the rudder of the turn in degrees, negative to
+    port; `dt`, the time between samples, s, is by default a fortieth of the time to travel one ship length;
+    the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond the rudder's limit,
+    UnstableModelError if the ship runs away.
     """
     turn = turning_rudder(rudder_deg, model.steering.rudder_limit_deg, "the rudder's limit")
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))

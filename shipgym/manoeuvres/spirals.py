@@ -73,22 +73,9 @@ def direct_spiral(
 ) -> Spiral:
     """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, at service speed and the matching shaft speed.
-    rudder_deg : sequence of float
-        From one side to the other, degrees; sailed in this order and then back to the first. The loop is
-        known to within their steps.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
-
-    Raises
-    ------
-    InputError
-        For angles that do not go from one side to the other.
-    UnstableModelError
-        If the ship runs away.
+    The angles, degrees, go from one side to the other; they are sailed in this order and then back to the
+    first. The loop is known to within their steps. Other arguments are as in `pull_out`. Raises InputError
+    for angles that do not go from one side to the other, UnstableModelError if the ship runs away.
     """
     limit = model.steering.rudder_limit_deg
     angles = _one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")

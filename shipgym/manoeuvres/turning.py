@@ -56,22 +56,9 @@ def turning_circle(
 ) -> Trial:
     """Simulate a turning circle from straight ahead at service speed, without an approach run.
 
-    Parameters
-    ----------
-    model : ShipModel
-    rudder_deg : float
-        Rudder ordered at the start, degrees; negative turns to port.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth, weather, seed
-        As in `zigzag`.
-
-    Raises
-    ------
-    InputError
-        For a rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0.
-    UnstableModelError
-        If the ship runs away.
+    The rudder is ordered at the start, degrees, negative to port; `duration` and `dt`, the time between
+    samples, are in s; the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond 90 degrees, or a
+    duration or step that is not above 0, UnstableModelError if the ship runs away.
     """
     angle = turning_rudder(rudder_deg, 90.0)
     commands = np.repeat(model.service_command[None], number_of_steps(duration, dt), axis=0)

@@ -117,14 +117,12 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     / 2 and N about midship by rho g a^2 L^2 / 2.
     """
     line = waterline(ship)
-    middle = (0.5 * (line.x[1:] + line.x[:-1]), 0.5 * (line.y[1:] + line.y[:-1]))
+    x, half = (0.5 * (ends[1:] + ends[:-1]) for ends in line)  # middle of each part
     dx, dy = np.diff(line.x), np.diff(line.y)
+    length = np.hypot(dx, dy)
     Y, N = np.zeros(np.shape(chi)), np.zeros(np.shape(chi))
     for side in (1.0, -1.0):
-        # outward normal of the side, times the length of the part
-        length = np.hypot(dx, dy)
-        out_x, out_y = dy / length, -side * dx / length
-        x, y = middle[0], side * middle[1]
+        out_x, out_y, y = dy / length, -side * dx / length, side * half  # outward normal of the side
         toward = np.multiply.outer(np.cos(chi), out_x) + np.multiply.outer(np.sin(chi), out_y)
         pressure = np.maximum(toward, 0.0) ** 2 * length
         Y = Y - pressure @ out_y

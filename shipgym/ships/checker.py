@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,7 +41,7 @@ class ModelCheck(Findings):
 
     # root mean square of the accelerations' port/starboard difference over twice their own, over states that
     # a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated
-    asymmetry: float = float("nan")
+    asymmetry: float = field(kw_only=True)
 
     @property
     def verdict(self) -> str:
@@ -69,7 +69,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         model.ship_numbers()
         problems = list(_wrong_accelerations(model))
     except InputError as error:  # a file, numbers or equations that cannot be used
-        return ModelCheck(name, (str(error),))
+        return ModelCheck(name, (str(error),), asymmetry=float("nan"))
     remarks: list[str] = []
     asymmetry = float("nan")
     if not problems:
@@ -77,7 +77,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         problems += [*_wrong_courses(model), *_wrong_rudder(model)]
         remarks += _unusual(model, asymmetry)
     problems += _wrong_covariance(model)
-    return ModelCheck(name, tuple(problems), tuple(remarks), asymmetry)
+    return ModelCheck(name, tuple(problems), tuple(remarks), asymmetry=asymmetry)
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:

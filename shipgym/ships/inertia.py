@@ -46,10 +46,7 @@ def _prime_mass(model: ManoeuvringModel) -> float:
 def _particulars(model: ManoeuvringModel) -> Floats:
     p = model.particulars.completed()
     table, arms = model.dynamics, np.array([1.0, 1.0, p.length])
-    if isinstance(table, SharedStructure):
-        prime = table.inertia(model.coefficients, p)
-    else:
-        prime = prime_inertia(p)
+    prime = table.inertia(model.coefficients, p) if isinstance(table, SharedStructure) else prime_inertia(p)
     return _prime_mass(model) * np.hstack([prime * arms * arms[:, None], np.zeros((3, 1))])
 
 
