@@ -130,7 +130,8 @@ class Renderer:
         if scene.corridor is not None:
             half = scene.corridor / chart.metres
             for start, end in pairwise(points):
-                brush.polygon(CORRIDOR, _strip(start, end, half))
+                side = half * _axes(start, end)[1]
+                brush.polygon(CORRIDOR, [start + side, end + side, end - side, start - side])
             for point in points:
                 brush.circle(CORRIDOR, point, half)
         brush.lines(PATH, points, 2)
@@ -317,8 +318,3 @@ def _axes(start: Floats, end: Floats) -> tuple[Floats, Floats]:
     """Unit vectors along a line and across it."""
     along = (end - start) / max(hypot(*(end - start)), 1e-9)
     return along, np.array([-along[1], along[0]])
-
-
-def _strip(start: Floats, end: Floats, half: float) -> list[list[float]]:
-    across = half * _axes(start, end)[1]
-    return [corner.tolist() for corner in (start + across, end + across, end - across, start - across)]

@@ -141,20 +141,18 @@ def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterva
     beyond = {name for name, test in needed.items() if name in found and _outside(model, test)}
     first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
 
-    def worst_of(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
+    def worst_of(manoeuvre: str, index: str, limit: float, paragraph: str) -> Criterion:
         names = [name for name in found if name in needed and name.startswith(manoeuvre)]
-        one = _criterion([found[name] for name in names], index, limit, unit, paragraph)
+        one = _criterion([found[name] for name in names], index, limit, paragraph)
         return _decided(one, trial_in_words(model, manoeuvre), bool(beyond & set(names)))
 
     return {
-        "advance": worst_of("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
-        "tactical_diameter": worst_of(
-            "turning circle", "tactical_diameter_lengths", 5.0, "ship lengths", "5.3.1"
-        ),
-        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
-        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "deg", "5.3.3.1"),
-        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "deg", "5.3.3.2"),
-        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
+        "advance": worst_of("turning circle", "advance_lengths", 4.5, "5.3.1"),
+        "tactical_diameter": worst_of("turning circle", "tactical_diameter_lengths", 5.0, "5.3.1"),
+        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "5.3.2"),
+        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "5.3.3.1"),
+        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "5.3.3.2"),
+        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "5.3.3.3"),
         "stopping": _stopping(model, found.get("crash stop")),
     }
 
@@ -249,15 +247,10 @@ def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
 
 
 def _criterion(
-    runs: Sequence[Mapping[str, IndexInterval]],
-    index: str,
-    limit: float,
-    unit: str,
-    paragraph: str,
-    note: str = "",
+    runs: Sequence[Mapping[str, IndexInterval]], index: str, limit: float, paragraph: str, note: str = ""
 ) -> Criterion:
     """The worst value of some runs against its limit; a run that never got so far fails it."""
-    drawn = worst([run[index] for run in runs])
+    drawn, unit = worst([run[index] for run in runs]), "deg" if index.endswith("_deg") else "ship lengths"
     passed = drawn.value is not None and drawn.value <= limit
     return Criterion(drawn.value, limit, passed, unit, f"MSC.137(76), annex, {paragraph}", drawn, note)
 
@@ -265,9 +258,7 @@ def _criterion(
 def _stopping(model: ShipModel, stop: Mapping[str, IndexInterval] | None) -> Criterion:
     """The full astern stopping test."""
     if stop is not None:
-        return _criterion(
-            [stop], "track_reach_lengths", STOPPING_LIMIT, "ship lengths", "5.3.4", LARGE_DISPLACEMENT
-        )
+        return _criterion([stop], "track_reach_lengths", STOPPING_LIMIT, "5.3.4", LARGE_DISPLACEMENT)
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = "its thrust is inside its surge coefficients, so it cannot be ordered astern"

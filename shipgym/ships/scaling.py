@@ -71,16 +71,13 @@ def scale_model(
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
-    gear, quicker = model.steering, fast / size
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=SteeringGear(
-            gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker
-        ),
+        steering=_steering(model.steering, fast / size),
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
-        envelope=_envelope(model.envelope, np.array([fast, fast, quicker, 1.0])),
+        envelope=_envelope(model.envelope, np.array([fast, fast, fast / size, 1.0])),
         provenance=(model.provenance or {})
         | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
         service_shaft_speed=model.service_shaft_speed * fast / size,
@@ -104,6 +101,10 @@ def _particulars(ship: Particulars, size: float, speed: float, water_density: fl
         denser = 1.0 if water_density is None else water_density / ship.require("water_density")
         changes["mass"] = ship.mass * size**3 * denser
     return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
+
+
+def _steering(gear: SteeringGear, quicker: float) -> SteeringGear:
+    return SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker)
 
 
 def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:
