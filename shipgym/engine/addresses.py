@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Sequence
 from functools import partial
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +33,7 @@ def array_at(dtype: Any, dimensions: int) -> Part:
             return np.zeros(shape, dtype)
         return np.frombuffer((ctypes.c_char * size).from_address(int(world[k])), dtype).reshape(shape)
 
-    def kind() -> Any:
-        from numba.core import types
-        from numba.np.numpy_support import from_dtype
-
-        return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
+    kind = partial(_kind, dtype, dimensions, "C")
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         word = context.get_value_type(kinds[1])
@@ -60,10 +56,7 @@ def plan_at(first: int) -> Part:
     def plan_of(state: Any, lane: int) -> Any:
         return state.reshape((-1, LANES))[first:, lane]
 
-    def kind() -> Any:
-        from numba.core import types
-
-        return types.Array(types.float64, 1, "A")
+    kind = partial(_kind, np.float64, 1, "A")
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         word = context.get_value_type(kinds[1])
@@ -73,3 +66,11 @@ def plan_at(first: int) -> Part:
         return new_array(context, builder, kind(), pointer, [length], [word(8 * LANES)])
 
     return Part(plan_of, code=partial(intrinsic, generate, 2, kind), key=("plan", first))
+
+
+def _kind(dtype: Any, dimensions: int, order: Literal["A", "C"]) -> Any:
+    """Numba's type of an array."""
+    from numba.core import types
+    from numba.np.numpy_support import from_dtype
+
+    return types.Array(from_dtype(np.dtype(dtype)), dimensions, order)

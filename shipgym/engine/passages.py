@@ -30,16 +30,8 @@ def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
 
 def in_depth(ship: Ship, water_depth: float) -> Ship:
     """The ship in water of another depth."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=ship.rudder_limit,
-        rudder_rate=ship.rudder_rate,
-        gear_frequency=ship.gear_frequency,
-        shaft=ship.shaft,
-        water_depth=water_depth,
-        scale_speed=ship.scale_speed,
-    )
+    limit, rate, frequency = ship.rudder_limit, ship.rudder_rate, ship.gear_frequency
+    return Ship(ship.length, ship.speed, limit, rate, frequency, ship.shaft, water_depth, ship.scale_speed)
 
 
 def replaced(m: Motion, psi: float, delta: float, n: float) -> Motion:

@@ -16,6 +16,7 @@ from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is
 Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
 Generate = Callable[[Any, Any, Any, Any], Any]
+Answer = Callable[[], Any] | None  # Numba's type of what a function returns
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Part:
@@ -164,9 +165,8 @@ def summer(record: Record) -> Part:
 
 
 def _part(
-    name: str, of: Rows | Record, more: object, function: Any, generate: Generate, answer: Callable[[],
-    Any] | None = None,
-) -> Part:  # fmt: skip
+    name: str, of: Rows | Record, more: object, function: Any, generate: Generate, answer: Answer = None
+) -> Part:
     """A part whose code depends on a record, on its rows, and on what more there is."""
     record = of.record if isinstance(of, Rows) else of
     rows = (of.first, of.present) if isinstance(of, Rows) else ()
@@ -175,7 +175,7 @@ def _part(
     return Part(function, code=partial(intrinsic, generate, arity, answer), key=key)
 
 
-def intrinsic(generate: Generate, arity: int, answer: Callable[[], Any] | None = None) -> Any:
+def intrinsic(generate: Generate, arity: int, answer: Answer = None) -> Any:
     """A function of its LLVM instructions; without an answer it returns nothing."""
     import numba.extending
     from numba.core import types

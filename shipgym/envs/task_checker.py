@@ -43,10 +43,6 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         The file of a task (`shipgym.tasks.contract`), or the name of one of the package's.
     **options
         Keywords of the environment, `model`, `reward` and `sensors` among them.
-
-    Returns
-    -------
-    TaskCheck
     """
     try:
         model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
@@ -126,8 +122,8 @@ def _fails_in_python(plain: Engine) -> str | None:
 def _not_finite(engine: Engine) -> Iterator[str]:
     """Parts of the reward, of the state and observations that are no finite numbers, each once."""
     engine.reset(np.arange(engine.num_envs))
-    state = engine.task.definition.State
-    names = [path for path in leaves(state) if path in engine._voyages.state["state"].present]
+    definition = engine.task.definition
+    names = [path for path in leaves(definition.State) if path in engine._voyages.state["state"].present]
     found: set[str] = set()
     for step in range(min(STEPS, engine.task.episode_steps)):
         seen, *_ = engine.step(_orders(engine, step))
@@ -139,16 +135,11 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             if name not in found and not np.isfinite(values).all():
                 found.add(name)
                 lane = int(np.argmax(~np.isfinite(values)))
+                own = definition.reward_source if name.startswith("reward_") else definition.source
                 yield (
-                    f"{_file_of(engine, name)}: {name} is {values[lane]} in lane {lane} at step "
+                    f"{own}: {name} is {values[lane]} in lane {lane} at step "
                     f"{step + 1}, expected finite numbers"
                 )
-
-
-def _file_of(engine: Engine, name: str) -> str:
-    """Where a number is worked out."""
-    definition = engine.task.definition
-    return definition.reward_source if name.startswith("reward_") else definition.source
 
 
 def _differ_compiled(compiled: Engine, plain: Engine) -> Iterator[str]:

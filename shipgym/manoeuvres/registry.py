@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -61,11 +61,8 @@ def _check_physical(model: ShipModel, trial: Trial) -> None:
             )
 
 
-class Variants(Protocol):
-    """From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name."""
-
-    def __call__(self, model: ShipModel, water_depth: float = np.inf) -> Mapping[str, Manoeuvre]:
-        """Her manoeuvres, none where they do not suit her."""
+#: From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name.
+Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
 
 
 @dataclass(frozen=True)

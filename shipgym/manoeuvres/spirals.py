@@ -134,22 +134,10 @@ def spiral_from_trial(
 ) -> Spiral:
     """The steady turns of a measured direct spiral.
 
-    A turn lasts while the rudder stays within a tolerance, or its order unchanged where that was
-    recorded; its yaw rate is the mean over the last third.
-
-    Parameters
-    ----------
-    trial : Trial
-        With r and delta (or delta_command).
-    rudder_deg : sequence of float, optional
-        Keep only turns within the tolerance of these angles, degrees; by default all.
-    tolerance_deg : float
-        Degrees.
-
-    Raises
-    ------
-    InputError
-        If a channel is missing, or there are fewer than four steady turns.
+    A turn lasts while the rudder stays within a tolerance, or its order unchanged where that was recorded;
+    its yaw rate is the mean over the last third. The trial has r and delta (or delta_command). With
+    `rudder_deg` only turns within the tolerance of these angles are kept, all in degrees. Raises InputError
+    if a channel is missing, or there are fewer than four steady turns.
     """
     require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
