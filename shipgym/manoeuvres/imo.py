@@ -87,27 +87,12 @@ def imo_assessment(
 
     Simulated from service speed in deep water: turning circles with 35 degrees of rudder, or the
     rudder's limit where that is less, and zigzags 10/10 and 20/20, each to both sides; a full astern stop
-    where the ship's equations hold for a shaft astern.
+    where the ship's equations hold for a shaft astern. To show how certain each verdict is, `n_draws` models
+    are drawn from the covariance of an identified ship, by default 100, and none for a ship without one.
 
-    Parameters
-    ----------
-    model : ShipModel
-    n_draws : int, optional
-        Models drawn from the covariance of an identified ship, to show how certain each verdict is; by
-        default 100, and none for a ship without covariance.
-    seed : int or Generator
-        Of the draw.
-
-    Returns
-    -------
-    dict of str to Criterion
-        `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`, `overshoot_2_10_10`,
-        `overshoot_1_20_20`, `stopping`.
-
-    Raises
-    ------
-    InputError
-        If draws are asked for and the model has no covariance.
+    Returns the criteria `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`,
+    `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises InputError if draws are asked for and the
+    model has no covariance.
     """
     usual = 0 if model.covariance is None else DRAWS
     count = int(check_number(usual if n_draws is None else n_draws, "n_draws", at_least=0))
