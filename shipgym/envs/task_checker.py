@@ -37,12 +37,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     hundred steps of many ships by orders of a beginner: rewards, state and observations finite and within
     their bounds; the same results compiled and in plain Python, for one ship and for many.
 
-    Parameters
-    ----------
-    task : str, Path or module
-        The file of a task (`shipgym.tasks.contract`), or the name of one of the package's.
-    **options
-        Keywords of the environment, `model`, `reward` and `sensors` among them.
+    The task is a file or module (`shipgym.tasks.contract`), or the name of one of the package's; options are
+    keywords of the environment, `model`, `reward` and `sensors` among them.
     """
     try:
         model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)

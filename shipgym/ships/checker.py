@@ -56,11 +56,8 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     (finite, as the table of terms says, alike to both sides); straight running; the side to which the rudder
     turns the ship; hard turns to both sides; the covariance.
 
-    Parameters
-    ----------
-    model : ShipModel, str or Path
-        A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
-        coefficient is missing for instance, is a problem found.
+    Given is a model, a shipped model's name or the path of a model file. A file that cannot be loaded,
+    because a coefficient is missing for instance, is a problem found.
     """
     name = str(model)
     try:
