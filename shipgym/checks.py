@@ -5,6 +5,7 @@ import math
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from numbers import Integral, Real
 from operator import ge, gt, le, lt
 from pathlib import Path
@@ -46,6 +47,30 @@ def placed(where: str) -> Iterator[None]:
         if str(error).startswith(where):
             raise
         raise InputError(f"{where}: {error}") from None
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What a battery of checks found."""
+
+    name: str  # of what was checked
+    problems: tuple[str, ...]  # what makes it unfit to be used, each with a remedy or its place
+    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are no problems."""
+        return not self.problems
+
+    @property
+    def verdict(self) -> str:
+        """Whether it is sound, in words."""
+        return "sound" if self.ok else f"{len(self.problems)} problem(s)"
+
+    def __str__(self) -> str:
+        """Verdict, then a line for each problem and remark."""
+        lines = [f"{self.name}: {self.verdict}", *(f"  problem: {problem}" for problem in self.problems)]
+        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
 
 
 def quoted(words: Iterable[str]) -> str:

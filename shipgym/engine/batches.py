@@ -17,33 +17,16 @@ def advance_tile(state: Any, command: Any, h: float, ships: Any) -> None:
     for lane in range(LANES):
         ship, coefficients = ship_at(common, ships, lane)
         motion = load_motion(state, lane)
-        after = sail(
-            motion,
-            command[lane],
-            command[LANES + lane],
-            h,
-            Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-            coefficients,
-            ship,
-        )
-        store_motion(state, lane, after)
+        rudder, shaft, calm = command[lane], command[LANES + lane], Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        store_motion(state, lane, sail(motion, rudder, shaft, h, calm, coefficients, ship))
 
 
 def advance_batch(states: Any, commands: Any, h: float, steps: int, ships: Any) -> None:
     """Some Runge-Kutta steps of h seconds of all ships, the commands held.
 
-    Parameters
-    ----------
-    states : array of shape (n_tiles, n_state * 64)
-        Changed in place.
-    commands : array of shape (n_tiles, 2 * 64)
-        Rudder angle, rad, and shaft speed, 1/s, of each lane.
-    h : float
-        Step, s.
-    steps : int
-        Number of steps.
-    ships : array of shape (n_ships, n_rows * 64)
-        One tile of ships for all, or one for each tile of states.
+    `states`, shape (n_tiles, n_state * 64), are changed in place; `commands`, (n_tiles, 2 * 64), are rudder
+    angle, rad, and shaft speed, 1/s, of each lane; `ships`, (n_ships, n_rows * 64), are one tile of ships for
+    all, or one for each tile of states.
     """
     for _ in range(steps):
         for tile in range(states.shape[0]):

@@ -26,26 +26,10 @@ SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to w
 def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     """A loop compiled with parts in the places that it names, or read from the cache.
 
-    Parameters
-    ----------
-    loop : function
-        A plain Python function on arrays.
-    signature : str
-        Of its arguments, as Numba writes it.
-    parts : mapping of str to Part, number or other global
-        What takes the place of the globals that loop and parts name.
-    what : str
-        For messages: what is compiled for whom.
-
-    Returns
-    -------
-    callable
-        With `NUMBA_DISABLE_JIT=1`, the same as plain Python.
-
-    Raises
-    ------
-    InputError
-        If a part does not compile, naming its function, the line and Numba's reason.
+    The loop is a plain Python function on arrays, the signature that of its arguments as Numba writes it;
+    `parts` (Parts, numbers or other globals) take the place of the globals that loop and parts name; `what`
+    says in messages what is compiled for whom. With `NUMBA_DISABLE_JIT=1` it is plain Python. Raises
+    InputError if a part does not compile, naming its function, the line and Numba's reason.
     """
     tag = fingerprint(loop, parts)
     if plain_python():
@@ -62,16 +46,15 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     folder = usable_folder()
     if folder is None:
         _announce(what, None)
-        _compile(dispatcher, signature, what)
-        return dispatcher
-    dispatcher._cache = disk = DiskCache(folder, tag, signature)
-    if disk.ready():
-        _compile(dispatcher, signature, what)
-        return dispatcher
-    with locked(lock_of(disk.path)):
-        if not disk.ready():  # another process may have been first
-            _announce(what, folder)
-        _compile(dispatcher, signature, what)
+    else:
+        dispatcher._cache = disk = DiskCache(folder, tag, signature)
+        if not disk.ready():
+            with locked(lock_of(disk.path)):
+                if not disk.ready():  # another process may have been first
+                    _announce(what, folder)
+                _compile(dispatcher, signature, what)
+                return dispatcher
+    _compile(dispatcher, signature, what)
     return dispatcher
 
 

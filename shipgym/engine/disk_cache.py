@@ -15,16 +15,9 @@ from shipgym.engine.cache_folder import LOOP, read_loop, tell, warn_of, write_lo
 
 
 class DiskCache(NullCache):  # type: ignore[misc]
-    """What Numba asks of a cache, for one loop.
+    """What Numba asks of a cache, for one loop, in a folder that need not be writable.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the cache; it need not be writable.
-    tag : str
-        Hash of everything that the loop depends on.
-    signature : str
-        Of its arguments.
+    `tag` is the hash of everything that the loop depends on, `signature` that of its arguments.
     """
 
     def __init__(self, folder: Path, tag: str, signature: str) -> None:

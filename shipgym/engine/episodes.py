@@ -377,15 +377,10 @@ STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked fo
 def run(world: Any, asked: int) -> int:
     """`step` or `reset` of arrays that are given by their addresses and shapes, by turns.
 
-    To look at a dozen arrays takes the interpreter longer than to sail a ship.
-
-    Parameters
-    ----------
-    world : int64 array
-        States, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags,
-        then the first tile of a step, the one behind its last, and room for the result of a tile.
-    asked : int
-        `STEP`; `STEP_AND_BEGIN`: episodes that were over begin anew; `BEGIN` or `BEGIN_NEXT` in some lanes.
+    To look at a dozen arrays takes the interpreter longer than to sail a ship. In `world`, int64, stand
+    states, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags, then
+    the first tile of a step, the one behind its last, and room for the result of a tile. Asked is `STEP`,
+    `STEP_AND_BEGIN` (episodes that were over begin anew), or `BEGIN` or `BEGIN_NEXT` in some lanes.
     """
     actions, observations = single_table_at(world, 19), single_table_at(world, 22)
     shown = Shown(rows_at(world, 15), observations, table_at(world, 25), flag_table_at(world, 28))

@@ -38,14 +38,9 @@ CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
 @contextmanager
 def lean(tag: str, loop: str) -> Iterator[None]:
-    """Compile functions whose name ends with `tag`, but for the loop, no further than they are needed.
+    """Compile functions whose name ends with `tag`, but for the one called `loop`, no further than needed.
 
-    Parameters
-    ----------
-    tag : str
-        At the end of the names of all functions that are compiled together.
-    loop : str
-        Name of the one that is called.
+    The tag ends the names of all functions that are compiled together.
     """
     with _replaced() as replace:
         if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):

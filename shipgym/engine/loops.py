@@ -19,27 +19,13 @@ SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parame
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop as it is compiled.
+    """A loop as it is compiled."""
 
-    Attributes
-    ----------
-    function : callable
-        A plain Python function on arrays.
-    signature : str
-        Of its arguments, as Numba writes it.
-    lanes : int
-        Of a tile of states: 64, or 1 where states are vectors.
-    shared : bool
-        Whether there is one ship only, so that her numbers are a vector.
-    parts : mapping of str to Part or other global
-        Beside the ship's and the sea's.
-    """
-
-    function: Callable[..., Any]
-    signature: str
-    lanes: int = 1
-    shared: bool = True
-    parts: Mapping[str, Any] = field(default_factory=dict)
+    function: Callable[..., Any]  # a plain Python function on arrays
+    signature: str  # of its arguments, as Numba writes it
+    lanes: int = 1  # of a tile of states: 64, or 1 where states are vectors
+    shared: bool = True  # whether there is one ship only, so that her numbers are a vector
+    parts: Mapping[str, Any] = field(default_factory=dict)  # beside the ship's and the sea's
 
 
 MEASURED_GEAR = {"HAS_LAG": False}

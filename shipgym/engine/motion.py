@@ -185,23 +185,10 @@ def way(motion: Motion) -> tuple[float, float]:
 def sail(
     motion: Motion, rudder: float, shaft: float, h: float, push: Push, coefficients: Any, ship: Ship
 ) -> Motion:
-    """State after one classical Runge-Kutta step of h seconds with the commands held.
+    """State after one classical Runge-Kutta step of h seconds with the commands held, rad and 1/s.
 
     The way made is summed in the frame of the heading at the start and turned once: the stages are but a
     small angle away from it, whose sine and cosine cost little.
-
-    Parameters
-    ----------
-    motion : Motion
-        The state.
-    rudder, shaft : float
-        Commanded rudder, rad, and shaft speed, 1/s.
-    h : float
-        Step, s.
-    push : Push
-        What the sea does, held over the step.
-    coefficients, ship
-        The ship.
     """
     order = clip(rudder, -ship.rudder_limit, ship.rudder_limit)
     n = motion.n if HAS_SHAFT else shaft

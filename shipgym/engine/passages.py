@@ -12,8 +12,7 @@ from typing import Any
 
 from shipgym.engine.motion import HAS_SEA, Motion, Push, Ship, sail
 from shipgym.engine.places import (
-    begin_sea, evolve, load_coefficients, load_motion, load_sea, load_sea_parameters, load_ship, push,
-    store_motion, store_sea,
+    begin_sea, evolve, load_motion, load_sea, load_sea_parameters, push, store_motion, store_sea,
 )  # fmt: skip
 
 #: What is recorded of the sea beside the state: first-order motion, current, wind.
@@ -24,54 +23,20 @@ NO_LIMIT = 1e300
 BEGIN_WORDS = EVOLVE_WORDS = 0  # parts: steps of the random numbers' state
 
 
-def ship_of(numbers: Any) -> Any:
-    """Ship and coefficients from the vector of her numbers."""
-    return load_ship(numbers, 0), load_coefficients(numbers, 0)
-
-
 def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
     """The ship with another steering gear, without lag."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=limit,
-        rudder_rate=rate,
-        gear_frequency=0.0,
-        shaft=ship.shaft,
-        water_depth=ship.water_depth,
-        scale_speed=ship.scale_speed,
-    )
+    return Ship(ship.length, ship.speed, limit, rate, 0.0, ship.shaft, ship.water_depth, ship.scale_speed)
 
 
 def in_depth(ship: Ship, water_depth: float) -> Ship:
     """The ship in water of another depth."""
-    return Ship(
-        length=ship.length,
-        speed=ship.speed,
-        rudder_limit=ship.rudder_limit,
-        rudder_rate=ship.rudder_rate,
-        gear_frequency=ship.gear_frequency,
-        shaft=ship.shaft,
-        water_depth=water_depth,
-        scale_speed=ship.scale_speed,
-    )
+    limit, rate, frequency = ship.rudder_limit, ship.rudder_rate, ship.gear_frequency
+    return Ship(ship.length, ship.speed, limit, rate, frequency, ship.shaft, water_depth, ship.scale_speed)
 
 
-def replaced(motion: Motion, psi: float, delta: float, n: float) -> Motion:
+def replaced(m: Motion, psi: float, delta: float, n: float) -> Motion:
     """A state with another heading, rudder angle and shaft speed."""
-    return Motion(
-        x=motion.x,
-        y=motion.y,
-        psi=psi,
-        u=motion.u,
-        v=motion.v,
-        r=motion.r,
-        p=motion.p,
-        phi=motion.phi,
-        q=motion.q,
-        delta=delta,
-        n=n,
-    )
+    return Motion(m.x, m.y, psi, m.u, m.v, m.r, m.p, m.phi, m.q, delta, n)
 
 
 def advanced(

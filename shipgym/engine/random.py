@@ -15,12 +15,8 @@ TO_UNIT = 1.0 / 9007199254740992.0  # 2**-53
 WEATHER_STREAM = np.uint64(0xA0761D6478BD642F)  # apart from the draws of an episode's task
 #: Steps from a state of the generator to each number drawn at it, and to the next state.
 DRAW = tuple(np.uint64((k * 0x9E3779B97F4A7C15) % 2**64) for k in range(16))
-QUARTERS, S16, S32, LOW_32 = (
-    np.uint64(0x0000FFFF0000FFFF),
-    np.uint64(16),
-    np.uint64(32),
-    np.uint64(0xFFFFFFFF),
-)
+S16, S32 = np.uint64(16), np.uint64(32)
+QUARTERS, LOW_32 = np.uint64(0x0000FFFF0000FFFF), np.uint64(0xFFFFFFFF)
 
 
 def mix(word: np.uint64) -> np.uint64:
@@ -53,11 +49,5 @@ def normal(word: np.uint64, draw: np.uint64) -> float:
     total = np.int32((pairs & LOW_32) + (pairs >> S32))
     t = (float(total) - 131070.0) * (1.0 / 65536.0)
     z = t * t
-    return t * (
-        1.6670030710794617
-        + z
-        * (
-            0.04695799541224908
-            + z * (0.030027949208590633 + z * (-0.018156674707275382 + z * 0.005565249837221889))
-        )
-    )
+    rest = 0.030027949208590633 + z * (-0.018156674707275382 + z * 0.005565249837221889)
+    return t * (1.6670030710794617 + z * (0.04695799541224908 + z * rest))

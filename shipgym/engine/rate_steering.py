@@ -6,8 +6,9 @@ from typing import Any
 
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import lost, sail
-from shipgym.engine.passages import felt, follow, ship_of
+from shipgym.engine.passages import felt, follow
 from shipgym.engine.places import load_motion
+from shipgym.engine.vessel import read_ship
 
 
 def steer_rate(
@@ -20,7 +21,7 @@ def steer_rate(
     helmsman's rudder and is changed; for `out` and the rest see `passages`. Returns the last row at which
     the ship had not yet run away.
     """
-    ship, coefficients = ship_of(numbers)
+    ship, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
     limit = ship.rudder_limit
     kept = memory[0]

@@ -16,6 +16,7 @@ from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is
 Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
 Generate = Callable[[Any, Any, Any, Any], Any]
+Answer = Callable[[], Any] | None  # Numba's type of what a function returns
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Part:
@@ -60,7 +61,7 @@ def row_reader(lanes: int = LANES) -> Part:
         index = builder.mul(values[1], word(lanes), flags=("nsw",))
         return builder.load(builder.gep(values[0], [index], inbounds=True))
 
-    return Part(row_of, code=partial(_intrinsic, generate, 2, _double), key=("row", lanes))
+    return Part(row_of, code=partial(intrinsic, generate, 2, _double), key=("row", lanes))
 
 
 def storer(rows: Rows, lanes: int = LANES) -> Part:
@@ -112,7 +113,7 @@ def number_storer(row: int) -> Part:
         builder.store(values[2], _entry(context, builder, kinds[0], values[0], row, LANES, values[1]))
         return context.get_dummy_value()
 
-    return Part(store, code=partial(_intrinsic, generate, 3), key=("number", row))
+    return Part(store, code=partial(intrinsic, generate, 3), key=("number", row))
 
 
 def chooser(record: Record) -> Part:
@@ -164,21 +165,20 @@ def summer(record: Record) -> Part:
 
 
 def _part(
-    name: str, of: Rows | Record, more: object, function: Any, generate: Generate, answer: Callable[[],
-    Any] | None = None,
-) -> Part:  # fmt: skip
+    name: str, of: Rows | Record, more: object, function: Any, generate: Generate, answer: Answer = None
+) -> Part:
     """A part whose code depends on a record, on its rows, and on what more there is."""
     record = of.record if isinstance(of, Rows) else of
     rows = (of.first, of.present) if isinstance(of, Rows) else ()
     key = (name, _shape(record), rows, more)
     arity = function.__code__.co_argcount
-    return Part(function, code=partial(_intrinsic, generate, arity, answer), key=key)
+    return Part(function, code=partial(intrinsic, generate, arity, answer), key=key)
 
 
-def _intrinsic(generate: Generate, arity: int, answer: Callable[[], Any] | None = None) -> Any:
+def intrinsic(generate: Generate, arity: int, answer: Answer = None) -> Any:
     """A function of its LLVM instructions; without an answer it returns nothing."""
+    import numba.extending
     from numba.core import types
-    from numba.extending import intrinsic
 
     def typed(*kinds: Any) -> Any:
         def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
@@ -194,7 +194,7 @@ def _intrinsic(generate: Generate, arity: int, answer: Callable[[], Any] | None 
         lambda typing, a, b, c: typed(a, b, c),
         lambda typing, a, b, c, d: typed(a, b, c, d),
     )
-    return intrinsic(forms[arity])
+    return numba.extending.intrinsic(forms[arity])
 
 
 def _double() -> Any:
@@ -285,19 +285,22 @@ def _entry(context: Any, builder: Any, kind: Any, array: Any, row: int, lanes: i
 
 
 def _rest(context: Any, builder: Any, kind: Any, array: Any, first: int) -> Any:
-    """What follows in a vector, as an array that keeps nothing alive."""
+    """What follows in a vector."""
     from numba.core import types
-    from numba.np.arrayobj import populate_array
 
     word = context.get_value_type(types.intp)
     whole = context.make_array(kind)(context, builder, array)
-    rest = context.make_array(types.float64[::1])(context, builder)
-    populate_array(
-        rest,
-        data=builder.gep(whole.data, [word(first)]),
-        shape=[builder.sub(whole.nitems, word(first))],
-        strides=[word(8)],
-        itemsize=word(8),
-        meminfo=None,
-    )
-    return rest._getvalue()
+    pointer, length = builder.gep(whole.data, [word(first)]), builder.sub(whole.nitems, word(first))
+    return new_array(context, builder, types.float64[::1], pointer, [length], [word(8)])
+
+
+def new_array(context: Any, builder: Any, kind: Any, pointer: Any, shape: Any, strides: Any) -> Any:
+    """An array that keeps nothing alive."""
+    from numba.core import types
+    from numba.np.arrayobj import populate_array
+    from numba.np.numpy_support import as_dtype
+
+    item = context.get_value_type(types.intp)(as_dtype(kind.dtype).itemsize)
+    array = context.make_array(kind)(context, builder)
+    populate_array(array, data=pointer, shape=shape, strides=strides, itemsize=item, meminfo=None)
+    return array._getvalue()

@@ -61,21 +61,11 @@ def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Rows:
-    """Where the numbers of a record stand.
+    """Where the numbers of a record stand."""
 
-    Attributes
-    ----------
-    record : type
-        A `NamedTuple` of floats, or of such records.
-    first : int
-        Row of its first number.
-    present : tuple of str
-        Paths of the numbers that have a row; the others are 0 and not stored.
-    """
-
-    record: Record
-    first: int
-    present: tuple[str, ...]
+    record: Record  # a `NamedTuple` of floats, or of such records
+    first: int  # row of its first number
+    present: tuple[str, ...]  # paths of the numbers that have a row; the others are 0 and not stored
 
     @property
     def end(self) -> int:
@@ -93,13 +83,7 @@ class Rows:
 
 
 class Layout:
-    """Rows of several records, one after another.
-
-    Parameters
-    ----------
-    **records : type, or tuple of type and iterable of str
-        By name; with a tuple, only the named numbers have rows.
-    """
+    """Rows of several records by name, one after another; of a record in a tuple with names only these."""
 
     def __init__(self, **records: Any) -> None:
         self.rows: dict[str, Rows] = {}

@@ -14,24 +14,12 @@ from shipgym.engine.records import LANES
 def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any, out: Any) -> None:
     """From the tile's state through a grid of measured inputs, straight between its points.
 
-    A measured rudder is a steering gear without limit or lag that moves at the measured rate; `state` is
-    changed. A ship that runs away leaves numbers that are not finite, or not any ship's.
-
-    Parameters
-    ----------
-    state : float64 array of shape (n_state * 64,)
-        Where each ship starts.
-    ships : float64 array of shape (n_rows * 64,)
-        A tile of ships.
-    offsets : float64 array of shape (64,)
-        Added to the measured rudder, rad.
-    inputs : float64 array of shape (n_points, 6)
-        Time, s, rudder, rad, shaft speed, 1/s, and the accelerations by wind in surge, sway and yaw, of
-        which a loop for calm water knows nothing.
-    samples : int64 array of shape (n_points,)
-        Row of `out` that takes the state at a point, -1 for none.
-    out : float64 array of shape (n_samples, n_state * 64)
-        The states at the samples.
+    A measured rudder is a steering gear without limit or lag that moves at the measured rate. `state` is
+    where each ship starts, and is changed; `offsets`, shape (64,), are added to the measured rudder, rad;
+    `inputs`, (n_points, 6), are time, s, rudder, rad, shaft speed, 1/s, and the accelerations by wind in
+    surge, sway and yaw, of which a loop for calm water knows nothing. `samples`, (n_points,), has the row of
+    `out`, (n_samples, n_state * 64), that takes the state at a point, -1 for none. A ship that runs away
+    leaves numbers that are not finite, or not any ship's.
     """
     for lane in range(LANES):
         motion = load_motion(state, lane)
@@ -46,11 +34,8 @@ def sail_segment(state: Any, ships: Any, offsets: Any, inputs: Any, samples: Any
         aside = 0.5 * (inputs[i, 4] + inputs[i + 1, 4])
         about = 0.5 * (inputs[i, 5] + inputs[i + 1, 5])
         for lane in range(LANES):
-            ship, coefficients = (
-                with_gear(load_ship(ships, lane), NO_LIMIT, rate),
-                load_coefficients(ships, lane),
-            )
-            delta = order + offsets[lane]
+            ship = with_gear(load_ship(ships, lane), NO_LIMIT, rate)
+            coefficients, delta = load_coefficients(ships, lane), order + offsets[lane]
             wind = Push(ahead, aside, about, 0.0, 0.0, 0.0)
             motion = sail(load_motion(state, lane), delta, shaft, h, wind, coefficients, ship)
             store_motion(state, lane, replaced(motion, motion.psi, delta, motion.n))

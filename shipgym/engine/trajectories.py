@@ -11,13 +11,14 @@ from typing import Any
 
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import HAS_SHAFT, Motion, Push, ground_velocity, lost, rates, rudder_velocity, sail
-from shipgym.engine.passages import NO_LIMIT, felt, follow, in_depth, replaced, ship_of, with_gear
+from shipgym.engine.passages import NO_LIMIT, felt, follow, in_depth, replaced, with_gear
 from shipgym.engine.places import load_motion, store_motion
+from shipgym.engine.vessel import read_ship
 
 
 def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any) -> None:
     """Time derivative of each state; `commands` holds rudder angle and shaft speed."""
-    ship, coefficients = ship_of(numbers)
+    ship, coefficients = read_ship(numbers)
     for i in range(states.shape[0]):
         at, stored = in_depth(ship, depths[i]), load_motion(states[i], 0)
         n = stored.n if HAS_SHAFT else commands[i, 1]
@@ -33,7 +34,7 @@ def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any)
 
 def simulate(out: Any, commands: Any, h: float, sea: Any, words: Any, parameters: Any, numbers: Any) -> int:
     """From the state in row 0 with one row of commands (rudder, shaft speed) a step of h seconds."""
-    ship, coefficients = ship_of(numbers)
+    ship, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
     for i in range(commands.shape[0]):
         pushed = felt(motion, sea, parameters)
@@ -51,7 +52,7 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: flo
     calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a
     loop for calm water knows nothing.
     """
-    own, coefficients = ship_of(numbers)
+    own, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
     for i in range(t.shape[0] - 1):
         interval = t[i + 1] - t[i]

@@ -16,30 +16,16 @@ from shipgym.engine.records import LANES, Layout, Record, Rows
 
 @dataclass(frozen=True, eq=False)
 class Vessel:
-    """What is compiled of a ship; ships that share it differ in numbers only.
+    """What is compiled of a ship; ships that share it differ in numbers only."""
 
-    Attributes
-    ----------
-    name : str
-        For messages.
-    state_names : tuple of str
-        Numbers of `Motion` that she has, in its order.
-    coefficients : type
-        `NamedTuple` of the numbers that her functions read.
-    functions : mapping of str to Part or other global
-        `accelerations`, `shaft_acceleration`, and what these name in turn (see `shipgym.engine.motion`).
-    lag : bool
-        Whether her steering gear has a time constant.
-    summed : mapping of str to Part
-        Of a ship part of whose accelerations is a sum over a table: what takes the place of her functions
-        where many ships are sailed (`shipgym.engine.stages`).
-    """
-
-    name: str
-    state_names: tuple[str, ...]
-    coefficients: Record
+    name: str  # for messages
+    state_names: tuple[str, ...]  # numbers of `Motion` that she has, in its order
+    coefficients: Record  # `NamedTuple` of the numbers that her functions read
+    # Parts or other globals: `accelerations`, `shaft_acceleration`, and what these name in turn
     functions: Mapping[str, Any]
-    lag: bool
+    lag: bool  # whether her steering gear has a time constant
+    # of a ship part of whose accelerations is a sum over a table: Parts that take the place of her functions
+    # where many ships are sailed (`shipgym.engine.stages`)
     summed: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -55,16 +41,10 @@ class Vessel:
     def parts(self, lanes: int = LANES, shared: bool = True) -> dict[str, Any]:
         """What takes the place of the globals of `shipgym.engine.motion` and of the loops.
 
-        Parameters
-        ----------
-        lanes : int
-            Of a tile of states, 64, or 1 where states are vectors.
-        shared : bool
-            Whether all lanes have the same ship, so that her numbers are a vector and not a tile.
+        `lanes` are those of a tile of states, 64, or 1 where states are vectors. With `shared` all lanes have
+        the same ship: her numbers are a vector and not a tile.
         """
         return {
-            "accelerations": Part(no_accelerations),
-            "shaft_acceleration": Part(no_shaft),
             **self.functions,
             "HAS_ROLL": "phi" in self.state_names,
             "HAS_SHAFT": "n" in self.state_names,
@@ -81,18 +61,8 @@ class Vessel:
         }
 
 
-def no_accelerations(motion: Any, coefficients: Any, ship: Any) -> tuple[float, ...]:
-    """Those of a body without forces."""
-    return 0.0, 0.0, 0.0, 0.0, 0.0
-
-
-def no_shaft(n: float, command: float, coefficients: Any, ship: Any) -> float:
-    """A shaft without dynamics."""
-    return 0.0
-
-
 def read_ship(ships: Any) -> Any:
-    """The ship of all lanes, read once before a loop."""
+    """Ship and coefficients of one ship, or of all lanes, read once before a loop."""
     return load_ship(ships, 0), load_coefficients(ships, 0)
 
 

@@ -25,17 +25,10 @@ from shipgym.tasks.definition import TaskDefinition
 
 @dataclass(frozen=True)
 class Sensors:
-    """A sensor set as it is compiled.
+    """A sensor set as it is compiled."""
 
-    Attributes
-    ----------
-    module : module
-        With `Settings`, `Memory`, `measure` and `readings`.
-    noise, filter : bool
-        Whether a bridge's instruments are noisy, and whether they filter.
-    """
-
-    module: Any
+    module: Any  # with `Settings`, `Memory`, `measure` and `readings`
+    # whether a bridge's instruments are noisy, and whether they filter
     noise: bool = False
     filter: bool = False
 
@@ -54,27 +47,13 @@ def sensors_for(windy: bool, noise: bool, filtered: bool) -> Sensors:
 
 @dataclass(frozen=True, eq=False)
 class Voyages:
-    """Episodes of one task with ships that differ in numbers only.
-
-    Attributes
-    ----------
-    vessel : Vessel
-        The ship.
-    task : TaskDefinition
-        What is asked.
-    sensors : Sensors
-        What she is seen by.
-    windy : bool
-        Whether there is current, wind or waves.
-    shared : bool
-        Whether all lanes have the same ship and sea.
-    """
+    """Episodes of one task with ships that differ in numbers only."""
 
     vessel: Vessel
     task: TaskDefinition
     sensors: Sensors
-    windy: bool
-    shared: bool
+    windy: bool  # whether there is current, wind or waves
+    shared: bool  # whether all lanes have the same ship and sea
 
     @cached_property
     def state(self) -> Layout:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from shipgym.engine.motion import Motion, Push, Ship, lost
-from shipgym.engine.passages import advanced, felt, follow, replaced, ship_of
+from shipgym.engine.passages import advanced, felt, follow, replaced
 from shipgym.engine.places import load_motion
+from shipgym.engine.vessel import read_ship
 
 SWITCH_ITERATIONS = 12
 
@@ -48,7 +49,7 @@ def zigzag(
     side of the order, at that instant (`inside_step`) or at the next sample. The second number
     returned counts the reversals.
     """
-    ship, coefficients = ship_of(numbers)
+    ship, coefficients = read_ship(numbers)
     first = load_motion(out[0], 0)
     start = first.psi
     motion = replaced(first, 0.0, first.delta, first.n)

@@ -1,6 +1,7 @@
 """A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
 from collections.abc import Callable
+from contextlib import ExitStack, closing
 from typing import Any
 
 import gymnasium
@@ -42,11 +43,8 @@ def check_vector_env(
         Naming the first promise that is not kept, what was found and what is expected.
     """
     for check in (_check_spaces, _check_reset, _check_steps, _check_seeds, _check_actions, _check_autoreset):
-        env = make()
-        try:
+        with closing(make()) as env:
             check(env, n_steps)
-        finally:
-            env.close()
     if make_single is not None:
         _check_rows(make, make_single, n_steps)
 
@@ -69,9 +67,8 @@ def autoreset_mode(env: VectorEnv[Any, Any, Any]) -> AutoresetMode:
 
 def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     autoreset_mode(env)
-    _expect(
-        isinstance(env.num_envs, int) and env.num_envs >= 1, f"num_envs is {env.num_envs!r}, expected >= 1"
-    )
+    n = env.num_envs
+    _expect(isinstance(n, int) and n >= 1, f"num_envs is {n!r}, expected >= 1")
     for which in ("observation", "action"):
         single, batch = getattr(env, f"single_{which}_space"), getattr(env, f"{which}_space")
         expected = gymnasium.vector.utils.batch_space(single, env.num_envs)
@@ -82,10 +79,8 @@ def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
 
 def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     answer = env.reset(seed=SEED)
-    _expect(
-        isinstance(answer, tuple) and len(answer) == 2,
-        f"reset returned {type(answer)}, expected (observations, infos)",
-    )
+    pair = isinstance(answer, tuple) and len(answer) == 2
+    _expect(pair, f"reset returned {type(answer)}, expected (observations, infos)")
     observations, infos = answer
     _check_observations(env, observations, "reset")
     _check_infos(env, infos, "reset")
@@ -116,10 +111,8 @@ def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
 
 
 def _check_observations(env: VectorEnv[Any, Any, Any], observations: Any, where: str) -> None:
-    _expect(
-        observations in env.observation_space,
-        f"{where}: observations {observations} are not in {env.observation_space}",
-    )
+    space = env.observation_space
+    _expect(observations in space, f"{where}: observations {observations} are not in {space}")
 
 
 def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
@@ -135,17 +128,14 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
         if isinstance(value, dict):
             _check_infos(env, value, f"{where}, {key}")
         else:
-            length = len(value) if isinstance(value, np.ndarray) else None
-            _expect(
-                length == env.num_envs,
-                f"{where}: infos['{key}'] is {value!r}, expected an entry for each row",
-            )
+            rows = isinstance(value, np.ndarray) and len(value) == env.num_envs
+            _expect(rows, f"{where}: infos['{key}'] is {value!r}, expected an entry for each row")
 
 
 def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
+    listed = [SEED + i for i in range(env.num_envs)]
     first, again, list_of_seeds, other = (
-        _rollout(env, seed, n_steps)
-        for seed in (SEED, SEED, [SEED + i for i in range(env.num_envs)], SEED + 10_000)
+        _rollout(env, seed, n_steps) for seed in (SEED, SEED, listed, SEED + 10_000)
     )
     _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
     _expect(
@@ -168,11 +158,8 @@ def _rollout(env: VectorEnv[Any, Any, Any], seed: Any, n_steps: int) -> Episode:
 
 
 def _same(one: Episode, other: Episode) -> bool:
-    return all(
-        np.array_equal(a, b)
-        for left, right in zip(one, other, strict=True)
-        for a, b in zip(left, right, strict=True)
-    )
+    steps = zip(one, other, strict=True)
+    return all(np.array_equal(a, b) for left, right in steps for a, b in zip(left, right, strict=True))
 
 
 def _check_actions(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
@@ -238,15 +225,13 @@ def _check_rows(
     make_single: Callable[[], gymnasium.Env[Any, Any]],
     n_steps: int,
 ) -> None:
-    env = make()
-    singles = [make_single() for _ in range(env.num_envs)]
-    mode = autoreset_mode(env)
-    try:
+    with closing(make()) as env, ExitStack() as stack:
+        singles = [stack.enter_context(closing(make_single())) for _ in range(env.num_envs)]
+        mode = autoreset_mode(env)
         env.action_space.seed(SEED)
         observations, _ = env.reset(seed=SEED)
         for i, single in enumerate(singles):
-            expected, _ = single.reset(seed=SEED + i)
-            _expect_row(i, observations[i], expected)
+            _expect_row(i, observations[i], single.reset(seed=SEED + i)[0])
         ended = np.zeros(env.num_envs, dtype=np.bool_)
         for _ in range(n_steps):
             actions = env.action_space.sample()
@@ -259,10 +244,6 @@ def _check_rows(
             ended = terminated | truncated
             if mode is AutoresetMode.DISABLED and np.any(ended):
                 break
-    finally:
-        env.close()
-        for single in singles:
-            single.close()
 
 
 def _row(single: gymnasium.Env[Any, Any], action: Any, ended: bool, mode: AutoresetMode) -> tuple[Any, ...]:

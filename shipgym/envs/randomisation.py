@@ -95,7 +95,9 @@ class Randomisation:
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
-            ship = _at_speed(ship, paces[id(ship.particulars)][random.integers(N_SPEEDS)])
+            own, pace = ship.particulars, paces[id(ship.particulars)][random.integers(N_SPEEDS)]
+            shaft = pace["speed"] / own["speed"] * ship.service_shaft_speed  # in proportion
+            ship = replace(ship, particulars=pace, service_shaft_speed=shaft)
         return ship
 
 
@@ -104,12 +106,6 @@ def _check_range(given: Any, name: str) -> None:
         raise InputError(f"{name}: {given!r} found, expected the least and the largest, two numbers")
     check_number(given[0], f"{name}: the least", above=0.0)
     check_number(given[1], f"{name}: the largest", at_least=given[0])
-
-
-def _at_speed(ship: ShipModel, particulars: Particulars) -> ShipModel:
-    """A ship with another approach speed, and shaft speed in proportion."""
-    part = particulars["speed"] / ship.particulars["speed"]
-    return replace(ship, particulars=particulars, service_shaft_speed=part * ship.service_shaft_speed)
 
 
 def _loaded(ship: ShipModel, displacement: float) -> ShipModel:

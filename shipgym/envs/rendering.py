@@ -97,8 +97,7 @@ class Renderer:
         self._brush.show(self._surface)
         if self.mode == "human":
             self._show()
-        pixels: Picture = np.transpose(self._pygame.surfarray.array3d(self._surface), (1, 0, 2))
-        return pixels
+        return np.transpose(self._pygame.surfarray.array3d(self._surface), (1, 0, 2))
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -131,7 +130,8 @@ class Renderer:
         if scene.corridor is not None:
             half = scene.corridor / chart.metres
             for start, end in pairwise(points):
-                brush.polygon(CORRIDOR, _strip(start, end, half))
+                side = half * _axes(start, end)[1]
+                brush.polygon(CORRIDOR, [start + side, end + side, end - side, start - side])
             for point in points:
                 brush.circle(CORRIDOR, point, half)
         brush.lines(PATH, points, 2)
@@ -176,14 +176,9 @@ class Renderer:
             corners = ((-4.0, 0.0), (9.0, -0.09), (9.0, 0.09))
             order = scene.course_order
             brush.polygon(ORDER, [_on_circle(centre, radius + out, order + side) for out, side in corners])
-        if scene.wind is not None:
-            origin = scene.wind[1]
-            brush.arrow(WIND, _on_circle(centre, radius + 12.0, origin),
-                        _on_circle(centre, radius - 8.0, origin))  # fmt: skip
-        if scene.current is not None:
-            towards = scene.current[1]
-            brush.arrow(CURRENT, _on_circle(centre, radius - 8.0, towards),
-                        _on_circle(centre, radius + 12.0, towards))  # fmt: skip
+        for colour, flow, ends in ((WIND, scene.wind, (12.0, -8.0)), (CURRENT, scene.current, (-8.0, 12.0))):
+            if flow is not None:
+                brush.arrow(colour, *(_on_circle(centre, radius + out, flow[1]) for out in ends))
 
     def _draw_gauge(self, scene: Scene, centre: Point, width: float) -> None:
         brush, (x, y) = self._brush, centre
@@ -249,8 +244,7 @@ class _Brush:
 
     def arrow(self, colour: Colour, start: Any, end: Any) -> None:
         tail, tip = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
-        along = (tip - tail) / max(hypot(*(tip - tail)), 1e-9)
-        across = np.array([-along[1], along[0]])
+        along, across = _axes(tail, tip)
         self.line(colour, tail, tip - 5.0 * along, 2)
         self.polygon(colour, [tip, tip - 9.0 * along + 4.0 * across, tip - 9.0 * along - 4.0 * across])
 
@@ -320,7 +314,7 @@ def _on_circle(centre: Point, radius: float, bearing: float) -> Point:
     return centre[0] + radius * cos(angle), centre[1] + radius * sin(angle)
 
 
-def _strip(start: Floats, end: Floats, half: float) -> list[list[float]]:
+def _axes(start: Floats, end: Floats) -> tuple[Floats, Floats]:
+    """Unit vectors along a line and across it."""
     along = (end - start) / max(hypot(*(end - start)), 1e-9)
-    across = half * np.array([-along[1], along[0]])
-    return [corner.tolist() for corner in (start + across, end + across, end - across, start - across)]
+    return along, np.array([-along[1], along[0]])

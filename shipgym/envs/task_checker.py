@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
+from shipgym.checks import Findings
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
@@ -26,34 +26,8 @@ BEYOND = 1e-6  # of a bound, what rounding makes
 OFTEN = 0.05  # part of the observations beyond their bounds that is worth a remark
 
 
-@dataclass(frozen=True)
-class TaskCheck:
-    """What a check of a task found.
-
-    Attributes
-    ----------
-    name : str
-        Of the task, or its file.
-    problems : tuple of str
-        What makes it unfit to be used, each with its place; empty for a sound task.
-    remarks : tuple of str
-        What is unusual, and may be right.
-    """
-
-    name: str
-    problems: tuple[str, ...]
-    remarks: tuple[str, ...] = ()
-
-    @property
-    def ok(self) -> bool:
-        """Whether there are no problems."""
-        return not self.problems
-
-    def __str__(self) -> str:
-        """Verdict, then a line for each problem and remark."""
-        verdict = "sound" if self.ok else f"{len(self.problems)} problem(s)"
-        lines = [f"{self.name}: {verdict}", *(f"  problem: {problem}" for problem in self.problems)]
-        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+class TaskCheck(Findings):
+    """What a check of a task found; its name is that of the task, or its file."""
 
 
 def check_task(task: Any, **options: Any) -> TaskCheck:
@@ -63,16 +37,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     hundred steps of many ships by orders of a beginner: rewards, state and observations finite and within
     their bounds; the same results compiled and in plain Python, for one ship and for many.
 
-    Parameters
-    ----------
-    task : str, Path or module
-        The file of a task (`shipgym.tasks.contract`), or the name of one of the package's.
-    **options
-        Keywords of the environment, `model`, `reward` and `sensors` among them.
-
-    Returns
-    -------
-    TaskCheck
+    The task is a file or module (`shipgym.tasks.contract`), or the name of one of the package's; options are
+    keywords of the environment, `model`, `reward` and `sensors` among them.
     """
     try:
         model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
@@ -152,8 +118,8 @@ def _fails_in_python(plain: Engine) -> str | None:
 def _not_finite(engine: Engine) -> Iterator[str]:
     """Parts of the reward, of the state and observations that are no finite numbers, each once."""
     engine.reset(np.arange(engine.num_envs))
-    state = engine.task.definition.State
-    names = [path for path in leaves(state) if path in engine._voyages.state["state"].present]
+    definition = engine.task.definition
+    names = [path for path in leaves(definition.State) if path in engine._voyages.state["state"].present]
     found: set[str] = set()
     for step in range(min(STEPS, engine.task.episode_steps)):
         seen, *_ = engine.step(_orders(engine, step))
@@ -165,16 +131,11 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             if name not in found and not np.isfinite(values).all():
                 found.add(name)
                 lane = int(np.argmax(~np.isfinite(values)))
+                own = definition.reward_source if name.startswith("reward_") else definition.source
                 yield (
-                    f"{_file_of(engine, name)}: {name} is {values[lane]} in lane {lane} at step "
+                    f"{own}: {name} is {values[lane]} in lane {lane} at step "
                     f"{step + 1}, expected finite numbers"
                 )
-
-
-def _file_of(engine: Engine, name: str) -> str:
-    """Where a number is worked out."""
-    definition = engine.task.definition
-    return definition.reward_source if name.startswith("reward_") else definition.source
 
 
 def _differ_compiled(compiled: Engine, plain: Engine) -> Iterator[str]:

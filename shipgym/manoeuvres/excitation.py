@@ -88,28 +88,10 @@ def multi_sine_rudder(
 ) -> Trial:
     """Simulate a multi-sine rudder: all harmonics of 1 / duration in a band, of equal amplitude.
 
-    The phases are the draw with the smallest crest among 32.
-
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, straight ahead at service speed.
-    amplitude_deg : float
-        Largest rudder angle, degrees.
-    seed : int or Generator
-        Of the phases.
-    longest_period_s, shortest_period_s : float, optional
-        The band, s; by default 20 and 2 times the time to travel one ship length.
-    duration, dt, water_depth, weather
-        As in `prbs_rudder`.
-
-    Raises
-    ------
-    InputError
-        For an amplitude beyond the rudder's limit, a band without a harmonic or beyond the samples, or a
-        time that is not above 0.
-    UnstableModelError
-        If the ship runs away.
+    The phases, of the seed, are the draw with the smallest crest among 32; the amplitude is the largest
+    rudder angle, degrees. The band is from `longest_period_s` to `shortest_period_s`, s, by default 20 and 2
+    times the time to travel one ship length; InputError for one without a harmonic or beyond the samples.
+    Otherwise as `prbs_rudder`.
     """
     amplitude = _rudder_angle(model, amplitude_deg, "amplitude_deg")
     times = _times(duration, dt)
@@ -148,25 +130,9 @@ def random_rudder_steps(
 ) -> Trial:
     """Simulate rudder steps of random angle and length, both evenly distributed.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, straight ahead at service speed.
-    largest_deg : float
-        Largest rudder angle to either side, degrees.
-    seed : int or Generator
-        Of the steps.
-    shortest_s, longest_s : float, optional
-        How long an angle is held, s; by default 0.5 to 4 times the time to travel one ship length.
-    duration, dt, water_depth, weather
-        As in `prbs_rudder`.
-
-    Raises
-    ------
-    InputError
-        For an angle beyond the rudder's limit, or a time that is not above 0.
-    UnstableModelError
-        If the ship runs away.
+    Angles are up to `largest_deg` to either side, degrees, each held for `shortest_s` to `longest_s`, s, by
+    default 0.5 to 4 times the time to travel one ship length. The seed is that of the steps; otherwise as
+    `prbs_rudder`.
     """
     largest = _rudder_angle(model, largest_deg, "largest_deg")
     times = _times(duration, dt)
@@ -190,28 +156,10 @@ def shaft_speed_steps(
 ) -> Trial:
     """Simulate steps of the ordered shaft speed, of random speed and length, both evenly distributed.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A ship whose propeller is in its equations, straight ahead at service speed.
-    lowest_ratio, highest_ratio : float
-        Range of the orders, in parts of the shaft speed at service speed; ahead only.
-    seed : int or Generator
-        Of the steps.
-    shortest_s, longest_s : float, optional
-        How long a speed is held, s; by default 5 to 15 times the time to travel one ship length.
-    rudder_deg : float
-        Rudder held meanwhile, degrees.
-    duration, dt, water_depth, weather
-        As in `prbs_rudder`.
-
-    Raises
-    ------
-    InputError
-        For a ship without a shaft, a range that is not ahead or beyond 1.5, a rudder beyond its limit, or a
-        time that is not above 0.
-    UnstableModelError
-        If the ship runs away.
+    Orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed, ahead and at most 1.5,
+    each held for `shortest_s` to `longest_s`, s, by default 5 to 15 times the time to travel one ship length;
+    the rudder is held at `rudder_deg` meanwhile, degrees. The seed is that of the steps; otherwise as
+    `prbs_rudder`. InputError too for a ship whose propeller is not in its equations.
     """
     service = shaft_of(model)
     check_number(lowest_ratio, "lowest_ratio", above=0.0, at_most=1.5, hint="part of the service shaft speed")

@@ -34,9 +34,8 @@ class Criterion:
 
     value: float | None  # of the model, in `unit`; None where the manoeuvre never got so far
     limit: float  # largest value allowed
-    passed: (
-        bool | None
-    )  # None where it is not decided, or the ship's equations do not allow the test: see `note`
+    # None where it is not decided, or the ship's equations do not allow the test: see `note`
+    passed: bool | None
     unit: str  # "ship lengths" or "deg"
     source: str  # paragraph of the annex of MSC.137(76)
     # the value over models drawn from the covariance of an identified ship
@@ -69,16 +68,8 @@ class Criterion:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON knows it."""
-        fields: dict[str, Any] = {
-            "manoeuvre": self.manoeuvre,
-            "value": self.value,
-            "measured": self.measured,
-            "limit": self.limit,
-            "decided": self.decided,
-            "passed": self.passed,
-            "unit": self.unit,
-            "source": self.source,
-        }
+        names = ("manoeuvre", "value", "measured", "limit", "decided", "passed", "unit", "source")
+        fields: dict[str, Any] = {name: getattr(self, name) for name in names}
         if self.note:
             fields["note"] = self.note
         if self.drawn is not None and len(self.drawn.values):
@@ -96,27 +87,12 @@ def imo_assessment(
 
     Simulated from service speed in deep water: turning circles with 35 degrees of rudder, or the
     rudder's limit where that is less, and zigzags 10/10 and 20/20, each to both sides; a full astern stop
-    where the ship's equations hold for a shaft astern.
+    where the ship's equations hold for a shaft astern. To show how certain each verdict is, `n_draws` models
+    are drawn from the covariance of an identified ship, by default 100, and none for a ship without one.
 
-    Parameters
-    ----------
-    model : ShipModel
-    n_draws : int, optional
-        Models drawn from the covariance of an identified ship, to show how certain each verdict is; by
-        default 100, and none for a ship without covariance.
-    seed : int or Generator
-        Of the draw.
-
-    Returns
-    -------
-    dict of str to Criterion
-        `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`, `overshoot_2_10_10`,
-        `overshoot_1_20_20`, `stopping`.
-
-    Raises
-    ------
-    InputError
-        If draws are asked for and the model has no covariance.
+    Returns the criteria `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`,
+    `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises InputError if draws are asked for and the
+    model has no covariance.
     """
     usual = 0 if model.covariance is None else DRAWS
     count = int(check_number(usual if n_draws is None else n_draws, "n_draws", at_least=0))
@@ -150,20 +126,18 @@ def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterva
     beyond = {name for name, test in needed.items() if name in found and _outside(model, test)}
     first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
 
-    def worst_of(manoeuvre: str, index: str, limit: float, unit: str, paragraph: str) -> Criterion:
+    def worst_of(manoeuvre: str, index: str, limit: float, paragraph: str) -> Criterion:
         names = [name for name in found if name in needed and name.startswith(manoeuvre)]
-        one = _criterion([found[name] for name in names], index, limit, unit, paragraph)
+        one = _criterion([found[name] for name in names], index, limit, paragraph)
         return _decided(one, trial_in_words(model, manoeuvre), bool(beyond & set(names)))
 
     return {
-        "advance": worst_of("turning circle", "advance_lengths", 4.5, "ship lengths", "5.3.1"),
-        "tactical_diameter": worst_of(
-            "turning circle", "tactical_diameter_lengths", 5.0, "ship lengths", "5.3.1"
-        ),
-        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "ship lengths", "5.3.2"),
-        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "deg", "5.3.3.1"),
-        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "deg", "5.3.3.2"),
-        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "deg", "5.3.3.3"),
+        "advance": worst_of("turning circle", "advance_lengths", 4.5, "5.3.1"),
+        "tactical_diameter": worst_of("turning circle", "tactical_diameter_lengths", 5.0, "5.3.1"),
+        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "5.3.2"),
+        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "5.3.3.1"),
+        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "5.3.3.2"),
+        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "5.3.3.3"),
         "stopping": _stopping(model, found.get("crash stop")),
     }
 
@@ -198,9 +172,9 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
         angle = float(np.degrees(np.percentile(np.abs(rudder(trial)), 75)))
         if trial.kind == "zigzag":
             heading, indices = switch_heading_deg(trial) or 0.0, zigzag_indices(trial, length)
-            for usual in (
-                one for one in STANDARD_DEG if max(abs(angle - one), abs(heading - one)) <= ANGLE_DEG
-            ):
+            for usual in STANDARD_DEG:
+                if max(abs(angle - usual), abs(heading - usual)) > ANGLE_DEG:
+                    continue
                 values[f"overshoot_1_{usual:.0f}_{usual:.0f}"] = indices.overshoot_1_deg
                 if usual == STANDARD_DEG[0]:
                     values["overshoot_2_10_10"] = indices.overshoot_2_deg
@@ -219,11 +193,7 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
     """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
     full = min(TURN_DEG, model.steering.rudder_limit_deg)
-    return (
-        f"{full:g} deg turn"
-        if manoeuvre == "turning circle"
-        else manoeuvre.replace("zigzag ", "") + " zigzag"
-    )
+    return f"{full:g} deg turn" if manoeuvre == "turning circle" else f"{manoeuvre.split()[-1]} zigzag"
 
 
 def _outside(model: ShipModel, test: Manoeuvre) -> bool:
@@ -262,15 +232,10 @@ def overshoot_limits_deg(seconds_per_length: float) -> tuple[float, float]:
 
 
 def _criterion(
-    runs: Sequence[Mapping[str, IndexInterval]],
-    index: str,
-    limit: float,
-    unit: str,
-    paragraph: str,
-    note: str = "",
+    runs: Sequence[Mapping[str, IndexInterval]], index: str, limit: float, paragraph: str, note: str = ""
 ) -> Criterion:
     """The worst value of some runs against its limit; a run that never got so far fails it."""
-    drawn = worst([run[index] for run in runs])
+    drawn, unit = worst([run[index] for run in runs]), "deg" if index.endswith("_deg") else "ship lengths"
     passed = drawn.value is not None and drawn.value <= limit
     return Criterion(drawn.value, limit, passed, unit, f"MSC.137(76), annex, {paragraph}", drawn, note)
 
@@ -278,9 +243,7 @@ def _criterion(
 def _stopping(model: ShipModel, stop: Mapping[str, IndexInterval] | None) -> Criterion:
     """The full astern stopping test."""
     if stop is not None:
-        return _criterion(
-            [stop], "track_reach_lengths", STOPPING_LIMIT, "ship lengths", "5.3.4", LARGE_DISPLACEMENT
-        )
+        return _criterion([stop], "track_reach_lengths", STOPPING_LIMIT, "5.3.4", LARGE_DISPLACEMENT)
     why = "its equations hold for a shaft turning ahead only"
     if "n" not in model.command_names:
         why = "its thrust is inside its surge coefficients, so it cannot be ordered astern"

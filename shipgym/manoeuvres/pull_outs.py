@@ -8,9 +8,8 @@ from functools import partial
 
 import numpy as np
 
-from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import require, rudder
+from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
@@ -43,30 +42,14 @@ def pull_out(
 ) -> Trial:
     """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, at service speed and the matching shaft speed.
-    rudder_deg : float
-        Rudder of the turn, degrees; negative turns to port.
-    dt : float, optional
-        Time between samples, s; by default a fortieth of the time to travel one ship length.
-    water_depth, weather, seed
-        As in `zigzag`.
-
-    Raises
-    ------
-    InputError
-        For a rudder of 0 or beyond the rudder's limit.
-    UnstableModelError
-        If the ship runs away.
+    The ship is at service speed and the matching shaft speed, the rudder of the turn in degrees, negative to
+    port; `dt`, the time between samples, s, is by default a fortieth of the time to travel one ship length;
+    the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond the rudder's limit,
+    UnstableModelError if the ship runs away.
     """
-    limit = model.steering.rudder_limit_deg
-    check_number(rudder_deg, "rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit")
-    if rudder_deg == 0.0:
-        raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
+    turn = turning_rudder(rudder_deg, model.steering.rudder_limit_deg, "the rudder's limit")
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    for angle in (np.radians(rudder_deg), 0.0):
+    for angle in (turn, 0.0):
         voyage.settle(voyage.hold(angle, model.service_shaft_speed))
     return voyage.trial("pull-out")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,27 +25,13 @@ SIDES = (("starboard", 1.0), ("port", -1.0))
 
 @dataclass(frozen=True)
 class Manoeuvre:
-    """One manoeuvre with all its settings, and the indices that are read from it.
+    """One manoeuvre with all its settings, and the indices that are read from it."""
 
-    Attributes
-    ----------
-    sail : callable
-        From a ship to the trial (to the spiral, for spirals).
-    indices : callable
-        From what was sailed to its indices.
-    outcome : type
-        The dataclass of its indices, units in the names of its fields.
-    caption : str
-        What its figure shows.
-    figure : callable, optional
-        From what was sailed to a plotly figure; by default what suits its kind
-        (`shipgym.plots.manoeuvre_figure`).
-    """
-
-    sail: Callable[[ShipModel], Any]
-    indices: Callable[[Any], Any]
-    outcome: type
-    caption: str = ""
+    sail: Callable[[ShipModel], Any]  # from a ship to the trial (to the spiral, for spirals)
+    indices: Callable[[Any], Any]  # from what was sailed to its indices
+    outcome: type  # the dataclass of its indices, units in the names of its fields
+    caption: str = ""  # what its figure shows
+    # from what was sailed to its figure; by default what suits its kind (`shipgym.plots.manoeuvre_figure`)
     figure: Callable[[Any], Figure] | None = None
 
     @property
@@ -75,11 +61,8 @@ def _check_physical(model: ShipModel, trial: Trial) -> None:
             )
 
 
-class Variants(Protocol):
-    """From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name."""
-
-    def __call__(self, model: ShipModel, water_depth: float = np.inf) -> Mapping[str, Manoeuvre]:
-        """Her manoeuvres, none where they do not suit her."""
+#: From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name.
+Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Ci
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -72,32 +73,17 @@ def direct_spiral(
 ) -> Spiral:
     """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, at service speed and the matching shaft speed.
-    rudder_deg : sequence of float
-        From one side to the other, degrees; sailed in this order and then back to the first. The loop is
-        known to within their steps.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
-
-    Raises
-    ------
-    InputError
-        For angles that do not go from one side to the other.
-    UnstableModelError
-        If the ship runs away.
+    The angles, degrees, go from one side to the other; they are sailed in this order and then back to the
+    first. The loop is known to within their steps. Other arguments are as in `pull_out`. Raises InputError
+    for angles that do not go from one side to the other, UnstableModelError if the ship runs away.
     """
     limit = model.steering.rudder_limit_deg
     angles = _one_way(rudder_deg, "rudder_deg", "deg", limit, "the rudder's limit")
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    points = [
-        voyage.settle(voyage.hold(np.radians(angle), model.service_shaft_speed))
-        for angle in [*angles, *angles[-2::-1]]
-    ]
+    angles += angles[-2::-1]
+    points = [voyage.settle(voyage.hold(np.radians(angle), model.service_shaft_speed)) for angle in angles]
     rates = np.degrees([point.yaw_rate for point in points])
-    return Spiral(voyage.trial("spiral"), np.array([*angles, *angles[-2::-1]]), rates, "direct")
+    return Spiral(voyage.trial("spiral"), np.array(angles), rates, "direct")
 
 
 def reverse_spiral(
@@ -113,26 +99,9 @@ def reverse_spiral(
     It also finds the turns at which an unstable ship would not stay by itself. The helmsman is a
     proportional-integral controller, designed from the rudder's effect on the ship.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, at service speed and the matching shaft speed.
-    yaw_rate_deg_s : sequence of float, optional
-        From one side to the other, degrees per second; by default from 0.2 to -0.2 times U0 / L.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
-
-    Returns
-    -------
-    Spiral
-        The rudder of each point is the mean of what the helmsman ordered.
-
-    Raises
-    ------
-    InputError
-        For yaw rates that do not go from one side to the other.
-    UnstableModelError
-        If the ship runs away.
+    The yaw rates, degrees per second, go from one side to the other, by default from 0.2 to -0.2 times U0 /
+    L; the rudder of each point is the mean of what the helmsman ordered. Other arguments and errors are those
+    of `direct_spiral`.
     """
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     usual = [float(np.degrees(rate / voyage.length_time)) for rate in REVERSE_RATES]
@@ -165,22 +134,10 @@ def spiral_from_trial(
 ) -> Spiral:
     """The steady turns of a measured direct spiral.
 
-    A turn lasts while the rudder stays within a tolerance, or its order unchanged where that was
-    recorded; its yaw rate is the mean over the last third.
-
-    Parameters
-    ----------
-    trial : Trial
-        With r and delta (or delta_command).
-    rudder_deg : sequence of float, optional
-        Keep only turns within the tolerance of these angles, degrees; by default all.
-    tolerance_deg : float
-        Degrees.
-
-    Raises
-    ------
-    InputError
-        If a channel is missing, or there are fewer than four steady turns.
+    A turn lasts while the rudder stays within a tolerance, or its order unchanged where that was recorded;
+    its yaw rate is the mean over the last third. The trial has r and delta (or delta_command). With
+    `rudder_deg` only turns within the tolerance of these angles are kept, all in degrees. Raises InputError
+    if a channel is missing, or there are fewer than four steady turns.
     """
     require(trial, ("r",), "a spiral")
     tolerance = check_number(tolerance_deg, "tolerance_deg", above=0.0)
@@ -190,7 +147,7 @@ def spiral_from_trial(
     for i in range(1, len(delta)):
         if abs(delta[i] - delta[edges[-1]]) > allowed:
             edges.append(i)
-    spans = [(first, last) for first, last in zip(edges, [*edges[1:], len(delta)], strict=True)]
+    spans = list(pairwise([*edges, len(delta)]))
     durations = np.array([trial.t[last - 1] - trial.t[first] for first, last in spans])
     points = []
     for (first, last), duration in zip(spans, durations, strict=True):
@@ -223,9 +180,14 @@ def spiral_indices(spiral: Spiral) -> SpiralIndices:
     return SpiralIndices(*find(spiral.rudder_deg, spiral.yaw_rate_deg_s))
 
 
+def turning_point(angles: Floats) -> int:
+    """Number of the point at which a direct spiral turns back: the later of its extreme rudder angles."""
+    return int(max(np.argmin(angles), np.argmax(angles)))
+
+
 def _direct_loop(angles: Floats, rates: Floats) -> tuple[float, float, float]:
     """Width, deg, height, deg/s, and middle, deg: each way changes side at another rudder."""
-    turn = int(np.argmin(angles) if np.argmax(angles) < np.argmin(angles) else np.argmax(angles))
+    turn = turning_point(angles)
     there = np.array([angles[: turn + 1], rates[: turn + 1]])
     back = np.array([angles[turn:], rates[turn:]])
     falling, rising = (there, back) if angles[turn] < angles[0] else (back, there)
@@ -272,13 +234,10 @@ def standard_spirals(model: ShipModel, water_depth: float = np.inf) -> dict[str,
     direct = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
     reverse = partial(reverse_spiral, water_depth=water_depth)
     spirals = {"direct spiral": Manoeuvre(direct, spiral_indices, SpiralIndices, DIRECT_CAPTION)}
-    if not _is_stable(model):
+    try:
+        stable = is_course_stable(model)
+    except InputError:  # there is no straight course at all
+        stable = False
+    if not stable:
         spirals["reverse spiral"] = Manoeuvre(reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION)
     return spirals
-
-
-def _is_stable(model: ShipModel) -> bool:
-    try:
-        return is_course_stable(model)
-    except InputError:  # there is no straight course at all
-        return False

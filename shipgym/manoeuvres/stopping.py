@@ -65,23 +65,15 @@ def stopping(
     shaft stopped they are used beyond the advance ratios they were measured at, where the container
     ship's has no drag and KVLCC2's that of a propeller dragged along.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A ship whose propeller is in its equations.
-    shaft_speed : float
-        Ordered shaft speed, 1/s: 0 for stopped, negative for astern.
-    speed_ratio : float
-        Surge speed at which the trial ends, by that at service; 0 for dead in the water, which only a
-        shaft astern brings about.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
+    The shaft is ordered to `shaft_speed`, 1/s, 0 for stopped, negative for astern. The trial ends at
+    `speed_ratio` of the surge speed at service, 0 for dead in the water, which only a shaft astern brings
+    about; other arguments are as in `pull_out`.
 
     Raises
     ------
     InputError
-        For a ship without a shaft, an order astern where its equations do not hold, an order that does not
-        slow the ship down, or dead in the water without an order astern.
+        For a ship whose propeller is not in its equations, an order astern where they do not hold, an order
+        that does not slow the ship down, or dead in the water without an order astern.
     ManoeuvreError
         If the ship is still faster after 300 times the time to travel one ship length; with the trial so far.
     UnstableModelError
@@ -180,23 +172,9 @@ def acceleration(
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
 
-    Parameters
-    ----------
-    model : ShipModel
-        A ship whose propeller is in its equations.
-    start_ratio : float
-        Speed and shaft speed at the start, by those at service.
-    duration : float, optional
-        s; by default 40 times the time to travel one ship length.
-    dt, water_depth, weather, seed
-        As in `pull_out`.
-
-    Raises
-    ------
-    InputError
-        For a ship without a shaft, or a number out of range.
-    UnstableModelError
-        If the ship runs away.
+    `start_ratio` is speed and shaft speed at the start by those at service; the duration, s, is by default 40
+    times the time to travel one ship length; the rest as in `pull_out`. Raises InputError for a ship whose
+    propeller is not in its equations or a number out of range, UnstableModelError if the ship runs away.
     """
     shaft_of(model)
     check_number(start_ratio, "start_ratio", above=0.0, below=1.0, hint="part of the service speed")

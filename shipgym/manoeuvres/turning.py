@@ -6,9 +6,15 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import execute_time, number_of_steps, reached, require, ship_length
+from shipgym.arrays import Floats
+from shipgym.manoeuvres.execution import (
+    execute_time,
+    number_of_steps,
+    reached,
+    require,
+    ship_length,
+    turning_rudder,
+)
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
@@ -50,29 +56,13 @@ def turning_circle(
 ) -> Trial:
     """Simulate a turning circle from straight ahead at service speed, without an approach run.
 
-    Parameters
-    ----------
-    model : ShipModel
-    rudder_deg : float
-        Rudder ordered at the start, degrees; negative turns to port.
-    duration, dt : float
-        s. The samples are dt apart.
-    water_depth, weather, seed
-        As in `zigzag`.
-
-    Raises
-    ------
-    InputError
-        For a rudder of 0 or beyond 90 degrees, or a duration or step that is not above 0.
-    UnstableModelError
-        If the ship runs away.
+    The rudder is ordered at the start, degrees, negative to port; `duration` and `dt`, the time between
+    samples, are in s; the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond 90 degrees, or a
+    duration or step that is not above 0, UnstableModelError if the ship runs away.
     """
-    check_number(rudder_deg, "rudder_deg", at_least=-90.0, at_most=90.0)
-    if rudder_deg == 0.0:
-        raise InputError("rudder_deg: 0 found, expected an angle that turns the ship")
-    n_steps = number_of_steps(duration, dt)
-    commands = np.repeat(model.service_command[None], n_steps, axis=0)
-    commands[:, 0] = np.radians(rudder_deg)
+    angle = turning_rudder(rudder_deg, 90.0)
+    commands = np.repeat(model.service_command[None], number_of_steps(duration, dt), axis=0)
+    commands[:, 0] = angle
     return simulate(model, commands, dt, None, water_depth, "turning-circle", weather, seed)
 
 
@@ -84,15 +74,10 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     """
     require(trial, ("x", "y", "psi"), "a turning circle")
     lpp = ship_length(trial, length)
-    start = execute_time(trial)
-    x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
-    after = trial.t >= start
-    x, y = trial["x"][after] - x0, trial["y"][after] - y0
-    turned = trial["psi"][after] - psi0
+    after = trial.t >= execute_time(trial)
+    ahead, aside, turned = (values[after] for values in track_from_order(trial, lpp))
     side = 1.0 if turned[-1] >= 0.0 else -1.0
-    turned = side * turned
-    ahead = (x * np.cos(psi0) + y * np.sin(psi0)) / lpp
-    aside = side * (y * np.cos(psi0) - x * np.sin(psi0)) / lpp
+    turned, aside = side * turned, side * aside
     steady = turned >= turned[-1] - np.pi / 2
     ratio, drift, diameter = (
         _steady(trial, after, steady, side, lpp) if turned[-1] > 1.5 * np.pi else (None,) * 3
@@ -105,6 +90,15 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
         steady_speed_ratio=ratio,
         steady_drift_deg=drift,
     )
+
+
+def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Floats]:
+    """Way ahead and to starboard in ship lengths, and turn in rad, from where the rudder was ordered."""
+    start = execute_time(trial)
+    x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
+    x, y = trial["x"] - x0, trial["y"] - y0
+    ahead, aside = x * np.cos(psi0) + y * np.sin(psi0), y * np.cos(psi0) - x * np.sin(psi0)
+    return ahead / length, aside / length, trial["psi"] - psi0
 
 
 def _steady(

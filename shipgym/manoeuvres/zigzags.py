@@ -179,7 +179,9 @@ def switch_heading_deg(trial: Trial) -> float | None:
     start, turns = reversals(trial)
     if not turns:
         return None
-    around = [turns[0] - _last_step(trial, turns[0]), turns[0]]
+    row = int(np.clip(np.searchsorted(trial.t, turns[0]), 1, len(trial) - 1))
+    step = float(trial.t[row] - trial.t[row - 1])  # the sampling step that ends at or spans the reversal
+    around = [turns[0] - step, turns[0]]
     before, at = sorted(np.abs(np.degrees(_heading_change(trial, start, around))).tolist())
     if "delta_command" in trial.channels:
         whole = np.floor(at + 1e-6)
@@ -187,12 +189,6 @@ def switch_heading_deg(trial: Trial) -> float | None:
     usual = np.array([1.0, *np.arange(5.0, 95.0, 5.0)])
     reached = usual[0.95 * usual <= at]
     return float(reached[-1]) if len(reached) and at - reached[-1] < 3.0 else float(at)
-
-
-def _last_step(trial: Trial, time: float) -> float:
-    """Length of the sampling step that ends at or spans a time, s."""
-    row = int(np.clip(np.searchsorted(trial.t, time), 1, len(trial) - 1))
-    return float(trial.t[row] - trial.t[row - 1])
 
 
 def _heading_change(trial: Trial, start: float, times: Sequence[float] | Floats) -> Floats:

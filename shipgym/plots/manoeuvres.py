@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from shipgym.errors import InputError
-from shipgym.manoeuvres.execution import distance_sailed, execute_time, rudder, ship_length
+from shipgym.manoeuvres.execution import distance_sailed, rudder, ship_length
 from shipgym.manoeuvres.pull_outs import pull_out_indices
-from shipgym.manoeuvres.spirals import Spiral, spiral_indices
-from shipgym.manoeuvres.turning import turning_indices
+from shipgym.manoeuvres.spirals import Spiral, spiral_indices, turning_point
+from shipgym.manoeuvres.turning import track_from_order, turning_indices
 from shipgym.manoeuvres.zigzags import switch_heading_deg
 from shipgym.plots.style import (
     LIMIT,
@@ -32,7 +32,7 @@ from shipgym.trials.trial import Trial
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-EXCITATION = ("delta_command", "delta", "n_command", "n", "psi", "r", "speed", "drift")
+ORDERS = ("delta_command", "delta", "n_command", "n")
 
 
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
@@ -68,12 +68,8 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
     trial's own. Raises InputError if a channel or the length is missing.
     """
     indices, lpp = turning_indices(trial, length), ship_length(trial, length)
-    start = execute_time(trial)
-    x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
-    north, east = trial["x"] - x0, trial["y"] - y0
-    ahead = (north * np.cos(psi0) + east * np.sin(psi0)) / lpp
-    aside = (east * np.cos(psi0) - north * np.sin(psi0)) / lpp
-    side = 1.0 if trial["psi"][-1] >= psi0 else -1.0
+    ahead, aside, turned = track_from_order(trial, lpp)
+    side = 1.0 if turned[-1] >= 0.0 else -1.0
     figure = graph_objects().Figure()
     figure.add_trace(line(aside, ahead, "path", MODEL, 2.0))
     advance, transfer, diameter = (
@@ -84,7 +80,7 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
         _dimension(figure, [far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1])
         _dimension(figure, [0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2])
     if diameter is not None:
-        level = float(np.interp(np.pi, side * (trial["psi"] - psi0), ahead))
+        level = float(np.interp(np.pi, side * turned, ahead))
         wide = [0.0, side * diameter]
         _dimension(figure, wide, [level] * 2, f"tactical diameter {diameter:.2f} L", PALETTE[3])
     figure.update_layout(layout(height, hovermode="closest"))
@@ -109,7 +105,7 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
     ways = {"reverse spiral": (slice(None), MODEL)}
     if spiral.method == "direct":
-        turn = int(np.argmin(angles) if np.argmax(angles) < np.argmin(angles) else np.argmax(angles))
+        turn = turning_point(angles)
         ways = {"there": (slice(0, turn + 1), MODEL), "and back": (slice(turn, None), PALETTE[1])}
     for name, (part, colour) in ways.items():
         way = line(angles[part], rates[part], name, colour, 1.6, **points)
@@ -175,20 +171,10 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
 
 def excitation_figure(trial: Trial) -> Figure:
     """A manoeuvre for identification, such as of `prbs_rudder`: orders above what the ship made of them."""
-    figure = history_figure({"simulated": trial}, _excited(trial))
+    orders = [name for name in ORDERS if name in trial.channels and np.ptp(trial[name]) > 0.0]
+    figure = history_figure({"simulated": trial}, (*orders, "psi", "r", "speed", "drift"))
     figure.update_layout(showlegend=False)
     return figure
-
-
-def _excited(trial: Trial) -> list[str]:
-    """Quantities worth a panel: orders that change, and the motion."""
-    orders = ("delta_command", "delta", "n_command", "n")
-    values = {name: quantity(trial, name) for name in EXCITATION}
-    return [
-        name
-        for name, value in values.items()
-        if value is not None and (name not in orders or np.ptp(value) > 0.0)
-    ]
 
 
 def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:

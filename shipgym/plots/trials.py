@@ -63,13 +63,10 @@ def history_figure(
     for row, channel in enumerate(shown, start=1):
         title, factor = AXES[channel]
         for name, trial in trials.items():
-            values = quantity(trial, channel)
+            values, part = quantity(trial, channel), thinned(trial)
             if values is None:
                 continue
-            part, style = (
-                thinned(trial),
-                {"showlegend": row == 1, "hovertemplate": "%{y:.3g}", **styles[name]},
-            )
+            style = {"showlegend": row == 1, "hovertemplate": "%{y:.3g}", **styles[name]}
             trace = line(trial.t[part], factor * values[part], name, **style)
             figure.add_trace(trace, row=row, col=1)
         label(figure, "time, s" if row == len(shown) else "", title, row=row, col=1)

@@ -250,12 +250,12 @@ class Weather:
     @property
     def random_directions(self) -> tuple[str, ...]:
         """Those of "current", "wind", "waves" that are on and whose direction is not given."""
-        directions = {
-            "current": self.current and (self.current.calm or self.current.towards_deg is not None),
-            "wind": self.wind and (self.wind.calm or self.wind.from_deg is not None),
-            "waves": self.waves and (self.waves.calm or self.waves.from_deg is not None),
-        }
-        return tuple(name for name, known in directions.items() if known is False)
+        given = (
+            ("current", self.current, self.current and self.current.towards_deg),
+            ("wind", self.wind, self.wind and self.wind.from_deg),
+            ("waves", self.waves, self.waves and self.waves.from_deg),
+        )
+        return tuple(name for name, part, deg in given if part and not part.calm and deg is None)
 
     def with_direction(self, from_deg: float) -> Weather:
         """The same weather with `from_deg` for wind and waves that have no direction."""

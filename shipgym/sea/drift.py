@@ -117,14 +117,12 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     / 2 and N about midship by rho g a^2 L^2 / 2.
     """
     line = waterline(ship)
-    middle = (0.5 * (line.x[1:] + line.x[:-1]), 0.5 * (line.y[1:] + line.y[:-1]))
+    x, half = (0.5 * (ends[1:] + ends[:-1]) for ends in line)  # middle of each part
     dx, dy = np.diff(line.x), np.diff(line.y)
+    length = np.hypot(dx, dy)
     Y, N = np.zeros(np.shape(chi)), np.zeros(np.shape(chi))
     for side in (1.0, -1.0):
-        # outward normal of the side, times the length of the part
-        length = np.hypot(dx, dy)
-        out_x, out_y = dy / length, -side * dx / length
-        x, y = middle[0], side * middle[1]
+        out_x, out_y, y = dy / length, -side * dx / length, side * half  # outward normal of the side
         toward = np.multiply.outer(np.cos(chi), out_x) + np.multiply.outer(np.sin(chi), out_y)
         pressure = np.maximum(toward, 0.0) ** 2 * length
         Y = Y - pressure @ out_y
@@ -150,11 +148,8 @@ def added_resistance(omega: ArrayLike, chi: ArrayLike, ship: Particulars, speed:
 def _radiated(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> Floats:
     """Part of the ship's motions, equations G-14 to G-22."""
     L, B, CB = ship.length, ship.require("beam"), ship.require("block_coefficient")
-    slender, Fr, c = (
-        np.log(max(B / ship.require("draught"), _NARROWEST)),
-        speed / np.sqrt(GRAVITY * L),
-        np.cos(chi),
-    )
+    slender = np.log(max(B / ship.require("draught"), _NARROWEST))
+    Fr, c = speed / np.sqrt(GRAVITY * L), np.cos(chi)
     w = (
         2.142 * _PITCH_GYRADIUS ** (1 / 3) * np.sqrt(L / (2.0 * np.pi * GRAVITY)) * (CB / 0.65) ** 0.17
         * (1.0 - 0.111 / CB * (slender - np.log(2.75)))
@@ -192,8 +187,7 @@ def _amplitudes(
 
 
 def _speed_factor(Fr: Floats) -> Floats:
-    factor: Floats = np.where(Fr < 0.12, 0.0072 + 0.1676 * Fr, Fr**1.5 * np.exp(-3.5 * Fr))
-    return factor
+    return np.where(Fr < 0.12, 0.0072 + 0.1676 * Fr, Fr**1.5 * np.exp(-3.5 * Fr))
 
 
 def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> Floats:
@@ -203,10 +197,7 @@ def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> F
     length = 2.0 * np.pi * GRAVITY / omega**2
 
     def depth(T_: Floats) -> Floats:
-        share: Floats = np.where(
-            length <= 2.5 * L, 1.0 - np.exp(-4.0 * np.pi * (T_ / length - T_ / (2.5 * L))), 0.0
-        )
-        return share
+        return np.where(length <= 2.5 * L, 1.0 - np.exp(-4.0 * np.pi * (T_ / length - T_ / (2.5 * L))), 0.0)
 
     def flat(angle: Floats) -> Floats:
         part: Floats = np.sin(E + angle) ** 2 + 2.0 * omega * speed / GRAVITY * (

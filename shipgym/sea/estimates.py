@@ -1,12 +1,9 @@
 """What wind and waves need of a ship's particulars, estimated where it is not given."""
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import Estimates, Particulars, with_estimates
 
 GRAVITY = 9.80665
 
@@ -40,12 +37,7 @@ def weather_particulars(particulars: Particulars) -> Particulars:
             f"weather without the particulars it needs: {', '.join(missing)} of {particulars.name} is not "
             "known, expected in [ship] of the ship file or in the model's particulars"
         )
-    ship = particulars.completed()
-    for name, estimate in _ESTIMATES.items():
-        if getattr(ship, name) is None:
-            changes: dict[str, Any] = {name: estimate(ship), "estimated": ship.estimated | {name}}
-            ship = replace(ship, **changes)
-    return ship
+    return with_estimates(particulars.completed(), _ESTIMATES)
 
 
 def freeboard(ship: Particulars) -> float:
@@ -90,7 +82,7 @@ def _roll_period(ship: Particulars) -> float:
     return 2.0 * max(C, 0.3) * beam / math.sqrt(ship.require("metacentric_height"))
 
 
-_ESTIMATES: dict[str, Callable[[Particulars], float]] = {  # in this order
+_ESTIMATES: Estimates = {  # in this order
     "length_overall": lambda ship: 1.03 * ship.length,
     "frontal_area": _frontal_area,
     "lateral_area": _lateral_area,

@@ -30,8 +30,7 @@ class GaussMarkov(NamedTuple):
         """One-sided spectral density at frequencies in Hz."""
         T = self.time_constant
         f = np.asarray(frequency, dtype=float)
-        density: Floats = 4.0 * self.standard_deviation**2 * T / (1.0 + (2.0 * np.pi * f * T) ** 2)
-        return density
+        return 4.0 * self.standard_deviation**2 * T / (1.0 + (2.0 * np.pi * f * T) ** 2)
 
 
 def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") -> Floats:
@@ -53,8 +52,7 @@ def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") 
     else:
         x = f * HARRIS_LENGTH / speed
         shape = 4.0 * HARRIS_LENGTH / speed / (2.0 + x * x) ** (5.0 / 6.0)
-    density: Floats = SURFACE_DRAG * speed**2 * shape
-    return density
+    return SURFACE_DRAG * speed**2 * shape
 
 
 def gust_variance(speed: float, spectrum: str = "harris") -> float:

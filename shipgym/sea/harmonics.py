@@ -41,5 +41,4 @@ def cosine_series(curve: Floats, n: int) -> Floats:
 
 def sine_series(curve: Floats, n: int) -> Floats:
     """Coefficients of sin(angle), sin(2 angle), ... of an odd curve, shape (n,)."""
-    series: Floats = -np.fft.rfft(curve).imag[1 : n + 1] * 2.0 / len(curve)
-    return series
+    return -np.fft.rfft(curve).imag[1 : n + 1] * 2.0 / len(curve)

@@ -24,15 +24,12 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     """
     mass = np.zeros((4, 4))
     mass[:3] = _inertia(model, water_depth)
-    axes = [0, 1, 2]
-    if model.structure == "container":
-        axes = [0, 1, 2, 3]
-        mass[3] = _container_roll(model, mass)
-    elif isinstance(model.dynamics, Structure):
+    axes = [0, 1, 2, 3] if "phi" in model.state_names else [0, 1, 2]
+    if isinstance(model.dynamics, Structure):
         axes = [_AXES.index(equation) for equation in model.dynamics.equations if equation in _AXES]
-        mass[3, 3] = roll_inertia(model) if 3 in axes else 0.0
-    elif "phi" in model.state_names:
-        axes = [0, 1, 2, 3]
+    if model.structure == "container":
+        mass[3] = _container_roll(model, mass)
+    elif 3 in axes:
         mass[3, 3] = roll_inertia(model)
     matrix = np.zeros((4, 4))
     matrix[np.ix_(axes, axes)] = np.linalg.inv(mass[np.ix_(axes, axes)])

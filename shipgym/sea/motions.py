@@ -25,11 +25,12 @@ def heading_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars)
     (`omega`, rad/s), for which the ship's speed does not matter; the slow yaw of a ship that runs before the
     sea is not in it. `chi` is where the waves come from, seen from the bow, rad.
     """
+    from scipy.special import spherical_jn
+
     L, T = particulars.length, particulars.require("draught")
     k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
-    q = 0.5 * k * L * np.cos(chi)
-    response: Floats = np.abs(np.sin(chi)) * np.exp(-0.5 * k * T) * 6.0 / L * np.abs(_j1(q))
-    return response
+    q = np.abs(0.5 * k * L * np.cos(chi))
+    return np.abs(np.sin(chi)) * np.exp(-0.5 * k * T) * 6.0 / L * np.abs(spherical_jn(1, q))
 
 
 def roll_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars, speed: float) -> Floats:
@@ -46,16 +47,7 @@ def roll_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars, sp
     slope = k * np.abs(np.sin(chi) * np.sinc(along) * np.sinc(across)) * np.exp(-0.5 * k * T)
     natural = 2.0 * np.pi / particulars.require("roll_period")
     a = encounter_frequency(omega, speed, chi) / natural
-    response: Floats = slope / np.hypot(1.0 - a * a, 2.0 * ROLL_DAMPING * a)
-    return response
-
-
-def _j1(q: Floats) -> Floats:
-    """Spherical Bessel function of the first kind and order 1."""
-    from scipy.special import spherical_jn
-
-    value: Floats = np.sign(q) * spherical_jn(1, np.abs(q))
-    return value
+    return slope / np.hypot(1.0 - a * a, 2.0 * ROLL_DAMPING * a)
 
 
 @dataclass(frozen=True)

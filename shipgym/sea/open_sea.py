@@ -367,6 +367,3 @@ def sea_parts(windy: bool, lanes: int = LANES, first: int = 0, shared: bool = Tr
         "store_sea": storer(state, lanes),
         "load_sea_parameters": loader(parameters, 1 if shared else LANES),
     }
-
-
-__all__ = ["Sea", "SeaParameters", "begin_sea", "evolve", "push", "sea_parts"]

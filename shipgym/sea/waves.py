@@ -29,8 +29,7 @@ class WaveFilter(NamedTuple):
         """One-sided spectral density of the output per rad/s, whose integral is 1."""
         w, w0 = np.asarray(omega, dtype=float), self.peak_frequency
         power = (self.gain * w) ** 2 / ((w0**2 - w**2) ** 2 + (2.0 * self.damping * w0 * w) ** 2)
-        density: Floats = power / np.pi
-        return density
+        return power / np.pi
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
@@ -51,14 +50,12 @@ def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Float
     enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
     ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
-    density: Floats = pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
-    return density
+    return pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
 
 
 def _enhancement(ratio: Floats, gamma: float) -> Floats:
     width = np.where(ratio <= 1.0, 0.07, 0.09)
-    factor: Floats = gamma ** np.exp(-0.5 * ((ratio - 1.0) / width) ** 2)
-    return factor
+    return gamma ** np.exp(-0.5 * ((ratio - 1.0) / width) ** 2)
 
 
 @lru_cache(maxsize=64)
@@ -90,8 +87,7 @@ def over_directions(curve: Floats, waves: Waves) -> Floats:
         return curve
     mu = circle(len(curve))
     weight = np.where(np.cos(mu) > 0.0, np.cos(mu) ** 2, 0.0)
-    averaged: Floats = np.fft.irfft(np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve))
-    return averaged
+    return np.fft.irfft(np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve))
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
@@ -143,8 +139,7 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
 
     kT = np.asarray(omega, dtype=float) ** 2 * draught / GRAVITY
     ratio = k1e(kT) * np.exp(-2.0 * np.minimum(kT, 300.0)) / (np.pi * i1e(kT))
-    share: Floats = 1.0 / (1.0 + ratio**2)
-    return share
+    return 1.0 / (1.0 + ratio**2)
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:

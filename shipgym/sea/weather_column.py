@@ -7,6 +7,7 @@ from shipgym.engine.records import flat
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
+from shipgym.sea.estimates import GRAVITY
 from shipgym.sea.gusts import GaussMarkov, gust_filter
 from shipgym.sea.harmonics import Harmonics
 from shipgym.sea.mobility import mobility_matrix
@@ -16,7 +17,6 @@ from shipgym.sea.waves import wave_filter
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 
-GRAVITY = 9.80665
 HARMONICS = len(Sines._fields)
 FLAT, NONE, STEADY = Cosines(*[0.0] * (HARMONICS + 1)), Sines(*[0.0] * HARMONICS), Filter(0.0, 0.0, 0.0)
 CALM = SeaParameters(

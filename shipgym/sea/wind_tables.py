@@ -87,10 +87,14 @@ class WindTable:
 
     def __post_init__(self) -> None:
         for name in ("angles_deg", "CX", "CY", "CN", "CK"):
-            row = getattr(self, name)
-            if row is not None or name != "CK":
-                object.__setattr__(self, name, _row(row, f"wind table {name}"))
-                self._check_length(name)
+            if getattr(self, name) is None and name == "CK":
+                continue
+            row, expected = _row(getattr(self, name), f"wind table {name}"), len(self.angles_deg)
+            object.__setattr__(self, name, row)
+            if len(row) != expected:
+                raise InputError(
+                    f"wind table {name}: {len(row)} values found, expected {expected}, one for each angle"
+                )
         rising = all(a < b for a, b in zip(self.angles_deg, self.angles_deg[1:], strict=False))
         if len(self.angles_deg) < 3 or not rising or self.angles_deg[0] != 0 or self.angles_deg[-1] != 180:
             raise InputError(
@@ -104,13 +108,6 @@ class WindTable:
                     f"wind table {name}: {row[0]:g} and {row[-1]:g} found at 0 and 180 degrees, expected "
                     "0: a ship with port-starboard symmetry"
                 )
-
-    def _check_length(self, name: str) -> None:
-        found, expected = len(getattr(self, name)), len(self.angles_deg)
-        if found != expected:
-            raise InputError(
-                f"wind table {name}: {found} values found, expected {expected}, one for each angle"
-            )
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "wind table") -> WindTable:

@@ -40,8 +40,8 @@ def model_of(ship: ShipEquations, coefficients: Mapping[str, float] | None = Non
 
 def container(rudder_limit_deg: float = 35.0) -> ShipModel:
     """The container ship S175 (SR108), 4 degrees of freedom; the MSS toolbox has a limit of 10 degrees."""
-    model = model_of(container_file.SHIP)
-    return replace(model, steering=replace(model.steering, rudder_limit_deg=rudder_limit_deg))
+    steering = replace(container_file.SHIP.steering, rudder_limit_deg=rudder_limit_deg)
+    return replace(model_of(container_file.SHIP), steering=steering)
 
 
 def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:

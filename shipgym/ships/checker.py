@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import Findings
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.term_table import Structure
+from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
 
 if TYPE_CHECKING:
     from shipgym.trials.trial import Trial
@@ -24,8 +25,6 @@ SAMPLES = 512
 #: Range of the states looked at, in service speed, service speed by length and rudder limit.
 SURGE, SWAY, YAW_RATE, RUDDER = (0.2, 1.1), 0.3, 0.8, 1.0
 ROLL_RATE, HEEL, MEMORY = 0.5, np.radians(15.0), 0.5  # the memory of yaw by (service speed by length)^2
-RATES = ("u", "v", "r", "p", "q")
-ANGULAR = ("r", "p", "q")
 CAPSIZED = np.radians(60.0)
 STEP = 0.02  # of the time to sail a ship length
 STRAIGHT_LENGTHS, TURN_LENGTHS = 30.0, 40.0
@@ -37,28 +36,17 @@ SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
 
 
 @dataclass(frozen=True)
-class ModelCheck:
+class ModelCheck(Findings):
     """What a check of a model found."""
 
-    name: str  # of the model
-    # what makes it unfit to be simulated or steered, each with a remedy; empty for a sound model
-    problems: tuple[str, ...]
-    remarks: tuple[str, ...]  # what is unusual, and may be right
     # root mean square of the accelerations' port/starboard difference over twice their own, over states that
     # a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated
-    asymmetry: float
+    asymmetry: float = field(kw_only=True)
 
     @property
-    def ok(self) -> bool:
-        """Whether there are no problems."""
-        return not self.problems
-
-    def __str__(self) -> str:
-        """Verdict, then a line for each problem and remark."""
-        verdict = "sound" if self.ok else f"{len(self.problems)} problem(s)"
-        lines = [f"{self.name}: {verdict}; port/starboard asymmetry {100.0 * self.asymmetry:.1f} %"]
-        lines += [f"  problem: {problem}" for problem in self.problems]
-        return "\n".join(lines + [f"  remark: {remark}" for remark in self.remarks])
+    def verdict(self) -> str:
+        """Whether it is sound, and how far port and starboard differ."""
+        return f"{super().verdict}; port/starboard asymmetry {100.0 * self.asymmetry:.1f} %"
 
 
 def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
@@ -68,25 +56,17 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     (finite, as the table of terms says, alike to both sides); straight running; the side to which the rudder
     turns the ship; hard turns to both sides; the covariance.
 
-    Parameters
-    ----------
-    model : ShipModel, str or Path
-        A model, a shipped model's name or the path of a model file. A file that cannot be loaded, because a
-        coefficient is missing for instance, is a problem found.
+    Given is a model, a shipped model's name or the path of a model file. A file that cannot be loaded,
+    because a coefficient is missing for instance, is a problem found.
     """
-    if not isinstance(model, ShipModel):
-        try:
-            model = load_model(model)
-        except InputError as error:
-            return ModelCheck(str(model), (str(error),), (), float("nan"))
+    name = str(model)
     try:
+        model = model if isinstance(model, ShipModel) else load_model(model)
+        name = model.name
         model.ship_numbers()
-    except InputError as error:
-        return ModelCheck(model.name, (str(error),), (), float("nan"))
-    try:
         problems = list(_wrong_accelerations(model))
-    except InputError as error:  # equations that cannot be compiled
-        return ModelCheck(model.name, (str(error),), (), float("nan"))
+    except InputError as error:  # a file, numbers or equations that cannot be used
+        return ModelCheck(name, (str(error),), asymmetry=float("nan"))
     remarks: list[str] = []
     asymmetry = float("nan")
     if not problems:
@@ -94,7 +74,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
         problems += [*_wrong_courses(model), *_wrong_rudder(model)]
         remarks += _unusual(model, asymmetry)
     problems += _wrong_covariance(model)
-    return ModelCheck(model.name, tuple(problems), tuple(remarks), asymmetry)
+    return ModelCheck(name, tuple(problems), tuple(remarks), asymmetry=asymmetry)
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
@@ -117,7 +97,7 @@ def _states(model: ShipModel) -> dict[str, Floats]:
 
 def _rates(model: ShipModel) -> list[str]:
     """Velocities of the model, and its memory of yaw: what has an acceleration."""
-    return [name for name in RATES if name in model.state_names]
+    return [name for name in EQUATION_NAMES if name in model.state_names]
 
 
 def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
@@ -134,7 +114,7 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     found = _accelerations(model, channels)
     if not np.all(np.isfinite(found)):
         row, axis = np.argwhere(~np.isfinite(found))[0]
-        known = [name for name in (*RATES, "phi", "delta") if name in model.state_names]
+        known = [name for name in (*EQUATION_NAMES, "phi", "delta") if name in model.state_names]
         state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
         yield (
             f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
@@ -205,14 +185,14 @@ def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:
     limit = model.steering.limit
-    courses: dict[str, Callable[[], Trial]] = {
-        "straight ahead": lambda: _run(model, 0.0, STRAIGHT_LENGTHS),
-        f"rudder {np.degrees(limit):.0f} deg to starboard": lambda: _run(model, limit, TURN_LENGTHS),
-        f"rudder {np.degrees(limit):.0f} deg to port": lambda: _run(model, -limit, TURN_LENGTHS),
+    courses = {
+        "straight ahead": (0.0, STRAIGHT_LENGTHS),
+        f"rudder {np.degrees(limit):.0f} deg to starboard": (limit, TURN_LENGTHS),
+        f"rudder {np.degrees(limit):.0f} deg to port": (-limit, TURN_LENGTHS),
     }
-    for name, sail in courses.items():
+    for name, (rudder, lengths) in courses.items():
         try:
-            trial = sail()
+            trial = _run(model, rudder, lengths)
             wrong, heel = "", float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
         except UnstableModelError as error:
             wrong, heel = str(error), abs(error.state.get("phi", 0.0))

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_whole
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
-from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.open_sea import Sea
 from shipgym.sea.weather_column import as_weather, weather_column
@@ -61,8 +61,6 @@ class Passage:
 
 def _first_word(seed: Seed) -> np.uint64:
     """State of the weather's random numbers at its beginning."""
-    if not isinstance(seed, np.random.Generator) and (
-        isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0
-    ):
-        raise InputError(f"seed: {seed!r} found, expected a whole number >= 0")
+    if not isinstance(seed, np.random.Generator):
+        check_whole(seed, "seed", at_least=0)
     return np.uint64(np.random.default_rng(seed).integers(2**63))

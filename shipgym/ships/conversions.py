@@ -31,6 +31,7 @@ from shipgym.ships.linear import (
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
+from shipgym.ships.structures import get_structure
 
 if TYPE_CHECKING:
     from control import StateSpace, TransferFunction
@@ -102,7 +103,11 @@ def nomoto1_ship(
     the service speed of the particulars. Raises InputError for a number that is not finite or is zero, or a
     rudder that turns to the wrong side (K / T < 0).
     """
-    _check_effect(check_number(K, "K") * check_number(T, "T"), "K and T")
+    if not check_number(K, "K") * check_number(T, "T") > 0.0:
+        raise InputError(
+            "K and T: of different sign, or zero, expected both positive (a stable ship) or both negative: a "
+            "positive rudder turns to starboard"
+        )
     coefficients = {"c_r": -1.0 / T, "c_d": K / T}
     return ShipModel(name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients)
 
@@ -142,12 +147,8 @@ def linear_steering_ship(
     """
     ship = _ship(particulars)
     a, b = prime_matrices(A, B, ship.require("length"), ship.require("speed"))
-    rows = np.hstack([a, b])
-    coefficients = {
-        f"{equation}_{term}": float(rows[i, j])
-        for i, equation in enumerate("bc")
-        for j, term in enumerate("vrd")
-    }
+    names = get_structure("linear-steering").coefficient_names
+    coefficients = dict(zip(names, np.hstack([a, b]).ravel().tolist(), strict=True))
     return ShipModel(name, "linear-steering", ship, steering or SteeringGear(), coefficients)
 
 
@@ -181,14 +182,6 @@ def _checked(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[F
         if matrix.shape != shape or not np.all(np.isfinite(matrix)):
             raise InputError(f"{name}: shape {matrix.shape} found, expected {shape} finite numbers")
     return a, b, np.array([speed, speed / length]), length / speed
-
-
-def _check_effect(effect: float, what: str) -> None:
-    if not effect > 0.0:
-        raise InputError(
-            f"{what}: of different sign, or zero, expected both positive (a stable ship) or both negative: a "
-            "positive rudder turns to starboard"
-        )
 
 
 def _need_time_constants(form: Nomoto) -> None:

@@ -46,13 +46,7 @@ class Envelope:
         return cls(low, high, middle, shape / reach)
 
     def distance(self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Floats:
-        """How far out a state is: up to 1 inside the ellipsoid, 2 at twice its size.
-
-        Parameters
-        ----------
-        u, v, r, delta : array-like of one shape
-            SI units.
-        """
+        """How far out states of one shape, SI units, are: 1 on the ellipsoid, 2 at twice its size."""
         z = np.stack(np.broadcast_arrays(*map(np.asarray, (u, v, r, delta))), axis=-1) - self.centre
         distance: Floats = np.linalg.norm(z @ self.shape.T, axis=-1)
         return distance

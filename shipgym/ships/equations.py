@@ -35,52 +35,28 @@ Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, floa
 
 @dataclass(frozen=True)
 class ShipEquations:
-    """The equations of motion of one ship, with her numbers.
+    """The equations of motion of one ship, with her numbers."""
 
-    Attributes
-    ----------
-    name : str
-        By which `load_model` and model files know the ship.
-    source : str
-        Where the equations were published.
-    coefficients_record : type
-        A `NamedTuple` of floats, each with its published value as the default.
-    accelerations : callable
-        From (motion, coefficients, ship) to udot, vdot in m/s^2, rdot, pdot in rad/s^2, and the rate of the
-        memory of yaw, 0 as a rule; body frame, origin midship. See `Motion` and `Ship` of
-        `shipgym.engine.motion`.
-    particulars : Particulars
-        With length and service speed.
-    steering : SteeringGear
-        Her steering gear.
-    shaft_acceleration : callable, optional
-        From (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2: then its speed is a
-        state. Without it the shaft turns as commanded.
-    service_shaft_speed : float
-        1/s; 0 for a ship without a propeller of her own, whose only command is the rudder.
-    rolls : bool
-        Whether roll rate and heel are among her states.
-    shallow_water : bool
-        Whether the equations know the depth of the water.
-    astern : bool
-        Whether the propeller holds for a shaft that turns astern.
-    switches : tuple of str
-        Coefficients that choose between forms of the equations: the functions read them as constants of the
-        same name in their file, which are compiled in.
-    """
-
-    name: str
-    source: str
-    coefficients_record: Record
+    name: str  # by which `load_model` and model files know the ship
+    source: str  # where the equations were published
+    coefficients_record: Record  # a `NamedTuple` of floats, each with its published value as the default
+    # from (motion, coefficients, ship), see `Motion` and `Ship` of `shipgym.engine.motion`, to udot, vdot in
+    # m/s^2, rdot, pdot in rad/s^2, and the rate of the memory of yaw, 0 as a rule; body frame, origin midship
     accelerations: Accelerations
-    particulars: Particulars
+    particulars: Particulars  # with length and service speed
     steering: SteeringGear
     _: KW_ONLY
+    # from (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2: then its speed is a
+    # state. Without it the shaft turns as commanded
     shaft_acceleration: Callable[[float, float, Any, Any], float] | None = None
-    service_shaft_speed: float = 0.0
-    rolls: bool = False
-    shallow_water: bool = False
-    astern: bool = False
+    service_shaft_speed: float = (
+        0.0  # 1/s; 0 without a propeller of her own, her only command then the rudder
+    )
+    rolls: bool = False  # whether roll rate and heel are among her states
+    shallow_water: bool = False  # whether the equations know the depth of the water
+    astern: bool = False  # whether the propeller holds for a shaft that turns astern
+    # coefficients that choose between forms of the equations: the functions read them as constants of the
+    # same name in their file, which are compiled in
     switches: tuple[str, ...] = ()
     path: Path | None = field(default=None, repr=False)
     normalisation: ClassVar[str] = "own"  # as a model file has it: the publication's units

@@ -17,24 +17,13 @@ def grey_box(
     shaft: bool | None = None,
     name: str = GREY_BOX,
 ) -> GreyBox:
-    """A reference ship plus a table of terms.
+    """A reference ship plus a table of terms, as a structure of a given name.
 
-    Parameters
-    ----------
-    reference : str or ShipModel
-        A shipped model's name, the path of a model file, or a model.
-    equations : mapping of str to str or Terms, optional
-        Terms by equation `u`, `v`, `r` in units of service speed (`read_terms`); by default Mei's: du (the
-        speed above service speed), v, r, delta and a constant, in all three.
-    shaft : bool, optional
-        Whether the target's shaft speed is known; by default if the reference ship knows one.
-    name : str
-        Of the structure.
-
-    Raises
-    ------
-    InputError
-        For a reference that does not exist or cannot be one, or a table that cannot be computed.
+    The reference is a shipped model's name, the path of a model file, or a model. The terms, by equation `u`,
+    `v`, `r`, are in units of service speed (`read_terms`), by default Mei's: du (the speed above service
+    speed), v, r, delta and a constant, in all three. `shaft` says whether the target's shaft speed is known,
+    by default if the reference ship knows one. Raises InputError for a reference that does not exist or
+    cannot be one, or a table that cannot be computed.
     """
     ship = reference if isinstance(reference, ShipModel) else load_model(reference)
     table = {

@@ -6,6 +6,7 @@ from shipgym.arrays import Floats
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import SharedStructure
+from shipgym.ships.term_table import inertia as prime_inertia
 
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
@@ -45,23 +46,21 @@ def _prime_mass(model: ManoeuvringModel) -> float:
 
 def _particulars(model: ManoeuvringModel) -> Floats:
     p = model.particulars.completed()
-    if isinstance(model.dynamics, SharedStructure):
-        arms = np.array([1.0, 1.0, p.length])
-        added = model.dynamics.inertia(model.coefficients, p) * np.outer(arms, arms)
-        return _prime_mass(model) * np.hstack([added, np.zeros((3, 1))])
+    table = model.dynamics
+    if isinstance(table, SharedStructure):
+        return _prime_mass(model) * _with_arms(table.inertia(model.coefficients, p), p)
     return particulars_inertia(p)
 
 
 def particulars_inertia(p: Particulars) -> Floats:
     """The same, by the particulars of a ship, which are complete; nothing in roll."""
-    unit, L = 0.5 * p.require("water_density") * p.length**3, p.length
-    m, static = p.mass_prime, p.mass_prime * p.xg_prime
-    prime = np.zeros((3, 4))
-    prime[0, 0] = m - p.require("X_udot")
-    prime[1, 1], prime[1, 2] = m - p.require("Y_vdot"), (static - p.require("Y_rdot")) * L
-    prime[2, 1] = (static - p.require("N_vdot")) * L
-    prime[2, 2] = (p.inertia_prime - p.require("N_rdot")) * L * L
-    return unit * prime
+    return 0.5 * p.require("water_density") * p.length**3 * _with_arms(prime_inertia(p), p)
+
+
+def _with_arms(prime: Floats, p: Particulars) -> Floats:
+    """A matrix of the prime system by its ship lengths, and nothing in roll."""
+    arms = np.array([1.0, 1.0, p.length])
+    return np.hstack([prime * arms * arms[:, None], np.zeros((3, 1))])
 
 
 def _container(model: ManoeuvringModel) -> Floats:

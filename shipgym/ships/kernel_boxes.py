@@ -17,12 +17,12 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine import stages
 from shipgym.engine.mathematics import two_to
-from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.motion import Motion, Ship, accelerations
 from shipgym.engine.parts import Part
 from shipgym.engine.places import row_of
 from shipgym.engine.records import table_of
 from shipgym.engine.stages import Point, Sums
-from shipgym.engine.vessel import Vessel, no_accelerations
+from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox, grey_box_vessel
 from shipgym.ships.particulars import Particulars
@@ -87,8 +87,7 @@ class Kernel:
     def features(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
         """Features of samples, shape (n_samples, n_features)."""
         x = (kernel_inputs(channels, particulars) - self.offset) / self.scale
-        found: Floats = gaussians(x, self.centres) @ self.basis
-        return found
+        return gaussians(x, self.centres) @ self.basis
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, as a model file has them."""
@@ -227,7 +226,7 @@ def _vessel(reference: Vessel, size: int, shaft: bool, state_names: tuple[str, .
     functions = {"N_CENTRES": size, "term_accelerations": Part(kernel_accelerations)}
     summed = {
         "sail_lanes": Part(stages.sail_lanes, inline=False),
-        "term_accelerations": Part(no_accelerations),
+        "term_accelerations": Part(accelerations),
         "point_of": Part(coordinates),
         "row_sums": Part(add_centre),
         "sum_accelerations": Part(sum_accelerations),

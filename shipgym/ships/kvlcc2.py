@@ -106,9 +106,8 @@ def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, f
 
     w_P = wake(drift, r_, c)
     inflow, tip = u * (1.0 - w_P), n * c.D_P  # advance ratio: inflow / tip
-    K_T_nn = (
-        c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
-    )  # thrust coefficient times tip^2
+    # thrust coefficient times tip^2
+    K_T_nn = c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
     thrust = c.D_P**2 * K_T_nn
 
     beta_R = drift - c.l_R * r_

@@ -150,10 +150,8 @@ class ManoeuvringModel:
         """
         depth = np.asarray(water_depth, dtype=float)
         self.check_depth(float(depth.min()))
-        states = np.asarray(state, dtype=float)
-        _expect_last_axis("state", states, self.state_names)
-        commands = np.asarray(command, dtype=float)
-        _expect_last_axis("command", commands, self.command_names)
+        states = _with_last_axis("state", state, self.state_names)
+        commands = _with_last_axis("command", command, self.command_names)
         if not np.all(np.isfinite(states)):
             raise InputError(f"state: {states[~np.isfinite(states)][0]} found, expected finite numbers")
         check_units(self, commands.reshape(-1, len(self.command_names)), "command")
@@ -198,11 +196,13 @@ class ManoeuvringModel:
             )
 
 
-def _expect_last_axis(argument: str, array: Floats, names: tuple[str, ...]) -> None:
+def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:
+    array = np.asarray(given, dtype=float)
     if array.ndim == 0 or array.shape[-1] != len(names):
         raise InputError(
             f"{argument}: shape {array.shape} found, expected (..., {len(names)}) for {', '.join(names)}"
         )
+    return array
 
 
 def two_commands(commands: Floats) -> Floats:

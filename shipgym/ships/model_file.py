@@ -131,19 +131,19 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
         "name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares", "kernel",
     )  # fmt: skip
     check_keys(table, keys, where)
+    if {"shares", "kernel", "equations"} & table.keys():
+        for name in ("source", "name"):
+            check_text(table.get(name), f"{where}.{name}")
     if "shares" in table:
         return _shared(table, where)
     if "kernel" in table:
-        named = {key: table[key] for key in keys[:4] if key in table}
-        structure = _structure({**named, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
-        return kernel_box(
-            _grey_box(structure, table, where, make), _kernel(table["kernel"], f"{where}.kernel")
-        )
+        structure = _structure({**table, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
+        kernel = _kernel(table["kernel"], f"{where}.kernel")
+        return kernel_box(_grey_box(structure, table, where, make), kernel)
     if "equations" in table:
-        structure = _structure({key: table[key] for key in keys[:5] if key in table}, where)
-        if {"reference", "shaft"} & table.keys():
-            return _grey_box(structure, table, where, make)
-        return structure
+        structure = _structure(table, where)
+        boxed = {"reference", "shaft"} & table.keys()
+        return _grey_box(structure, table, where, make) if boxed else structure
     try:
         return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
     except InputError as error:
@@ -168,18 +168,15 @@ def _grey_box(
 def _kernel(value: Any, where: str) -> Kernel:
     """The radial basis functions of a kernel."""
     table = check_table(value, where)
-    fields = ("offset", "scale", "centres", "basis")
-    check_keys(table, fields, where)
-    shapes: list[tuple[int | None, ...]] = [(4,), (4,), (None, 4), (None, None)]
-    return Kernel(
-        *(check_array(table.get(n), shape, f"{where}.{n}") for n, shape in zip(fields, shapes, strict=True))
-    )
+    shapes: dict[str, tuple[int | None, ...]] = {
+        "offset": (4,), "scale": (4,), "centres": (None, 4), "basis": (None, None),
+    }  # fmt: skip
+    check_keys(table, shapes, where)
+    return Kernel(*(check_array(table.get(name), shapes[name], f"{where}.{name}") for name in shapes))
 
 
 def _structure(table: Mapping[str, Any], where: str) -> Structure:
-    _check_lists(table.get("equations"), EQUATION_NAMES, SYMBOLS, ("name",), f"{where}.equations", "terms")
-    for name in ("source", "name"):
-        check_text(table.get(name), f"{where}.{name}")
+    _check_lists(table.get("equations"), EQUATION_NAMES, SYMBOLS, f"{where}.equations")
     return Structure.from_dict(table)
 
 
@@ -187,23 +184,16 @@ def _shared(table: Mapping[str, Any], where: str) -> Structure:
     """A table for the forces of captive tests."""
     shares = check_table(table["shares"], f"{where}.shares")
     listed = {axis: shares.get(axis) for axis in AXES} | dict(shares)
-    known, texts = (*SYMBOLS, *ACCELERATIONS), ("coefficient", "name")
-    _check_lists(listed, AXES, known, texts, f"{where}.shares", "shares", sign=True)
-    for name in ("source", "name"):
-        check_text(table.get(name), f"{where}.{name}")
+    _check_lists(listed, AXES, (*SYMBOLS, *ACCELERATIONS), f"{where}.shares", "shares")
     return SharedStructure.from_dict(table)
 
 
 def _check_lists(
-    value: Any,
-    equations: Collection[str],
-    symbols: Collection[str],
-    texts: tuple[str, ...],
-    where: str,
-    what: str,
-    sign: bool = False,
+    value: Any, equations: Collection[str], symbols: Collection[str], where: str, what: str = "terms"
 ) -> None:
-    """Check lists of terms by equation, each with texts, powers of symbols, and perhaps a sign."""
+    """Check lists of terms or shares by equation: their texts, powers of symbols, and the sign of a share."""
+    shares = what == "shares"
+    texts = ("coefficient", "name") if shares else ("name",)
     table = check_table(value, where)
     check_keys(table, equations, where)
     for equation, listed in table.items():
@@ -212,11 +202,11 @@ def _check_lists(
         for i, entry in enumerate(listed):
             place = f"{where}.{equation}[{i}]"
             term = check_table(entry, place)
-            check_keys(term, (*texts, "powers", *(("sign",) if sign else ())), place)
+            check_keys(term, (*texts, "powers", *(("sign",) if shares else ())), place)
             for name in texts:
                 check_text(term.get(name), f"{place}.{name}")
             check_keys(check_table(term.get("powers"), f"{place}.powers"), symbols, f"{place}.powers")
-            if sign:
+            if shares:
                 check_number(term.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
 
 

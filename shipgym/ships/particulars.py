@@ -185,14 +185,7 @@ class Particulars(Mapping[str, Any]):
         Gedling and Hine 1983 (The application of manoeuvring criteria in hull design using linear theory,
         Transactions of RINA 125). Raises InputError, naming what is missing, where not even that is possible.
         """
-        ship = self
-        for name, estimate in _ESTIMATES.items():
-            if getattr(ship, name) is None:
-                value = estimate(ship)
-                if value is not None:
-                    changes: dict[str, Any] = {name: value, "estimated": ship.estimated | {name}}
-                    ship = replace(ship, **changes)
-        return ship
+        return with_estimates(self, _ESTIMATES)
 
 
 #: Names of all values, in the order of the ship file.
@@ -204,6 +197,18 @@ LATER = ("rudder_aspect_ratio", "propeller_pitch_ratio", "rudders", "propellers"
 _BOUNDS: dict[str, _Bounds] = {
     item.name: item.metadata["bounds"] for item in fields(Particulars) if "bounds" in item.metadata
 }
+
+
+Estimates = Mapping[str, Callable[[Particulars], float | None]]
+
+
+def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
+    """A ship with what is absent estimated in turn, and marked so, where an estimate has an answer."""
+    for name, estimate in estimates.items():
+        if ship[name] is None and (value := estimate(ship)) is not None:
+            changes: dict[str, Any] = {name: value, "estimated": ship.estimated | {name}}
+            ship = replace(ship, **changes)
+    return ship
 
 
 def clarke_added_masses(
@@ -267,7 +272,7 @@ def _check_known(ship: Particulars, name: str, remedy: str) -> None:
         )
 
 
-_ESTIMATES: dict[str, Callable[[Particulars], float | None]] = {  # in this order
+_ESTIMATES: Estimates = {  # in this order
     "water_density": lambda ship: 1025.0,
     "xg": lambda ship: 0.0,
     "yaw_gyradius": lambda ship: 0.25 * ship.length,

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
@@ -105,8 +104,11 @@ class ShipModel(ManoeuvringModel):
                 f"model {self.name!r} has no covariance: only identified models can be sampled from"
             )
         mean = np.array(list(self.coefficients.values()))
-        values, vectors = np.linalg.eigh(_scaled(self.covariance))
-        root = _scale(self.covariance)[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
+        deviation = np.sqrt(np.diag(self.covariance))
+        scale = np.where(deviation > 0.0, deviation, 1.0)
+        # of the correlations: coefficients of 1e-5 and of 1 have to be drawn equally well
+        values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
+        root = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
         rng = np.random.default_rng(seed)
         draws = mean + rng.standard_normal((n, len(mean))) @ root.T
         tables = self._drawn_tables(n, rng)
@@ -145,16 +147,3 @@ class ShipModel(ManoeuvringModel):
         Raises InputError, naming the field at fault, after `where`.
         """
         return read_model(fields, where, cls)
-
-
-def _scale(covariance: Floats) -> Floats:
-    """Standard deviations, 1 where zero."""
-    deviation = np.sqrt(np.diag(covariance))
-    return np.where(deviation > 0.0, deviation, 1.0)
-
-
-def _scaled(covariance: Floats) -> Floats:
-    """Correlation matrix: coefficients of 1e-5 and of 1 have to be drawn equally well."""
-    scale = _scale(covariance)
-    scaled: Floats = covariance / np.outer(scale, scale)
-    return scaled

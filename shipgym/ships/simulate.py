@@ -69,14 +69,8 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     reached = loop(states, t, np.array(trial["delta"]), n, wind, longest_step, model.ship_numbers())
     if reached < len(t) - 1:
         raise unstable(model, t[reached], states[reached])
-    return Trial(
-        t,
-        _channels(model, states),
-        name=trial.name,
-        kind=trial.kind,
-        use=trial.use,
-        length=model.particulars["length"],
-    )
+    channels, length = _channels(model, states), model.particulars["length"]
+    return Trial(t, channels, name=trial.name, kind=trial.kind, use=trial.use, length=length)
 
 
 def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
@@ -109,10 +103,8 @@ def as_trial(
             channels[name] = values
     for name, command in zip(model.command_names, commands.T, strict=True):
         channels[f"{name}_command"] = command
-        if name == "n":
-            channels.setdefault(
-                "n", command
-            )  # a shaft without lag turns as ordered, and is part of the record
+        if name == "n":  # a shaft without lag turns as ordered, and is part of the record
+            channels.setdefault("n", command)
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
 
 

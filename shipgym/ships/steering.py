@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table
@@ -56,10 +56,9 @@ class SteeringGear:
         Raises InputError, beginning with `where`, for an unknown key or a value out of bounds.
         """
         table = check_table(mapping, where)
-        check_keys(table, [field.name for field in fields(cls)], where)
-        for name, bounds in _BOUNDS.items():
-            if name in table:
-                check_number(table[name], f"{where} {name}", **bounds)
+        check_keys(table, _BOUNDS, where)
+        for name, value in table.items():
+            check_number(value, f"{where} {name}", **_BOUNDS[name])
         return cls(**table)
 
     def to_dict(self) -> dict[str, float]:

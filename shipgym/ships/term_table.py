@@ -323,13 +323,8 @@ class Structure:
             equation: tuple(Term(term["name"], tuple(term["powers"].items())) for term in terms)
             for equation, terms in table["equations"].items()
         }
-        return cls(
-            table["name"],
-            table["source"],
-            equations,
-            table.get("normalisation", "prime"),
-            table.get("quantity", "force"),
-        )
+        given = {key: table[key] for key in ("normalisation", "quantity") if key in table}
+        return cls(table["name"], table["source"], equations, **given)
 
 
 @cache
