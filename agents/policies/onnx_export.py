@@ -95,11 +95,8 @@ def _nodes(policy: LearnedPolicy, helper: Any) -> tuple[list[Any], dict[str, Any
         nodes.append(helper.make_node("Mul", ["limited", "authority"], ["part"]))
         nodes.append(helper.make_node("Add", ["base_action", "part"], ["wanted"]))
         nodes.append(helper.make_node("Clip", ["wanted", "low", "high"], ["action"]))
-    return nodes, {name: array for name, array in constants.items() if _used(name, nodes)}
-
-
-def _used(name: str, nodes: list[Any]) -> bool:
-    return any(name in node.input for node in nodes)
+    used = {name for node in nodes for name in node.input}
+    return nodes, {name: array for name, array in constants.items() if name in used}
 
 
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:

@@ -71,9 +71,5 @@ def names(paths: Sequence[Path]) -> list[str]:
         called = ["/".join(stem[-depth:]).replace("//", "/") for stem in stems]
         if len(set(called)) == len(set(stems)):
             break
-    return [name if k == 0 else f"{name} ({k + 1})" for name, k in zip(called, _earlier(called), strict=True)]
-
-
-def _earlier(called: Sequence[str]) -> list[int]:
-    """How often each name occurred before."""
-    return [called[:i].count(name) for i, name in enumerate(called)]
+    earlier = [called[:i].count(name) for i, name in enumerate(called)]
+    return [name if k == 0 else f"{name} ({k + 1})" for name, k in zip(called, earlier, strict=True)]

@@ -108,7 +108,7 @@ def decompose_triangle(
     size = np.sqrt(np.sum(inner[:, :-1] ** 2, axis=0) / n_samples)
     whole = np.sqrt(np.sum(R[:, first:-1] ** 2, axis=0) / n_samples)
     size[size <= CONSTANT * whole] = 0.0
-    scales = _scales(size, scale)
+    scales = scales_of(size, scale)
     left, singular_values, directions = np.linalg.svd(inner[:-1, :-1] / scales)
     kept = min(n_samples, n_features)
     projections = left.T @ inner[:-1, -1]
@@ -131,10 +131,10 @@ def centre_and_scale(X: Floats, scale: bool | ArrayLike, fit_intercept: bool) ->
     size = np.sqrt(np.mean((X - centre) ** 2, axis=0))
     # what is constant is centred to rounding errors, which must not be blown up
     size[size <= CONSTANT * np.max(np.abs(X), axis=0, initial=0.0)] = 0.0
-    return centre, _scales(size, scale)
+    return centre, scales_of(size, scale)
 
 
-def _scales(size: Floats, scale: bool | ArrayLike) -> Floats:
+def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
     """What to divide features by that are of the given size; 1 for what is zero."""
     if isinstance(scale, bool | np.bool_):
         return np.where(size > 0.0, size, 1.0) if scale else np.ones(len(size))

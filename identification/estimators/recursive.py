@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings
 from identification.estimators.lssvm import LSSVM
 from shipgym.arrays import Floats
@@ -152,16 +153,7 @@ class Recursion(LinearRegressor):
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Zero coefficients with the covariance C, in scales that the samples give."""
         axes = tuple(range(features.ndim - 1))
-        if isinstance(self.scale, bool | np.bool_):
-            size = np.sqrt(np.mean(features**2, axis=axes)) if self.scale else np.ones(features.shape[-1])
-        else:
-            size = np.asarray(self.scale, dtype=float)
-            if size.shape != features.shape[-1:] or not np.all(np.isfinite(size) & (size > 0)):
-                raise InputError(
-                    f"scale: shape {size.shape} found, expected {features.shape[-1]} finite numbers above 0, "
-                    "True or False"
-                )
-        self.scale_ = np.where(size > 0.0, size, 1.0)
+        self.scale_ = scales_of(np.sqrt(np.mean(features**2, axis=axes)), self.scale)
         unit = np.sqrt(np.mean(targets**2, axis=0))
         self._unit = np.where(unit > 0.0, unit, 1.0)
         signals, m = targets.shape[1], features.shape[-1]
