@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -25,6 +26,8 @@ def new_ship_command(
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
+    import numpy as np
+
     from agents.cli.terminal import out as console
     from agents.cli.terminal import warn
     from shipgym.errors import InputError
@@ -36,10 +39,14 @@ def new_ship_command(
     if out.exists():
         raise InputError(f"{out}: exists already; choose another name with --out, or remove it")
     guesses, side, trial = guess_trial(logs[0])
-    speeds = quantity(trial, "speed")
+    speeds = []
+    for log in logs:
+        with suppress(InputError):  # `look` says what is wrong with it
+            if (known := quantity(guess_trial(log)[2], "speed")) is not None:
+                speeds.append(float(np.quantile(known, 0.9)))
     page = render(
         "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,
-        trial=trial, speed=None if speeds is None else float(sorted(speeds)[9 * len(speeds) // 10]),
+        trial=trial, speed=max(speeds, default=None),
         files=[json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
     )  # fmt: skip
     write_text(page, out)

@@ -28,6 +28,11 @@ _WINDOW_S, _FEWEST, _MOST = 5.0, 60, 200_000
 _MEMORIES_S = (20.0, 80.0)
 _LEAST_DIRECTION = 0.02  # of what explains the change beside the channel
 _SURE = 5.0  # standard errors by which the channel must tell on the other
+_HARD_OVER, _TURNED = math.radians(8.0), math.radians(60.0)
+_OTHER_SIGN = (
+    "with the opposite sign, expected a positive rudder to turn the bow to starboard; write "
+    'rudder_positive = "port" in [conventions], or take it out if it stands there'
+)
 
 
 class ClockOffset(NamedTuple):
@@ -106,6 +111,13 @@ def _reverses(values: Floats, least: float = 0.0) -> bool:
     return bool(high - low > least and np.count_nonzero(np.diff(np.sign(far))) >= 3)
 
 
+def _turns_against(psi: Floats, delta: Floats) -> bool:
+    """Whether a rudder that stays on one side turns the ship to the other, as in a circle."""
+    side = math.copysign(1.0, float(np.median(delta)))
+    one_side = float(np.quantile(side * delta, 0.1)) > 0.0 and side * float(np.median(delta)) > _HARD_OVER
+    return one_side and side * float(psi[-1] - psi[0]) < -_TURNED
+
+
 def corrected_clocks(
     t: Floats, values: Mapping[str, Floats], series: Series, choice: str | None, where: str
 ) -> tuple[Series, list[str]]:
@@ -123,11 +135,9 @@ def corrected_clocks(
         found["delta"] = rudder_offset(t, r, values["delta"])
         plain = clock_offset(t, r, values["delta"], {"r": r})
         if all(one is not None and one.gain < 0.0 and one.sure > _SURE for one in (found["delta"], plain)):
-            raise InputError(
-                f"{where}: the yaw acceleration follows the rudder with the opposite sign, expected a "
-                'positive rudder to turn the bow to starboard; write rudder_positive = "port" in '
-                "[conventions], or take it out if it stands there"
-            )
+            raise InputError(f"{where}: the yaw acceleration follows the rudder {_OTHER_SIGN}")
+    elif {"psi", "delta"} <= values.keys() and _turns_against(values["psi"], values["delta"]):
+        raise InputError(f"{where}: the ship turns away from the rudder, {_OTHER_SIGN}")
     own, notes = len({id(clock) for clock, _ in series.values()}) > 1, []
     changed: Series = {}
     for name, offset in found.items():

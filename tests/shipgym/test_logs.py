@@ -337,6 +337,16 @@ def test_a_rudder_of_the_wrong_sign_is_named(tmp_path):
 # --- mistakes
 
 
+def test_a_circle_away_from_the_rudder_is_named(tmp_path):
+    """In a turning circle nothing goes there and back; its side alone tells the sign of the rudder."""
+    t = np.arange(0.0, 400.0, 1.0)
+    circle = {"psi": 0.01 * t, "delta": np.full(t.size, -0.5), "u": np.full(t.size, 5.0), "v": 0.0 * t}
+    Trial(t, circle).to_csv(path := tmp_path / "circle.csv")
+    with pytest.raises(InputError, match=r'turns away from the rudder.*write rudder_positive = "port" in'):
+        Trial.from_csv(path)
+    assert Trial.from_csv(path, rudder_positive="port")["delta"][0] == 0.5
+
+
 def changed(column, value):
     def keep(row):
         return [value(cell) if k == column and cell else cell for k, cell in enumerate(row)]
