@@ -69,8 +69,13 @@ def check_page(path: Path) -> None:
     """
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
+    check_file(path)
+
+
+def check_file(path: Path) -> None:
+    """Refuse a file that cannot be written, before the work for it; raises InputError naming it."""
     if path.is_dir():
-        raise InputError(f"{path}: is a folder, expected a file to write the page to")
+        raise InputError(f"{path}: is a folder, expected a file to write to")
     folder = path.absolute().parent
     if not folder.is_dir() or not os.access(folder, os.W_OK):
         raise InputError(f"{path}: its folder does not exist or cannot be written; choose another")

@@ -31,6 +31,8 @@ LONGEST_S = 60  # that a wrong command may take
 
 #: The shortest right command line of each command; the folder that it is in is new.
 RIGHT: dict[str, list[str]] = {
+    "new-ship": [str(ROOT / "examples" / "mariner" / "zigzag_10_10.csv"), "--out", "out"],
+    "look": [SHIP, "--out", "out.html"],
     "identify": [SHIP, "--out", "out"],
     "advise": [SHIP],
     "reduce": [SHIP, "--out", "out"],

@@ -93,7 +93,10 @@ def benchmark_command(
     from agents.benchmarking.submission import submit as write_submission
     from agents.cli.terminal import progress_bars
     from agents.controllers.designs import CLASSICAL
+    from agents.output import check_file
 
+    if submit is not None:
+        check_file(submit)
     if out is None:
         fail("--out: no folder found, expected one for the results: --out results/", 2)
         return

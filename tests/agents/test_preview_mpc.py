@@ -66,9 +66,10 @@ def test_to_port_it_does_what_it_does_to_starboard():
 def test_in_a_current_its_search_is_worth_something_though_it_is_told_of_none():
     task = path_following_task(sea=Weather(current=Current(1.5)), max_turn_deg=90.0, episode_steps=600)
     engine, seeds = Engine(MARINER, 8, task), np.arange(8)
+    searched = PreviewMPC.from_model(MARINER, task=task, horizon_lengths=8.0)
     plain, better = (
-        episode_costs(kind.from_model(MARINER, task=task), engine, seeds).mean()
-        for kind in (WheelOver, PreviewMPC)
+        episode_costs(one, engine, seeds).mean()
+        for one in (WheelOver.from_model(MARINER, task=task), searched)
     )
     assert better < 0.99 * plain
 

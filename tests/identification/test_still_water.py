@@ -32,7 +32,7 @@ def log(run: Trial, seed: int = 0) -> Trial:
     channels = {
         name: run[name][every] + size * rng.standard_normal(len(run.t[every])) for name, size in noise.items()
     }
-    made, derived = to_project_conventions(run.t[every], channels, Conventions(), "log")
+    made, derived, *_ = to_project_conventions(run.t[every], channels, Conventions(), "log")
     return Trial(run.t[every], made, name=run.name, kind=run.kind, use=run.use, derived=derived)
 
 
@@ -112,7 +112,7 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
     """Of a trial with a speed log and positions only the sway that was derived changes."""
     run = zigzag(mariner, 20, 20, duration=300.0, dt=0.5, weather=CURRENT)
     channels = {name: run[name] for name in ("x", "y", "psi", "r", "delta", "u")}
-    made, derived = to_project_conventions(run.t, channels, Conventions(), "log")
+    made, derived, *_ = to_project_conventions(run.t, channels, Conventions(), "log")
     mixed = Trial(run.t, made, derived=derived)
     assert mixed.over_ground
     found = through_water(mixed, NORTH, EAST)
