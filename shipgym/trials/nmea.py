@@ -114,6 +114,8 @@ def _values_of(message: Any) -> Iterator[tuple[str, float]]:
             for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
                 value += si_factor("psi", "deg") * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
         elif kind == "MWV":
+            if message.wind_speed_units not in _SPEEDS:  # damaged where no checksum is
+                return
             if channel == "wind_speed":
                 value *= si_factor(channel, _SPEEDS[message.wind_speed_units])
             channel += "" if message.reference == "T" else "_relative"

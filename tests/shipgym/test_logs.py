@@ -278,6 +278,13 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
         read_log(tmp_path / "dark.nmea")
 
 
+def test_a_wind_of_no_unit_is_left_out(tmp_path):
+    path = nmea_log(tmp_path / "log.nmea", end=60)
+    before = Trial.from_csv(path)
+    path.write_text(path.read_text() + sentence("WIMWV,090.0,T,9.0,X,A") + "\n")
+    assert Trial.from_csv(path).channels.keys() == before.channels.keys()
+
+
 def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
     texts = ("235958", "235959", "000000", "000001", "000002")
     lines = [
