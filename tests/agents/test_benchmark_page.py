@@ -319,7 +319,10 @@ def test_figures_are_drawn_when_they_come_into_sight_and_runs_can_be_hidden(open
 
 
 def test_all_figures_are_drawn_for_who_prints_without_scrolling(opened):
-    opened.wait("document.querySelectorAll('.late:not(.drawn)').length === 0")
+    missing = "document.querySelectorAll('.late:not(.drawn)').length"
+    opened.wait(f"{missing} === 0")
+    assert opened.run(missing) == 0
+    assert opened.run("document.querySelectorAll('.late.drawn .main-svg').length") > 0
 
 
 def test_tabs_show_one_task_at_a_time(opened):
