@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,28 +10,29 @@ import gymnasium
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.checks import check_keys, check_table, check_whole, shown
+from shipgym.arrays import Floats
+from shipgym.checks import check_whole
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES, flat
 from shipgym.engine.voyages import Sensors, sensors_for, voyages
+from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import STEP_OUTCOME, OutputPool, Outputs
 from shipgym.envs.randomisation import Randomisation
 from shipgym.envs.stability import refuse_unstable
-from shipgym.envs.tiles import Threads, lanes_of, ship_columns, ship_tiles
+from shipgym.envs.tiles import Threads, ship_columns, ship_tiles
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 
-Floats = NDArray[np.float64]
 Observation = NDArray[np.float32]
 N_FIXED = 22  # words of a loop's world before those of its outputs
 #: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
 SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 
 
-class Engine:
+class Engine(Lanes):
     """A task for many ships at once.
 
     Parameters
@@ -164,7 +165,7 @@ class Engine:
         return np.array([*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64)
 
     def show_anew(self) -> None:
-        """Let what comes next be written into new arrays, so that those that were given may be kept."""
+        """See `Lanes.show_anew`."""
         self._write_into(self._outputs.take())
 
     def _write_into(self, outputs: Outputs) -> None:
@@ -263,75 +264,6 @@ class Engine:
         self._which[:] = which
         self._run(self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN)
 
-    @property
-    def episodes(self) -> NDArray[np.uint64]:
-        """Number of each lane's episode under its key, shape (num_envs,), a copy."""
-        return self._keys[:, 1].reshape(-1)[: self.num_envs].copy()
-
-    @property
-    def steps(self) -> Floats:
-        """Control intervals of each lane's episode so far, shape (num_envs,), a copy."""
-        return self.read("steps")
-
-    def copy_lanes(self, source: Engine, lanes: ArrayLike) -> None:
-        """Make each lane the copy of one of another engine: same ship, same episode, same future.
-
-        Gusts, noise and what will be asked are functions of the episode's seed and of the step, so copies
-        that are steered alike go on bit for bit like the original.
-
-        Parameters
-        ----------
-        source : Engine
-            Of the same task and ships.
-        lanes : array-like of int, shape (num_envs,)
-            Which lane of `source` each lane becomes.
-
-        Raises
-        ------
-        InputError
-            If the engines differ in more than the number of lanes, or there is no such lane.
-        """
-        which = np.asarray(lanes)
-        if which.shape != (self.num_envs,) or which.dtype.kind not in "iu":
-            raise InputError(
-                f"lanes: {which.dtype} of shape {which.shape} found, expected {self.num_envs} whole numbers"
-            )
-        if which.min() < 0 or which.max() >= source.num_envs:
-            raise InputError(
-                f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
-            )
-        self._check_alike(source)
-        there, here = divmod(which, LANES), divmod(np.arange(self.num_envs), LANES)
-        pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
-            (self._states, source._states), (self._keys, source._keys),
-        ]  # fmt: skip
-        if not self._voyages.shared:
-            pairs.append((self._ships, source._ships))
-        for own, other in pairs:
-            lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
-        self.shown.observations[:] = source.shown.observations[which]
-        self.shown.outcomes[:] = source.shown.outcomes[:, which]
-        self.shown.flags[:] = source.shown.flags[:, which]
-
-    def _check_alike(self, source: Engine) -> None:
-        """Refuse an engine whose lanes cannot be taken over."""
-        same_task = (
-            self._voyages is source._voyages
-            and self._states.shape[1] == source._states.shape[1]
-            and np.array_equal(self._settings, source._settings, equal_nan=True)
-        )
-        if not same_task:
-            raise InputError("source: an engine of another task found, expected one of the same")
-        if self._voyages.shared and not np.array_equal(source._ships, self._ships, equal_nan=True):
-            raise InputError("source: an engine with other ships found, expected one with the same")
-
-    def write(self, name: str, values: ArrayLike) -> None:
-        """Write one number of the state in all lanes: for trials of what might be, see `read`."""
-        row = self._voyages.row(name) * LANES
-        lanes = self._states[:, row : row + LANES].copy().reshape(-1)
-        lanes[: self.num_envs] = values
-        self._states[:, row : row + LANES] = lanes.reshape(-1, LANES)
-
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses those that are no numbers.
 
@@ -393,55 +325,6 @@ class Engine:
             "negative number (shipgym.check_task helps)"
         )
 
-    def get_state(self) -> dict[str, Any]:
-        """All that `set_state` needs to go on from here, copies by name."""
-        shown, gear = self.shown, self._voyages.state
-        rows = [f"{name}.{path}" for name, place in gear.rows.items() for path in place.present]
-        made_for = {"task": self.task.name, "model": self.model.name, "num_envs": self.num_envs, "rows": rows}
-        outputs = {name: getattr(shown, name).copy() for name in ("observations", "outcomes", "flags")}
-        return {"made_for": made_for, **self.memory(), **outputs}
-
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` of an engine made alike gave.
-
-        Raises
-        ------
-        InputError
-            For a state of another task, version, ship or number of lanes, or one with a number that is not
-            finite; nothing is changed then.
-        """
-        own = self.get_state()
-        check_keys(check_table(state, "state"), tuple(own), "state", required=own)
-        for name, expected in own["made_for"].items():
-            if (found := state["made_for"].get(name)) != expected:
-                raise InputError(
-                    f"state: {name} {shown(found)} found, expected {shown(expected)}: a state fits an "
-                    "environment made by the same arguments in the same version"
-                )
-        for name, expected in own.items():
-            if name != "made_for" and np.shape(state[name]) != np.shape(expected):
-                found = f"of shape {np.shape(state[name])}"
-                raise InputError(f"state: {name} {found} found, expected {np.shape(expected)}")
-        if self._voyages.shared and not np.array_equal(state["ships"], self._ships, equal_nan=True):
-            raise InputError(f"state: of another ship than this {self.model.name!r}, expected the same")
-        lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(-1, len(self._states[0]) // LANES)
-        for lane, row in np.argwhere(~np.isfinite(lanes[: self.num_envs]))[:1]:
-            name = (*own["made_for"]["rows"], *["plan"] * row)[row]
-            raise InputError(f"state: {name} in row {lane} is not finite, expected a number")
-        self.remember(state)
-        self.show_anew()
-        for name in ("observations", "outcomes", "flags"):
-            getattr(self.shown, name)[:] = state[name]
-
-    def memory(self) -> dict[str, NDArray[Any]]:
-        """All that the steps to come depend on beside their commands, copies by name."""
-        return {"states": self._states.copy(), "keys": self._keys.copy(), "ships": self._ships.copy()}
-
-    def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
-        """Go on from what `memory` of the same engine, or of one made alike, gave."""
-        self._states[:], self._keys[:] = memory["states"], memory["keys"]
-        self._ships[:] = memory["ships"]
-
     @property
     def command(self) -> Observation:
         """Commands of the next step, shape (n_commands, num_envs); may be written."""
@@ -452,11 +335,6 @@ class Engine:
         """What the autopilots see, float32 array of shape (num_envs, n_observations), a copy."""
         return self.shown.observations.copy()
 
-    def read(self, name: str) -> Floats:
-        """One number of the state for each lane by its name (`u`, `delta`, `course`, `steps`), a copy."""
-        row = self._voyages.row(name) * LANES
-        return self._states[:, row : row + LANES].reshape(-1)[: self.num_envs].copy()
-
     def info(self, name: str) -> Floats:
         """One entry of `info` for each lane, shape (num_envs,), a view of the last step."""
         row: Floats = self.shown.outcomes[STEP_OUTCOME + self.task.info_names.index(name)]
@@ -466,45 +344,6 @@ class Engine:
     def reward_parts(self) -> Floats:
         """Parts of the last rewards in the order of the task's, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
-
-    def physical_state(self) -> dict[str, Floats]:
-        """State, course, commands and, unless it is calm, the weather, SI units, each of shape (num_envs,).
-
-        Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
-        the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
-        """
-        state = {name: self.read(name) for name in self.model.state_names}
-        if "course" in self._voyages.state["state"].present:
-            state["set_point"] = self.read("course")
-        state["delta_command"] = self.read("rudder_command") * self._ship_row("rudder_limit")
-        if "n" in self.model.command_names:
-            state["n_command"] = self.read("shaft_command") * self._ship_row("shaft")
-        return {**state, **self._weather_now()} if self.windy else state
-
-    def _weather_now(self) -> dict[str, Floats]:
-        """What the weather is in each lane, by the names of the channels of trials."""
-        roll = ["phi_wave", "p_wave"] if "phi" in self.model.state_names else []
-        names = ["psi_wave", "r_wave", *roll, "current_north", "current_east"]
-        now = {name: self.read(name) for name in names}
-        now["wind_speed"] = self._ship_row("wind_speed") + self.read("gust")
-        return {**now, "wind_from": np.arctan2(self.read("wind_east"), self.read("wind_north"))}
-
-    def _ship_row(self, name: str) -> Floats:
-        """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
-        layout = self._voyages.ship
-        rows = layout["ship"] if name in layout["ship"].present else layout["sea"]
-        if self._voyages.shared:
-            return np.full(self.num_envs, self._ships[0, rows.row(name)])
-        first = rows.row(name) * LANES
-        return self._ships[:, first : first + LANES].reshape(-1)[: self.num_envs].copy()
-
-    def waypoints(self, lane: int = 0) -> Floats | None:
-        """North and east of the path of a lane's episode, m, shape (n, 2); None where there is none."""
-        plan = lanes_of(self._states)[:, self._voyages.state.n_rows :]
-        if plan.shape[1] == 0 or "waypoints" not in self.task.definition.settings:
-            return None
-        tile, lane = divmod(lane, LANES)
-        return plan[tile, :, lane].reshape(-1, 2).copy()
 
 
 def as_array(actions: Any) -> NDArray[Any]:
