@@ -125,7 +125,7 @@ def logged(run: Trial, seed: int) -> Trial:
     every = slice(None, None, 2)
     channels = {name: values[every] for name, values in channels.items()}
     t = read.t[every]
-    made, derived = to_project_conventions(t, channels, Conventions(), run.name)
+    made, derived, *_ = to_project_conventions(t, channels, Conventions(), run.name)
     return Trial(t, made, name=run.name, kind=run.kind, use=run.use, derived=derived, length=run.length)
 
 
