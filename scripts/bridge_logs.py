@@ -246,7 +246,7 @@ def wind_table() -> str:
     columns = dict(zip(names, names, strict=True)) | {
         "x": "x0", "y": "y0", "wind_speed": "wind_true_speed", "wind_from": "wind_true_dir"
     }  # fmt: skip
-    paths = [entry.path for entry in ship.entries if "zigzag" in entry.file]
+    paths = [path for entry in ship.entries for path in entry.paths if "zigzag" in path.name]
     runs = [under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag")) for path in paths]
     rows = []
     for title, recipe in ESSO_OSAKA.items():
