@@ -133,7 +133,7 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
 
 def _shifted(trial: Trial, name: str, change: float) -> Trial:
     """The trial with another value of a channel, from which a prediction starts."""
-    return Trial(trial.t, {**trial.channels, name: trial[name] + change}, name=trial.name, kind=trial.kind)
+    return trial.with_channels({name: trial[name] + change})
 
 
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:

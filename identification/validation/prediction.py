@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.validation.closed_loop import closed_loop
+from identification.validation.start import with_start
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 from shipgym.ships import ShipModel
@@ -20,9 +21,12 @@ TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder; None where the model runs away."""
+    """Simulate a trial from its initial state and measured rudder; None where the model runs away.
+
+    Initial velocities that were derived are estimated (`with_start`).
+    """
     try:
-        return open_loop(model, trial)
+        return open_loop(model, with_start(model, trial))
     except UnstableModelError:
         return None
 
@@ -47,7 +51,7 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
     if trial.kind == "zigzag":
         heading = switch_heading_deg(trial)
         indices |= _compared(ZIGZAG, trial, prediction, lambda t: zigzag_indices(t, length, heading))
-        again = None if prediction is None else closed_loop(model, trial)
+        again = None if prediction is None else closed_loop(model, with_start(model, trial))
         found = None if again is None else zigzag_indices(again, length, heading)
         for name in ZIGZAG:
             if indices[name] is not None:
