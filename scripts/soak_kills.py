@@ -34,10 +34,10 @@ SHIP = str(Path(__file__).resolve().parents[1] / "examples" / "mariner" / "ship.
 LEARN = ("ppo", "--set", "ships=4", "--set", "n_steps=32", "--set", "batch_size=64", "--set", "base=none")
 #: loaded once, before the commands are forked
 PRELOADED = [
-    "identification.pipeline", "identification.report.page", "agents.training.training", "agents.training.tuning",
-    "agents.benchmarking.run", "numba.core.registry", "scipy.signal", "scipy.optimize", "sklearn.svm",
-    "plotly.graph_objects", "pyarrow.parquet", "control", "torch._dynamo", "stable_baselines3", "optuna.storages",
-    "alembic.command", "rich.console",
+    "identification.pipeline", "identification.report.page", "agents.training.training",
+    "agents.training.tuning", "agents.benchmarking.run", "numba.core.registry", "scipy.signal",
+    "scipy.optimize", "sklearn.svm", "plotly.graph_objects", "pyarrow.parquet", "control", "torch._dynamo",
+    "stable_baselines3", "optuna.storages", "alembic.command", "rich.console",
 ]  # fmt: skip
 
 
