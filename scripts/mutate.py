@@ -277,6 +277,9 @@ def main() -> None:
     parser.add_argument(
         "--log", type=Path, help="JSON lines, a fault each; those in it already are not tried again"
     )
+    parser.add_argument(
+        "--trust", action="store_true", help="make no maps: do not run the tests without a fault first"
+    )
     asked = parser.parse_args()
     multiprocessing.get_context("forkserver").set_forkserver_preload(PRELOADED)
     log = asked.log.read_text("utf-8").splitlines() if asked.log and asked.log.exists() else []
@@ -291,7 +294,7 @@ def main() -> None:
         folders: SimpleQueue[Path] = SimpleQueue()
         for job in range(asked.jobs):
             folders.put(copied(Path(temporary) / str(job)))
-        maps = Maps(asked.maps.resolve())
+        maps = Maps(asked.maps.resolve(), not asked.trust)
         with ThreadPoolExecutor(asked.jobs) as pool:
             tasks = [pool.submit(tried, fault, folders, maps, asked.limit) for fault in wanted]
             for task in as_completed(tasks):
