@@ -10,6 +10,7 @@ Coverage does not see compiled functions. Lines of theirs are found by a second 
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import json
 import multiprocessing
@@ -28,6 +29,8 @@ PRELOADED = [
     "numpy", "scipy.optimize", "scipy.signal", "scipy.stats", "sklearn.svm", "sklearn.model_selection",
     "numba.core.registry", "gymnasium", "pydantic", "jinja2", "plotly.graph_objects", "pyarrow.parquet",
     "rich.console", "typer.testing", "control", "torch._dynamo", "stable_baselines3", "optuna.storages",
+    "hypothesis.core", "hypothesis.strategies", "hypothesis.internal.conjecture.providers",
+    "sklearn.utils.estimator_checks", "xdist.plugin",
 ]  # fmt: skip
 PACKAGES = ("shipgym", "identification", "agents")
 #: processor seconds: of a test in plain Python, of a file in plain Python; what a test may take with a fault,
@@ -125,6 +128,8 @@ def _run(folder: str, tests: list[str], log: str, plain: bool, plugin: Order | s
     os.chdir(folder)
     sys.path[:0] = [folder]
     os.environ["PYTHONPATH"] = folder
+    sys.dont_write_bytecode = False  # a module with a fault has a time of its own
+    gc.freeze()  # pytest collects what tests leave, not what the libraries are
     with Path(log).open("w") as stream:
         os.dup2(stream.fileno(), 1)
         os.dup2(stream.fileno(), 2)
@@ -134,6 +139,7 @@ def _run(folder: str, tests: list[str], log: str, plain: bool, plugin: Order | s
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         numba.config.DISABLE_JIT = True
     asked = ["-q", "-p", "no:cacheprovider", "--tb=line", "-rfE", *tests]
+    asked += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # plugins that are preloaded
     if isinstance(plugin, Order):
         os._exit(int(pytest.main(["-x", *asked], plugins=[plugin])))
     recorder = Recorder(folder, plain)
