@@ -215,9 +215,7 @@ def test_the_smallest_ellipsoid_holds_its_points_within_the_tolerance():
     points = np.random.default_rng(5).standard_normal((200, 4))
     centre, form = smallest_ellipsoid(points, 0.01)
     distances = np.einsum("ij,jk,ik->i", points - centre, form, points - centre)
-    assert (
-        1.0 <= distances.max() <= 1.0 + 5 / 4 * 0.01
-    )  # of lifted points it is (n + 1) / n times
+    assert 1.0 <= distances.max() <= 1.0 + 5 / 4 * 0.01  # of lifted points it is (n + 1) / n times
 
 
 def test_what_cannot_be_simulated_or_sampled_is_refused():
