@@ -21,11 +21,14 @@ DATA ?= ../shared/data
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
 
-# Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would.
-INTERPRETED := tests/shipgym/test_env_conformance.py
+# Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests of
+# these files that are marked as `compiled` take many steps, or state facts about compiled code.
+INTERPRETED := checker conversions env_conformance grey_box linear orders scaling ship_of_your_own structures
+INTERPRETED := $(patsubst %,tests/shipgym/test_%.py,$(INTERPRETED))
 
 test: lint type
-	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 $(INTERPRETED)
+	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "not compiled" $(INTERPRETED)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m compiled $(INTERPRETED)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(addprefix --ignore=,$(INTERPRETED))
 
 lint: $(VENV)/dev-installed

@@ -193,6 +193,12 @@ def test_python_that_is_not_arithmetic_is_refused_with_its_line():
         Translator({}, "it").function(unwritable, float)
 
 
+def test_a_lambda_is_refused():
+    double = lambda x: 2 * x  # noqa: E731
+    with pytest.raises(InputError, match=r"line 1: 'double = lambda x: 2 \* x' found, which cannot be"):
+        Translator({}, "it").function(double, float)
+
+
 def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
     CONTROLLERS["pid"].save(tmp_path / "pid.json")
     run = CliRunner().invoke
