@@ -1,4 +1,4 @@
-"""A name that the setup of PufferLib 3.0.0 uses and does not set where its games are left out (NO_OCEAN=1)."""
+"""A name that the setup of PufferLib 3.0.0 uses but, without its games (NO_OCEAN=1), does not set."""
 
 import builtins
 
