@@ -96,7 +96,10 @@ $(VENV)/docs-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
-	-$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt pufferlib
+	# PufferLib's games need downloads from elsewhere; without them its setup misses a name, which the folder gives
+	$(VENV)/ecosystem/bin/python -m pip install --quiet wheel gym==0.23 pettingzoo==1.24.1 shimmy psutil
+	NO_OCEAN=1 NO_TRAIN=1 PYTHONPATH=$(CURDIR)/scripts/pufferlib_setup $(VENV)/ecosystem/bin/python -m pip install --quiet \
+		--no-deps --no-build-isolation pufferlib==3.0.0
 	touch $@
 
 clean:
