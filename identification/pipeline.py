@@ -7,13 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import shipgym
 from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
-from identification.estimators.threads import on_one_thread
+from identification.estimators.threads import single_threaded
 from identification.options import Given, Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics, explained_samples
 from identification.regression.problem import Problem, held_out, pose
@@ -30,6 +29,7 @@ from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
+from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
@@ -38,12 +38,10 @@ from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
-@on_one_thread
+@single_threaded()
 def identify(
     trials: Sequence[Trial],
     structure: str | Structure = "abkowitz",

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from sklearn.cluster import KMeans
 
@@ -24,6 +23,7 @@ from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples
 from identification.validation.folds import TRIALS, held_out_rows
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
@@ -31,8 +31,6 @@ from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import AUTO, Options
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named

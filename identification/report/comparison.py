@@ -6,16 +6,15 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.validation.ranking import Ranking
+from shipgym.arrays import Floats
 from shipgym.pages import render
 from shipgym.plots import PALETTE, axis, graph_objects, label, layout, line, subplots
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-Floats = NDArray[np.float64]
 
 SHOWN = 4  # methods in a figure of predictions
 LARGEST = 2.0  # error that the figure shows; larger ones lie on its edge

@@ -19,6 +19,7 @@ from identification.options import Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
 from identification.simulation_error.segments import Segment, compared_channels, cut
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
@@ -28,7 +29,6 @@ from shipgym.ships import ShipModel
 from shipgym.ships.mmg import IDENTIFIED
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MAP, DEFAULT_METHOD = "map", Options.method

@@ -104,7 +104,7 @@ def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
 def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
     """A reference ship's turning circles at the target's scale; arguments as in `reference_prior`."""
     turns = virtual_trials(_at_target(reference, blank))[len(ZIGZAGS) :]
-    return [Trial(t.t[::2], {c: v[::2] for c, v in t.channels.items()}, name=t.name) for t in turns]
+    return [turn.part(slice(None, None, 2)) for turn in turns]
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:

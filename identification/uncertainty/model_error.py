@@ -119,7 +119,8 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
     if predicted is None or len(runs) < DRAWS / 2:
         return []
     noise = {name: noise_level(trial.t, trial[name]) for name in COMPARED if name in trial}
-    started = [predict(own, _shifted(clean, name, START * level)) for name, level in noise.items() if level]
+    shifted = [(name, clean[name] + START * level) for name, level in noise.items() if level]
+    started = [predict(own, clean.with_channels({name: values})) for name, values in shifted]
     found = []
     for name, level in noise.items():
         values = np.array([run[name] for run in runs]) - predicted[name]
@@ -129,11 +130,6 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
         if variance > 0.0:
             found.append((square, variance, level**2 + sum(starts)))
     return found
-
-
-def _shifted(trial: Trial, name: str, change: float) -> Trial:
-    """The trial with another value of a channel, from which a prediction starts."""
-    return Trial(trial.t, {**trial.channels, name: trial[name] + change}, name=trial.name, kind=trial.kind)
 
 
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:
@@ -187,9 +183,4 @@ def _reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | N
 def smoothed(trial: Trial) -> Trial:
     """The trial without the noise of heading and velocities, which extremes would be read from."""
     names = [name for name in ("psi", "u", "v", "r") if name in trial]
-    return Trial(
-        trial.t,
-        {**trial.channels, **smoothed_channels(trial, names, "spline")},
-        name=trial.name,
-        kind=trial.kind,
-    )
+    return trial.with_channels(smoothed_channels(trial, names, "spline"))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -60,34 +61,13 @@ def current_of(trial: Trial) -> tuple[float, float]:
 
 def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     """Heading (from 0 where it is not recorded) and yaw rate."""
-    t = trial.t
     names = [name for name in HEADING if name in trial]
     if not _noisy(trial, names) and "psi" in names:
         return {name: trial[name] for name in names}
-    h = np.diff(t)
-    transitions = _integrators(h)
-    observation = np.eye(3)[[HEADING.index(name) for name in names]]
-    start = np.array([trial[name][0] if name in trial else 0.0 for name in HEADING] + [0.0])
-    start_variances = np.array([1.0, 1e-2, 1.0])
-    measured = np.column_stack([trial[name] for name in names])
-    variances = _variances(trial, names)
-
-    def run(roughness: float, rows: slice, quick: bool) -> Smoothed:
-        process = roughness * _random_walk(h)
-        steps = slice(rows.start, rows.stop - 1)
-        return smooth_linear(
-            transitions[steps],
-            process[steps],
-            observation,
-            variances,
-            measured[rows],
-            start,
-            start_variances,
-            quick,
-        )
-
-    smoothed = _at_best_roughness(run, len(t), _first_guess(trial, "r" if "r" in trial else "psi"))
-    return {"psi": smoothed.states[:, 0], "r": smoothed.states[:, 1]}
+    h = np.diff(trial.t)
+    motion = _Motion((*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0))
+    states = motion.smoothed(trial, names, "r" if "r" in trial else "psi")
+    return {name: states[name] for name in HEADING}
 
 
 def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]:
@@ -96,42 +76,47 @@ def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]
     if not _noisy(trial, names) and not current:
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
-    size = 8 if current else 6
-    transitions = _plane_transitions(h, psi, current)[:, :size, :size]
-    observation = np.eye(size)[[PLANE.index(name) for name in names]]
-    start = np.zeros(size)
-    start[:4] = [trial[name][0] if name in trial else 0.0 for name in PLANE]
-    start_variances = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2] * 2)[:size]
-    measured = np.column_stack([trial[name] for name in names])
-    variances = _variances(trial, names)
-    walk = _random_walk(h)
-    shape = np.zeros((len(h), size, size))
+    columns = (*PLANE, "udot", "vdot", *(("current_north", "current_east") if current else ()))
+    size, walk = len(columns), _random_walk(h)
+    process = np.zeros((len(h), size, size))
     for first in (2, 3):
         axes = np.array([first, first + 2])
-        shape[:, axes[:, None], axes] = walk[:, 1:, 1:]
-
-    def run(roughness: float, rows: slice, quick: bool) -> Smoothed:
-        steps = slice(rows.start, rows.stop - 1)
-        process = roughness * shape[steps]
-        return smooth_linear(
-            transitions[steps], process, observation, variances, measured[rows], start, start_variances, quick
-        )
-
-    states = _at_best_roughness(run, len(psi), _first_guess(trial, "u" if "u" in trial else "x")).states
-    columns = (*PLANE, "udot", "vdot", "current_north", "current_east")
-    return dict(zip(columns, states.T, strict=False))
-
-
-def _at_best_roughness(run: Callable[[float, slice, bool], Smoothed], n: int, guess: float) -> Smoothed:
-    """The smoother at the roughness of greatest likelihood on the first samples."""
-    some = slice(0, min(n, LONGEST_SEARCH))
-    best = minimize_scalar(
-        lambda decade: -run(guess * 10.0**decade, some, True).log_likelihood,
-        bounds=(-DECADES, DECADES),
-        method="bounded",
-        options={"xatol": 0.1},
+        process[:, axes[:, None], axes] = walk[:, 1:, 1:]
+    transitions = _plane_transitions(h, psi, current)[:, :size, :size]
+    start_variances = (1e4, 1e4, 1e2, 1e2, 1.0, 1.0, CURRENT**2, CURRENT**2)[:size]
+    return _Motion(columns, transitions, process, start_variances).smoothed(
+        trial, names, "u" if "u" in trial else "x"
     )
-    return run(guess * 10.0 ** float(best.x), slice(0, n), False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """States that are integrals of a random walk of the acceleration, arguments of `smooth_linear`."""
+
+    columns: tuple[str, ...]
+    transitions: Floats
+    process: Floats  # by unit of roughness
+    start_variances: tuple[float, ...]
+
+    def smoothed(self, trial: Trial, names: Sequence[str], guessed_by: str) -> dict[str, Floats]:
+        """States by column, at the roughness of greatest likelihood on the first samples."""
+        observation = np.eye(len(self.columns))[[self.columns.index(name) for name in names]]
+        start = np.array([trial[name][0] if name in names else 0.0 for name in self.columns])
+        measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
+        guess = _first_guess(trial, guessed_by)
+
+        def run(decade: float, rows: int, quick: bool) -> Smoothed:
+            process = guess * 10.0**decade * self.process[: rows - 1]
+            return smooth_linear(
+                self.transitions[: rows - 1], process, observation, variances, measured[:rows], start,
+                np.array(self.start_variances), quick,
+            )  # fmt: skip
+
+        best = minimize_scalar(
+            lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True).log_likelihood,
+            bounds=(-DECADES, DECADES), method="bounded", options={"xatol": 0.1},
+        )  # fmt: skip
+        return dict(zip(self.columns, run(float(best.x), len(trial), False).states.T, strict=True))
 
 
 def _first_guess(trial: Trial, channel: str) -> float:
