@@ -33,7 +33,6 @@ from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
 from shipgym.trials.trial import Trial
@@ -176,7 +175,7 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
         return fit, None
-    refined = refine(fit, task, refinement, _memory(task.blank.particulars))
+    refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
     return refined.fit, refined
 
 
@@ -225,11 +224,6 @@ def _fitted_provenance(
     return found
 
 
-def _memory(ship: Particulars) -> float:
-    """Time over which errors are correlated, s."""
-    return float(MEMORY * ship["length"] / ship["speed"])
-
-
 def _scaled_covariance(
     options: Options, fit: GuardedFit, refined: Refined | None, problem: Problem, provenance: dict[str, Any]
 ) -> Floats:
@@ -247,8 +241,7 @@ def _covariance(
     fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None, uncertainty: str
 ) -> Floats:
     """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
-    ship = blank.particulars
-    memory, bootstrap = _memory(ship), uncertainty == "bootstrap"
+    memory, bootstrap = MEMORY * blank.travel_time, uncertainty == "bootstrap"
     if refined is None or refined.covariance is None:
         by_estimators = bootstrap_covariance if bootstrap else joint_covariance
         covariance = by_estimators(fit.estimators, regression, memory)
@@ -256,9 +249,7 @@ def _covariance(
         covariance = influence_covariance(refined.influences, max(round(memory / refined.width), 1))
     else:
         covariance = refined.covariance
-    return coefficient_covariance(
-        covariance, blank.table.acceleration_matrix(ship, blank.service_shaft_speed)
-    )
+    return coefficient_covariance(covariance, blank.acceleration_matrix)
 
 
 def _left_out(
@@ -277,15 +268,12 @@ def _left_out(
             )
             for estimators, rows in without
         ]
-    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
     values, most = np.array(list(fit.model.coefficients.values())), count / max(count - 1, 1)
     return [
-        replace(
-            fit.model,
-            coefficients=dict(zip(fit.model.coefficients, (values - change).tolist(), strict=True)),
-            covariance=most * covariance,
+        replace(fit.model.with_coefficients(values - most * change), covariance=most * covariance)
+        for change in (
+            np.linalg.solve(blank.acceleration_matrix, part.sum(axis=0)) for part in refined.influences
         )
-        for change in (most * np.linalg.solve(matrix, part.sum(axis=0)) for part in refined.influences)
     ]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +15,5 @@ def with_accelerations(blank: ShipModel, accelerations: Mapping[str, Floats]) ->
 
     Coefficients of the terms of each equation, arrays of shape (n_terms,), SI units.
     """
-    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
-    values = np.linalg.solve(matrix, np.concatenate([accelerations[q] for q in blank.table.regressed]))
-    return replace(blank, coefficients=dict(zip(blank.table.coefficient_names, values.tolist(), strict=True)))
+    stacked = np.concatenate([accelerations[q] for q in blank.table.regressed])
+    return blank.with_coefficients(np.linalg.solve(blank.acceleration_matrix, stacked))
