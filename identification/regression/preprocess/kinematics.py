@@ -19,44 +19,27 @@ PLANE = ("x", "y", "u", "v")
 LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
 DECADES = 4.0  # to either side of the first guess of the roughness
 LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels without noise
-CURRENT = 2.0  # m/s, standard deviation of an unknown current
 
 
-def smooth_kinematics(trial: Trial, current: bool = False) -> Trial:
+def smooth_kinematics(trial: Trial) -> Trial:
     """Smooth heading and yaw rate, then positions and velocities at that heading.
 
     Accelerations are random walks whose roughness is that of greatest likelihood; with the heading known,
     positions and velocities are linear in each other, so that two linear smoothers do. `trial`: with at least
-    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded; `current`: whether u and v
-    are through water that moves over the ground with an unknown steady current; then positions are needed.
-    Channels that are not recorded are not added. `raw` is the trial as it was. Raises InputError for a trial
-    with neither psi nor r, or a current without positions.
+    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded. Channels that are not
+    recorded are not added. `raw` is the trial as it was. Raises InputError for a trial with neither psi nor
+    r.
     """
     if not {"psi", "r"} & trial.channels.keys():
         raise InputError(
             f"trial {trial.name!r}: neither psi nor r found, expected the heading or the yaw rate to smooth "
             'the kinematics by; name its column, or choose preprocessing = "spline"'
         )
-    if current and not {"x", "y", "psi", "u", "v"} <= trial.channels.keys():
-        raise InputError(
-            f"trial {trial.name!r}: a current is to be found from {sorted(trial.channels)}, expected x, y, "
-            "psi, u and v; leave the current out"
-        )
     heading = _smooth_heading(trial)
     found: dict[str, Floats] = dict(heading)
     if {"u", "v"} & trial.channels.keys() or {"x", "y"} <= trial.channels.keys():
-        found |= _smooth_plane(trial, heading["psi"], current)
+        found |= _smooth_plane(trial, heading["psi"])
     return trial.with_channels({name: found[name] for name in found if name in trial})
-
-
-def current_of(trial: Trial) -> tuple[float, float]:
-    """Steady current that makes positions and velocities through water agree, north and east, m/s.
-
-    Raises InputError for a trial without positions, heading and velocities.
-    """
-    smooth_kinematics(trial, current=True)
-    found = _smooth_plane(trial, _smooth_heading(trial)["psi"], True)
-    return float(found["current_north"][0]), float(found["current_east"][0])
 
 
 def _smooth_heading(trial: Trial) -> dict[str, Floats]:
@@ -70,23 +53,19 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     return {name: states[name] for name in HEADING}
 
 
-def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]:
-    """Position, surge and sway, and a current, at a known heading."""
+def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
+    """Position, surge and sway at a known heading."""
     names = [name for name in PLANE if name in trial]
-    if not _noisy(trial, names) and not current:
+    if not _noisy(trial, names):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
-    columns = (*PLANE, "udot", "vdot", *(("current_north", "current_east") if current else ()))
-    size, walk = len(columns), _random_walk(h)
-    process = np.zeros((len(h), size, size))
+    walk, process = _random_walk(h), np.zeros((len(h), 6, 6))
     for first in (2, 3):
         axes = np.array([first, first + 2])
         process[:, axes[:, None], axes] = walk[:, 1:, 1:]
-    transitions = _plane_transitions(h, psi, current)[:, :size, :size]
-    start_variances = (1e4, 1e4, 1e2, 1e2, 1.0, 1.0, CURRENT**2, CURRENT**2)[:size]
-    return _Motion(columns, transitions, process, start_variances).smoothed(
-        trial, names, "u" if "u" in trial else "x"
-    )
+    transitions, start_variances = _plane_transitions(h, psi), (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
+    motion = _Motion((*PLANE, "udot", "vdot"), transitions, process, start_variances)
+    return motion.smoothed(trial, names, "u" if "u" in trial else "x")
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,16 +132,14 @@ def _random_walk(h: Floats) -> Floats:
     return found
 
 
-def _plane_transitions(h: Floats, psi: Floats, current: bool) -> Floats:
-    """Transitions of x, y, u, v, their accelerations and the current; mean heading over each step."""
-    found = np.tile(np.eye(8), (len(h), 1, 1))
+def _plane_transitions(h: Floats, psi: Floats) -> Floats:
+    """Transitions of x, y, u, v and their accelerations; mean heading over each step."""
+    found = np.tile(np.eye(6), (len(h), 1, 1))
     cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
     sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
     for axis, parts in enumerate(((cosine, -sine), (sine, cosine))):
         for k, part in enumerate(parts):
             found[:, axis, 2 + k] = h * part
             found[:, axis, 4 + k] = 0.5 * h**2 * part
-        if current:
-            found[:, axis, 6 + axis] = h
     found[:, 2, 4] = found[:, 3, 5] = h
     return found
