@@ -92,8 +92,7 @@ def identify(
     fit, refined = _fitted(chosen, asked, problem)
     provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
-    call = whole_call(asked, problem.trials, particulars, steering)
-    return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
+    return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance)
 
 
 def _identified_best(
@@ -128,15 +127,15 @@ def _identified_with_kernel(
         ).model
         fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
         blank, box = fitted, fitted_box(fitted)
-    found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
+    found = fit_kernel(blank, problem.used, box, options, problem.sampling)
     fit = _simulated(found.model, found.estimators, problem.used)
-    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
+    call = whole_call(options, problem.trials, particulars, steering)
+    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples, call=call)
     named = replace(options, structure=beneath.structure)
     provenance = _provenance(named, name_of(options.method), options.settings(), fit, problem)
     provenance["kernel"] = found.report
     covariance = _scaled_covariance(options, fit, None, problem, provenance)
-    call = whole_call(options, problem.trials, particulars, steering)
-    return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance, call)
+    return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance)
 
 
 def _identified_mmg(
@@ -145,18 +144,11 @@ def _identified_mmg(
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
+    samples, estimators = explained_samples(problem.used, found.model, **problem.sampling)
     fit = _simulated(found.model, estimators, problem.used)
     problem = replace(problem, samples=samples, blank=found.model)
     provenance = _provenance(options, MAP, {}, fit, problem) | found.report
-    call = whole_call(options, problem.trials, particulars, steering)
-    return _evaluated(found.model, fit, problem, provenance, call)
-
-
-def _sampling(options: Options, steering: SteeringGear | None) -> dict[str, Any]:
-    """Arguments of `build_samples`."""
-    smooth = options.preprocessing or options.smooth
-    return {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+    return _evaluated(found.model, fit, problem, provenance)
 
 
 def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
@@ -278,11 +270,11 @@ def _left_out(
 
 
 def _evaluated(
-    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
+    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
     provenance |= problem.sea
-    provenance["steering"] = "estimated" if call["steering"] is None else "given"
+    provenance["steering"] = "estimated" if problem.call["steering"] is None else "given"
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
@@ -305,6 +297,6 @@ def _evaluated(
         trials=trials,
         samples=problem.samples,
         estimators=fit.estimators,
-        settings=call,
+        settings=problem.call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )

@@ -9,7 +9,7 @@ one.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,9 +23,7 @@ from identification.regression.preprocess.noise import noise_level
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
-from identification.validation.prediction import COMPARED, ZIGZAG, predict
-from shipgym.errors import InputError
-from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
+from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -134,7 +132,7 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
 
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:
     """Of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
-    read = _reader(own, clean)
+    read = index_reader(own, clean)
     if read is None:
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
@@ -160,24 +158,6 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
         return float(np.degrees(np.hypot(noise_level(trial.t, trial["psi"]), timing * rate))) ** 2
     noise = noise_level(trial.t, trial["x"]) if "x" in trial and trial.kind != "zigzag" else 0.0
     return float(np.hypot(noise, timing * trial["u"].max()) / model.particulars["length"]) ** 2
-
-
-def _reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:
-    """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres."""
-    length = model.particulars["length"]
-    heading = switch_heading_deg(trial) if trial.kind == "zigzag" else None
-
-    def read(run: Trial | None) -> Any:
-        try:
-            if run is None:
-                return None
-            if heading is not None:
-                return zigzag_indices(run, length, heading)
-            return turning_indices(run, length)
-        except InputError:  # a channel such as the position is missing
-            return None
-
-    return read if heading is not None or trial.kind == "turning-circle" else None
 
 
 def smoothed(trial: Trial) -> Trial:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from identification.regression.preprocess.kalman import Smoothed, smooth_linear
+from identification.regression.preprocess.kalman import smooth_linear
 from identification.regression.preprocess.noise import NOISY, noise_level, noise_ratio
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
@@ -84,7 +84,7 @@ class _Motion:
         measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
         guess = _first_guess(trial, guessed_by)
 
-        def run(decade: float, rows: int, quick: bool) -> Smoothed:
+        def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
             process = guess * 10.0**decade * self.process[: rows - 1]
             return smooth_linear(
                 self.transitions[: rows - 1], process, observation, variances, measured[:rows], start,
@@ -92,10 +92,10 @@ class _Motion:
             )  # fmt: skip
 
         best = minimize_scalar(
-            lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True).log_likelihood,
+            lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True)[1],
             bounds=(-DECADES, DECADES), method="bounded", options={"xatol": 0.1},
         )  # fmt: skip
-        return dict(zip(self.columns, run(float(best.x), len(trial), False).states.T, strict=True))
+        return dict(zip(self.columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
 
 def _first_guess(trial: Trial, channel: str) -> float:
