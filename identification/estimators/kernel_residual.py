@@ -18,7 +18,6 @@ from sklearn.cluster import KMeans
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import ERROR_TOLERANCE, heading_error
-from identification.regression.coefficients import with_accelerations
 from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples
@@ -232,7 +231,7 @@ class _Search:
                 found[q] = np.asarray(
                     np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
                 )
-            errors.append(heading_error(with_accelerations(stage.model, found), held, "rmse"))
+            errors.append(heading_error(stage.model.with_accelerations(found), held, "rmse"))
         return float(np.mean(errors))
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
@@ -242,5 +241,5 @@ class _Search:
             q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
             for q, X in samples.features.items()
         }
-        model = with_accelerations(stage.model, {q: one.coef_ for q, one in estimators.items()})
+        model = stage.model.with_accelerations({q: one.coef_ for q, one in estimators.items()})
         return KernelFit(model, samples, estimators)

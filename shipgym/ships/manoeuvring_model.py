@@ -1,5 +1,6 @@
 """The equations of motion of one ship with her numbers: what every simulation is made from."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self
@@ -93,6 +94,11 @@ class ManoeuvringModel:
     def with_coefficients(self, values: Floats) -> Self:
         """A copy with other coefficients, in their order, shape (n_coefficients,)."""
         return replace(self, coefficients=dict(zip(self.coefficients, values.tolist(), strict=True)))
+
+    def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
+        """A copy with the coefficients that follow from those of each regression on accelerations, SI."""
+        stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
+        return self.with_coefficients(np.linalg.solve(self.acceleration_matrix, stacked))
 
     @property
     def travel_time(self) -> float:
