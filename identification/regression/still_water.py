@@ -91,12 +91,8 @@ def _take_out_current(
     doubts: dict[str, list[str]] = {}
     for trial, current, covariance, source in _currents(list(found.values()), length, speed, option):
         mean = np.reshape(current, (2, -1)).mean(axis=1)
-        row: dict[str, Any] = {
-            "north": float(mean[0]),
-            "east": float(mean[1]),
-            "source": source,
-            "taken_out": True,
-        }
+        row: dict[str, Any] = {"north": float(mean[0]), "east": float(mean[1])}
+        row |= {"source": source, "taken_out": True}
         doubt = ""
         if covariance is not None:
             errors = np.sqrt(np.diag(covariance))
