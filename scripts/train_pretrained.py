@@ -105,7 +105,7 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
 
 def publish(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     """Write a run's policy with its record."""
-    folder, name = folder_of(runs, algorithm, task, seed), f"{task.name}-{algorithm}-{seed}.json"
+    folder, name = folder_of(runs, algorithm, task, seed), f"{task.name}-{algorithm}-s{seed}.json"
     result = read_json(folder / RESULT, "result of a run", BROKEN)
     policy = load_agent(folder / run_folder.AGENT)
     assert isinstance(policy, LearnedPolicy)
