@@ -3,6 +3,7 @@
     python scripts/train_pretrained.py                                   # every task's missing runs
     python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
     python scripts/train_pretrained.py --table results                   # markdown for docs/pretrained.md
+    python scripts/train_pretrained.py --shield 50                       # what the shield costs, 50 episodes
 
 Each task is learned with its settings in `agents/training/hyperparameters`, once for each training seed, in
 the design model and over the models drawn from its covariance. Of each run the policy that costs least on
@@ -10,7 +11,8 @@ held-out episodes of the model is kept; the runs are all shipped and all scored,
 learn with the first seed before any learns with the second, so that a set that was cut short is balanced.
 Killed at any moment, it goes on where it was.
 
-`results` is a folder of `shipgym benchmark --suite shipgym-v2` with the agents and all the baselines.
+`results` is a folder of `shipgym benchmark --suite shipgym-v2` with the agents and the baselines; more
+folders may follow, of contestants that were run in fewer episodes.
 """
 
 from __future__ import annotations
@@ -26,10 +28,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
+from agents.benchmarking.contestants import pretrained
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.policies.policy import LearnedPolicy
-from agents.suites.suite import BenchmarkTask, load_suite
+from agents.policies.shield import Shielded
+from agents.rollouts.rollout import rollout
+from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
@@ -50,13 +55,17 @@ def main() -> None:
     parser.add_argument("--tasks", default="", help="names, separated by commas; by default all")
     parser.add_argument("--seeds", default="0,1,2,3,4", help="training seeds, separated by commas")
     parser.add_argument("--runs", type=Path, default=Path("runs/pretrained"), help="folder of the runs")
-    parser.add_argument("--table", type=Path, help="only print what the agents cost in these results")
+    parser.add_argument("--table", type=Path, nargs="+", help="only print what the agents cost in results")
+    parser.add_argument("--shield", type=int, help="only print what the shield costs, in so many episodes")
     asked = parser.parse_args()
     suite = load_suite(asked.suite)
     named = [suite.task(name) for name in asked.tasks.split(",") if name]
     tasks = named or [task for task in suite.tasks if task.on == "ship"]
     if asked.table:
-        print(table(tasks, load_results(asked.table), asked.algorithm))
+        print(table(tasks, [load_results(folder) for folder in asked.table], asked.algorithm))
+        return
+    if asked.shield:
+        print(shield_table(tasks, asked.algorithm, asked.shield))
         return
     for seed in map(int, asked.seeds.split(",")):
         for task in tasks:
@@ -125,47 +134,89 @@ def publish(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
         raise SystemExit(f"{path}: {size:.0f} kB with its weights, expected at most {LARGEST_KB:.0f}")
 
 
-def table(tasks: Sequence[BenchmarkTask], result: BenchmarkResult, algorithm: str) -> str:
+def table(tasks: Sequence[BenchmarkTask], results: Sequence[BenchmarkResult], algorithm: str) -> str:
     """Costs of the best baseline and of every training seed, the gain, and whether the aim is met."""
     lines = [
-        "| task | best baseline | its cost | agents, by training seed | gain on the ship | on the model "
+        "| task | best baseline | its cost | agents, by training seed | gain on the ship, % | on the model "
         "| far from the design | lost far: agents, baseline | aim |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for number, task in enumerate(tasks):
-        best, gain = _gain(result, task.name, algorithm, number)
-        seeds = ", ".join(f"{cost:.1f}" for cost in result.figures(algorithm, task.name).mean(axis=1))
-        others = [_gain(result, task.name + end, algorithm, number, best)[1] for end in ("-on-model", "-far")]
+        best = best_baseline(results, task.name, algorithm)
+        gain, *others = (
+            gain_of(*paired(results, task.name + end, algorithm, best), number) for end in SETS.values()
+        )
+        learned, theirs = paired(results, task.name, algorithm, best)
         lost = [
-            f"{result.figures(one, f'{task.name}-far', 'terminated').mean():.0%}" for one in (algorithm, best)
+            f"{one.mean():.0%}" for one in paired(results, f"{task.name}-far", algorithm, best, "terminated")
         ]
-        cost = result.figures(best, task.name).mean()
+        seeds, n = ", ".join(f"{cost:.1f}" for cost in learned.mean(axis=1)), theirs.shape[1]
+        named = best if n == N_EPISODES else f"{best} ({n} episodes)"
         met = "gain" if gain.value >= GAIN and gain.low > 0 else "near" if gain.value >= -CLOSE else "missed"
-        cells = [task.name, best, f"{cost:.1f}", seeds, *map(_shown, (gain, *others)), ", ".join(lost), met]
-        lines.append(f"| {' | '.join(cells)} |")
+        cells = [named, f"{theirs.mean():.1f}", seeds, *map(_shown, (gain, *others)), ", ".join(lost), met]
+        lines.append(f"| {' | '.join([task.name, *cells])} |")
     return "\n".join(lines)
 
 
-def _gain(
-    result: BenchmarkResult, task: str, algorithm: str, number: int, best: str | None = None
-) -> tuple[str, Interval]:
-    """The baseline, by default that of the least mean cost, and what part of it the agents cost less."""
-    costs = {name: result.figures(name, task) for name in result.summary["contestants"]}
-    baselines = [name for name in costs if name not in (algorithm, "best-known") and len(costs[name])]
-    best = best or min(baselines, key=lambda name: float(costs[name].mean()))
-    learned, theirs = costs[algorithm], costs[best]
+def best_baseline(results: Sequence[BenchmarkResult], task: str, algorithm: str) -> str:
+    """The one of the lowest mean cost; one that was run in fewer episodes is compared in these."""
+    names = {name for one in results for name in one.summary["contestants"]} - {algorithm, "best-known"}
+    costs = {name: figures(results, name, task) for name in sorted(names)}
+    best, *others = sorted(
+        (name for name in costs if costs[name].size), key=lambda name: (-costs[name].size, costs[name].mean())
+    )
+    for name in others:
+        ours, theirs = paired(results, task, best, name)
+        best = name if theirs.mean() < ours.mean() else best
+    return best
+
+
+def figures(
+    results: Sequence[BenchmarkResult], name: str, task: str, figure: str = "cost"
+) -> NDArray[np.float64]:
+    """A figure of a contestant where most episodes of it were run, shape (n_runs, n_episodes)."""
+    held = [one for one in results if name in one.summary["contestants"] and task in one.tasks]
+    return max((one.figures(name, task, figure) for one in held), key=np.size, default=np.zeros((0, 0)))
+
+
+def paired(
+    results: Sequence[BenchmarkResult], task: str, one: str, other: str, figure: str = "cost"
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A figure of two contestants in the episodes that both were run in."""
+    first, second = (figures(results, name, task, figure) for name in (one, other))
+    n = min(first.shape[1], second.shape[1])
+    return first[:, :n], second[:, :n]
+
+
+def shield_table(tasks: Sequence[BenchmarkTask], algorithm: str, episodes: int) -> str:
+    """What the agents of the first training seed cost with a shield and without, and how often it steers."""
+    lines = [
+        "| task | without | with shield | with / without | time it steers |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for task in tasks:
+        agent = load_agent(pretrained(task.name, algorithm)[0])
+        engine, seeds = task.engine(episodes), task.seeds[:episodes]
+        free, safe = (
+            rollout(one, engine, seeds, record=("heading_error",))
+            for one in (agent, Shielded.from_model(task.ship, agent))
+        )
+        without, held = float(free.costs.mean()), float(safe.costs.mean())
+        steers = safe.shielded[safe.sailing].mean()
+        lines.append(f"| {task.name} | {without:.1f} | {held:.1f} | {held / without:.3f} | {steers:.2%} |")
+    return "\n".join(lines)
+
+
+def gain_of(learned: NDArray[np.float64], theirs: NDArray[np.float64], number: int) -> Interval:
+    """What part of a baseline's cost the agents cost less, drawn over episodes and training seeds."""
     draws = Draws(number + 1, learned.shape[1])
-
-    def gains(own: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(1.0 - own.mean(axis=-1) / other.mean(axis=-1))
-
-    drawn = gains(draws.means(learned, number, 1), draws.means(theirs, number))
-    return best, interval(float(1.0 - learned.mean() / theirs.mean()), drawn)
+    drawn = 1.0 - draws.means(learned, number, 1).mean(axis=1) / draws.means(theirs, number).mean(axis=1)
+    return interval(float(1.0 - learned.mean() / theirs.mean()), drawn)
 
 
 def _shown(gain: Interval) -> str:
     """A gain with its interval, in percent."""
-    return f"{100 * gain.value:+.1f} % ({100 * gain.low:+.1f} to {100 * gain.high:+.1f})"
+    return f"{100 * gain.value:.1f} ({100 * gain.low:.1f} to {100 * gain.high:.1f})"
 
 
 if __name__ == "__main__":
