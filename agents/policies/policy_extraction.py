@@ -39,6 +39,8 @@ ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
+#: What the wrapper has that adds to a controller.
+RESIDUAL = ("base", "authority", "frame_stack", "action_repeat", "rate_limit")
 N_COMPARED = 16
 AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
@@ -90,15 +92,16 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """History, base and authority of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if all(name in vars(wrapper) for name in ("base", "authority", "frame_stack", "action_repeat")):
+        if all(name in vars(wrapper) for name in RESIDUAL):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 raise InputError(
                     f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
                     "hold"
                 )
-            numbers = {"frame_stack": int(wrapper.frame_stack), "action_repeat": int(wrapper.action_repeat)}
-            return {"base": base, "authority": float(wrapper.authority), **numbers}
+            whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
+            parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
+            return {"base": base, **whole, **parts}
     return {}
 
 
