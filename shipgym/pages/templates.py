@@ -58,7 +58,9 @@ def plotly_script() -> Markup:
 
     Its bundle `cartesian`, a third of the whole: lines, bars, boxes, histograms, heat maps, contours.
     """
-    return Markup(_source("shipgym.pages/plotly/plotly-cartesian.min.js")[0].replace("</script", "<\\/script"))
+    return Markup(
+        _source("shipgym.pages/plotly/plotly-cartesian.min.js")[0].replace("</script", "<\\/script")
+    )
 
 
 def plotted(plot: Figure) -> dict[str, Any]:
