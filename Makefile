@@ -3,7 +3,7 @@
 # make bench     how fast it is
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
-# make release-check  the lowest declared versions of all dependencies, installed and tried
+# make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
 # make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments; for every night
 # make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
