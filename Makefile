@@ -4,7 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
-# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments; for every night
+# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
 # make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
@@ -94,6 +94,8 @@ $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
 	-$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt pufferlib
+	$(VENV)/ecosystem/bin/python -m pip install --quiet matplotlib
+	$(VENV)/ecosystem/bin/python -m pip install --quiet --no-deps shipmmg
 	touch $@
 
 clean:

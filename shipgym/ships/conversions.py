@@ -52,8 +52,9 @@ def state_space(
 
     States are v (q in a table with a memory of yaw), r, and psi and delta where `heading` and `gear` ask for
     them: deviations from straight running in SI units, rudder positive to starboard. The input is `delta`, or
-    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. Speed in m/s,
-    the service speed by default. Raises InputError if the model has no straight course, or its gear no lag to make a state of.
+    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. The speed,
+    m/s, is the service speed by default. Raises InputError if the model has no straight course, or its gear
+    no lag to make a state of.
     """
     import control  # here, because it takes a second to import
 
