@@ -3,8 +3,8 @@
 # make bench     how fast it is
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
-# make release-check  the lowest declared versions of all dependencies, installed and tried
-# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments; for every night
+# make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
+# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
 # make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site
@@ -100,6 +100,8 @@ $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(VENV)/ecosystem/bin/python -m pip install --quiet wheel gym==0.23 pettingzoo==1.24.1 shimmy psutil
 	NO_OCEAN=1 NO_TRAIN=1 PYTHONPATH=$(CURDIR)/scripts/pufferlib_setup $(VENV)/ecosystem/bin/python -m pip install --quiet \
 		--no-deps --no-build-isolation pufferlib==3.0.0
+	$(VENV)/ecosystem/bin/python -m pip install --quiet matplotlib
+	$(VENV)/ecosystem/bin/python -m pip install --quiet --no-deps shipmmg
 	touch $@
 
 clean:

@@ -1,4 +1,4 @@
-"""Reinforcement-learning libraries' own wrappers on shipgym's environments, single and native vector.
+"""Reinforcement-learning libraries' own wrappers on shipgym's environments, and a turn in shipmmg.
 
     make ecosystem                            in a virtual environment of its own; needs the network
     python scripts/ecosystem.py torchrl skrl  only these, where they are installed
@@ -271,6 +271,26 @@ def sb3_wrapped() -> None:
     PPO("MlpPolicy", ships, n_steps=16, batch_size=32).learn(128)
 
 
+def shipmmg_turn() -> None:
+    """A turn of KVLCC2 at 35 deg in shipmmg and here ends within a millimetre of the same place."""
+    from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams, simulate_mmg_3dof
+
+    from shipgym.ships.catalogue import kvlcc2_l7
+
+    ship = kvlcc2_l7("shipmmg")
+    fields = shipgym.interchange.to_shipmmg(ship)
+    rudder, n = np.radians(35.0), ship.service_shaft_speed
+    ours = ship.simulate(np.tile([rudder, n], (1000, 1)), 0.2)
+    orders = np.minimum(ship.steering.rate * ours.t, rudder)
+    theirs = simulate_mmg_3dof(
+        Mmg3DofBasicParams(**fields["basic_params"]),
+        Mmg3DofManeuveringParams(**fields["maneuvering_params"]),
+        ours.t, orders, np.full(len(ours.t), n), u0=ship.particulars["speed"], rtol=1e-8, atol=1e-10,
+    ).sol(ours.t[-1])  # fmt: skip
+    apart = np.hypot(theirs[3] - ours["x"][-1], theirs[4] - ours["y"][-1])
+    assert apart < 1e-3, f"{1000.0 * apart:.2f} mm apart"
+
+
 CHECKS: dict[str, tuple[Callable[[], None], ...]] = {
     "skrl": (skrl_single, skrl_native),
     "torchrl": (torchrl_single, torchrl_native),
@@ -278,6 +298,7 @@ CHECKS: dict[str, tuple[Callable[[], None], ...]] = {
     "pufferlib": (pufferlib_single, pufferlib_native),
     "cleanrl": (cleanrl_single, cleanrl_native),
     "stable-baselines3": (sb3_wrapped,),
+    "shipmmg": (shipmmg_turn,),
 }
 
 

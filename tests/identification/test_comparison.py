@@ -73,7 +73,7 @@ def test_no_name_or_message_becomes_html(comparison: Comparison) -> None:
     page = comparison_page(changed)
     assert "<script>alert" not in page
     assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;&#34;&#39;&amp;{{ 7 * 7 }}") == 4
-    assert page.count("</script>") == 3  # plotly.js and two figures
+    assert page.count("</script>") == 4  # plotly.js, two figures, printing
 
 
 def test_without_trials_to_validate_each_is_held_out_in_turn(
