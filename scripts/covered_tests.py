@@ -35,7 +35,7 @@ PRELOADED = [
 PACKAGES = ("shipgym", "identification", "agents")
 #: processor seconds: of a test in plain Python, of a file in plain Python; what a test may take with a fault,
 #: beside ten times what it takes without, which compiles loops anew
-SLOW_S, SLOW_FILE_S, ALLOWED_S = 10.0, 200.0, 60.0
+SLOW_S, SLOW_FILE_S, ALLOWED_S = 5.0, 60.0, 60.0
 NOTICED, MISSED, TIME_LIMIT = "noticed", "missed", "time limit"
 
 
