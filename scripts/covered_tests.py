@@ -35,7 +35,7 @@ PRELOADED = [
 PACKAGES = ("shipgym", "identification", "agents")
 #: processor seconds: of a test in plain Python, of a file in plain Python; what a test may take with a fault,
 #: beside ten times what it takes without, which compiles loops anew
-SLOW_S, SLOW_FILE_S, ALLOWED_S = 10.0, 200.0, 60.0
+SLOW_S, SLOW_FILE_S, ALLOWED_S = 5.0, 60.0, 60.0
 NOTICED, MISSED, TIME_LIMIT = "noticed", "missed", "time limit"
 
 
@@ -106,6 +106,7 @@ class Order:
     first: dict[str, float]  # and their seconds
     only: bool
     seconds: dict[str, float]  # of all that are known
+    plain: bool = False  # whether in plain Python, where slow tests are given up
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items):
@@ -118,6 +119,12 @@ class Order:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_logstart(self, nodeid):
         """End the process where a test runs on and on, in compiled code too."""
+        if self.plain:
+            if processor_s() > SLOW_FILE_S:
+                pytest.exit("slow", 0)
+            signal.signal(signal.SIGPROF, lambda *_: pytest.skip("slow in plain Python"))
+            signal.setitimer(signal.ITIMER_PROF, SLOW_S)
+            return
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_PROF, ALLOWED_S + 10 * self.seconds.get(nodeid, 0.0))
 
@@ -232,8 +239,9 @@ class Maps:
 def noticed(maps: Maps, folder: Path, tests: list[str], module: str, lines: range, limit_s: float) -> Any:
     """Prepare in a copy without a fault, and return the function that runs the tests once the fault is in it.
 
-    Where compiled code has the fault, the tests that reach it run in plain Python first, and the one that
-    notices runs compiled, as it does without `mutate.py`: if it notices still, that is it; if not, all run.
+    Where no test reaches the fault, compiled code may have it: then the tests that reach it (or all, without
+    a map) run in plain Python first, and the one that notices runs compiled, as it does without `mutate.py`.
+    If it notices still, that is it; if not, all run.
     """
     first, seconds = maps.ordered(folder, tests, module, lines, plain=False)
     plain: dict[str, float] = {}
@@ -241,9 +249,10 @@ def noticed(maps: Maps, folder: Path, tests: list[str], module: str, lines: rang
         plain, _ = maps.ordered(folder, tests, module, lines, plain=True)
 
     def result() -> Result:
-        if plain:
-            quick = run(folder, tests, limit_s, Order(plain, True, plain), plain=True)
-            if quick.outcome == NOTICED and quick.test in plain:
+        if not first and (plain or not maps.made):
+            order = Order(plain, bool(plain), seconds, plain=True)
+            quick = run(folder, tests, limit_s, order, plain=True)
+            if quick.outcome == NOTICED and "::" in quick.test:
                 again = run(folder, [quick.test], limit_s, Order({quick.test: 0.0}, True, seconds))
                 if again.outcome != MISSED:
                     return again

@@ -9,6 +9,7 @@ import pytest
 from shipgym import InputError
 from shipgym.arrays import integral
 from shipgym.checks import (
+    check_array,
     check_choice,
     check_finite,
     check_flag,
@@ -125,3 +126,9 @@ def test_files_are_written_whole_or_not_at_all(tmp_path):
     (tmp_path / "folder").mkdir()
     with pytest.raises(InputError, match=r"folder: is not a file; choose another name$"):
         write_text("", tmp_path / "folder")
+
+
+def test_rows_of_an_array_are_equally_long_and_one_row_is_enough():
+    assert check_array([[1, 2.5]], (None, None), "x").tolist() == [[1.0, 2.5]]
+    with pytest.raises(InputError, match=r"x\[1\]: 1 entries found, expected a list of 2 numbers"):
+        check_array([[1.0, 2.0], [3.0]], (None, None), "x")

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -16,6 +17,8 @@ from shipgym.engine import mathematics
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
+from shipgym.engine.record_code import loader
+from shipgym.engine.records import Layout, table_of
 from shipgym.engine.specialise import fingerprint
 from shipgym.sea.open_sea import sea_parts
 from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
@@ -142,3 +145,17 @@ def test_a_reason_that_numba_colours_is_the_same_reason():
     said = explanation(ValueError(plain), "own")
     assert said == explanation(ValueError(coloured), "own")
     assert said == 'own: cannot be compiled in f (own.py, line 25): Unknown attribute "_replace"'
+
+
+class Sounding(NamedTuple):
+    depth: float
+    shares: table_of(3)
+
+
+def test_a_table_in_a_record_is_the_lane_s_column_of_its_tile():
+    rows = Layout(before=Sounding, found=Sounding)["found"]
+    tile = np.arange(64.0 * rows.end)
+    depth, shares = loader(rows).function(tile, 5)
+    assert depth == 64 * 4 + 5
+    assert shares[:3].tolist() == [64 * 5 + 5, 64 * 6 + 5, 64 * 7 + 5]
+    assert loader(rows, 1).function(np.arange(8.0), 5).shares.tolist() == [5.0, 6.0, 7.0]

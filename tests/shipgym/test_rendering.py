@@ -68,6 +68,18 @@ def test_a_path_lies_where_it_is(renderer):
     assert np.ptp(north) > 1000.0
 
 
+@pytest.mark.parametrize(("anchor", "left", "right"), [("left", 0, 1), ("right", 1, 0), ("centre", 1, 1)])
+def test_a_text_stands_at_its_anchor(renderer, anchor, left, right):
+    picture, brush = renderer._pygame.Surface((SIZE, SIZE)), renderer._brush
+    brush.fill((255, 255, 255))
+    brush.text("HIH", (300.0, 100.0), (0, 0, 0), anchor)
+    brush.show(picture)
+    columns, rows = np.nonzero(renderer._pygame.surfarray.array3d(picture)[..., 0] < 200)
+    width = left * (300 - columns.min()) + right * (columns.max() - 300)
+    assert np.ptp(columns) == pytest.approx(width, abs=4)
+    assert 0 <= rows.mean() - (90 if anchor == "centre" else 100) < 20
+
+
 def test_the_same_scene_gives_the_same_picture(renderer):
     assert np.array_equal(renderer.draw(SHIP), Renderer("rgb_array").draw(SHIP))
 

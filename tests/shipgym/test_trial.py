@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from shipgym.errors import InputError
+from shipgym.trials import plausibility
 from shipgym.trials.trial import Trial
 from shipgym.trials.trial_import import rotate_to_body
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
@@ -679,3 +680,11 @@ def test_velocities_derived_from_positions_are_over_ground(tmp_path):
     gnss = Trial.from_csv(tmp_path / "gnss.csv")
     assert all(copy.over_ground for copy in (gnss, gnss.with_(name="a"), pickle.loads(pickle.dumps(gnss))))
     assert not gnss.with_(over_ground=False).with_channels({"u": gnss["u"]}).over_ground
+
+
+def test_a_yaw_rate_loses_its_bias_whatever_its_clock_begins_at():
+    t = np.linspace(0.0, 300.0, 301)
+    turned = np.sin(t / 40.0)
+    of_zero = plausibility._detrended(t, turned + 0.01 * t + 3.0)
+    np.testing.assert_allclose(plausibility._detrended(t, turned), of_zero, atol=1e-12)
+    np.testing.assert_allclose(plausibility._detrended(t + 2e9, turned), of_zero, atol=1e-9)
