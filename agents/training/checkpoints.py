@@ -60,6 +60,9 @@ def put_back(agent: Any, memory: Memory) -> None:
     check_like(memory, _own(agent, memory), "agent")
     _check_weights(memory["parameters"])
     _check_observed(agent, memory["counters"]["_last_obs"])
+    for number, kept in enumerate(memory["ships"]):
+        if not np.isfinite(kept.get("states", 0.0)).all():  # positions, velocities, orders and what is asked
+            raise ValueError(f"agent.ships[{number}].states: expected finite numbers")
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)

@@ -177,8 +177,9 @@ class Lanes(ABC):
         """
         own = self.get_state()
         check_keys(check_table(state, "state"), tuple(own), "state", required=own)
+        made_for = check_table(state["made_for"], "state: made_for")
         for name, expected in own["made_for"].items():
-            if (found := state["made_for"].get(name)) != expected:
+            if (found := made_for.get(name)) != expected:
                 raise InputError(
                     f"state: {name} {shown(found)} found, expected {shown(expected)}: a state fits an "
                     "environment made by the same arguments in the same version"
@@ -193,6 +194,8 @@ class Lanes(ABC):
         for lane, row in np.argwhere(~np.isfinite(lanes[: self.num_envs]))[:1]:
             name = (*own["made_for"]["rows"], *["plan"] * row)[row]
             raise InputError(f"state: {name} in row {lane} is not finite, expected a number")
+        if not np.isfinite(state["observations"]).all():
+            raise InputError("state: observations are not finite, expected numbers")
         self.remember(state)
         self.show_anew()
         for name in ("observations", "outcomes", "flags"):

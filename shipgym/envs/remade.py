@@ -7,9 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, NoReturn
 
+import numpy as np
 from gymnasium.envs.registration import EnvSpec
 
-from shipgym.checks import check_keys, check_table
+from shipgym.checks import check_keys, check_table, shown
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
@@ -78,7 +79,11 @@ class Remade:
         check_keys(
             check_table(state, "state"), names := ("asked", "engine", *self._counters()), "state", names
         )
-        engine = self._engine_for(state["asked"])
+        for name, own in self._counters().items():
+            found = np.asarray(state[name])
+            if found.shape != np.shape(own) or found.dtype.kind not in "biu":
+                raise InputError(f"state: {name} {shown(state[name])} found, expected what `get_state` gave")
+        engine = self._engine_for(check_table(state["asked"], "state: asked"))
         engine.set_state(state["engine"])
         self._asked = state["asked"]
         self._recall(engine, state)

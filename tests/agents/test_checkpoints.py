@@ -146,6 +146,14 @@ def test_weights_with_which_outputs_overflow_are_refused(fresh, memory, wrong):
         checkpoints.put_back(fresh, changed)
 
 
+@pytest.mark.parametrize("wrong", [np.nan, -np.inf])
+def test_ships_that_are_nowhere_are_refused(fresh, memory, wrong):
+    changed = copy.deepcopy(memory)
+    changed["ships"][1]["states"][0, 0] = wrong
+    with pytest.raises(ValueError, match=r"agent\.ships\[1\]\.states: expected finite numbers"):
+        checkpoints.put_back(fresh, changed)
+
+
 @pytest.mark.parametrize("wrong", [np.nan, 3.0])
 def test_observations_that_no_environment_shows_are_refused(fresh, memory, wrong):
     changed = copy.deepcopy(memory)

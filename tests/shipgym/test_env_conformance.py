@@ -246,3 +246,12 @@ def test_reset_says_what_is_wrong():
     env = gymnasium.make(PATH, model="mariner").unwrapped
     with pytest.raises(InputError, match=r"options: .*'wind'"):
         env.reset(options={"wind": 3.0})
+
+
+@pytest.mark.parametrize("name", IDS)
+def test_every_id_conforms_as_a_vector(name):
+    options = {"episode_steps": 6, "disable_env_checker": True}
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of ids that are out of date
+        shipgym.check_vector_env(
+            lambda: gymnasium.make_vec(name, 3, episode_steps=6), lambda: gymnasium.make(name, **options), 20
+        )

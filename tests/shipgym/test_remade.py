@@ -92,6 +92,11 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
     state, before = env.get_state(), env.physical_state()
     broken = copy.deepcopy(state)
     broken["engine"]["states"][0, 0] = np.nan
+    blind = {
+        **state,
+        "engine": {**state["engine"], "observations": np.full_like(env.reset(seed=0)[0], np.nan)[None]},
+    }
+    before = env.physical_state()
     first, tanker, short, vector = one(FIRST), one(model="mariner-tls-svm"), one(waypoints=HOOK), many()
     for other in (first, tanker, short, vector):
         other.reset(seed=0)
@@ -102,6 +107,13 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         (states[2], "state: states of shape"),
         (states[3], "state: unknown key 'row_keys'"),
         (broken, "state: motion.x in row 0 is not finite"),
+        (blind, "state: observations are not finite"),
+        (
+            {**state, "engine": {**state["engine"], "made_for": 3}},
+            "state: made_for: 3 found, expected a table",
+        ),
+        ({**state, "asked": "x"}, "state: asked: 'x' found, expected a table"),
+        ({**state, "key": "x"}, "state: key 'x' found"),
         ({}, "state: field 'asked' is missing"),
         (3, "state: 3 found, expected a table"),
     ]:
