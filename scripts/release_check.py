@@ -1,15 +1,19 @@
-"""Install the lowest declared versions of shipgym's dependencies and try what they are for.
+"""Build the wheel, install it in clean environments and try what it is for: README's lines, and each extra.
 
-    python scripts/release_check.py                 the core and every extra, each in a fresh environment
-    python scripts/release_check.py core report     only these
+    python scripts/release_check.py                        the core and every extra, each in two environments:
+                                                           the lowest declared versions, and the newest
+    python scripts/release_check.py core report            only these
+    python scripts/release_check.py --newest core          only the newest versions; --lowest likewise
 
 Needs the network. torch is taken in the version of `constraints.txt`: other builds bring gigabytes.
-Exits with 1 if something does not install or does not run.
+Exits with 1 if something does not build, install or run.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -54,13 +58,40 @@ from agents.deployment.nmea import library, readings, sentences
 assert library("serial").VERSION
 assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
 """
+FRAME = """
+from shipgym import Trial, interchange
+trial = Trial([0.0, 1.0, 2.0], {"psi": [0.0, 0.1, 0.2]})
+for there, back in FORMS:
+    assert back(there(trial)).sha256 == trial.sha256
+"""
+XARRAY = FRAME.replace("FORMS", "[(interchange.to_xarray, interchange.from_xarray)]")
+LOGS = (
+    FRAME.replace("FORMS", "[(interchange.to_frame, interchange.from_frame)]")
+    + """
+interchange.to_frame(trial).to_parquet("trial.parquet")
+assert (Trial.from_csv("trial.parquet")["psi"] == trial["psi"]).all()
+"""
+)
+MINARI = """
+import os
+os.environ["MINARI_DATASETS_PATH"] = os.getcwd()
+import gymnasium, shipgym
+env = shipgym.RecordEpisode(gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=3), "episodes")
+env.reset(seed=0)
+while not env.step(env.action_space.sample())[3]:
+    pass
+episode = shipgym.Episode.load("episodes/episode-00000.json")
+dataset = shipgym.interchange.to_minari([episode], "shipgym/tried-v0")
+assert shipgym.interchange.from_minari(dataset)[0].rewards.tolist() == episode.rewards.tolist()
+"""
+(README,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
 SHIP = str(ROOT / "examples" / "mariner" / "ship.toml")
 BENCHMARK = ("benchmark", "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", "2", "--out")
 LEARN = ("ppo", "--total-steps", "64", "--set", "ships=2", "--set", "n_steps=32", "--set", "batch_size=32")
 
 #: What is run with the core and with each extra: Python, or the words after `shipgym`.
 TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
-    "core": (STEPS, HELP, ("--help",), ("doctor",), ("identify", SHIP, "--out", "ship")),
+    "core": (README, STEPS, HELP, ("--help",), ("doctor",), ("identify", SHIP, "--out", "ship")),
     "report": (("trials", "mariner", "--draws", "0", "--out", "trials.html"),),
     "benchmark": ((*BENCHMARK, "results"),),
     "render": (PICTURE,),
@@ -68,30 +99,35 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "onnx": (("export", str(ROOT / "agents/pretrained/mariner-calm-ppo.json"), "--onnx", "agent.onnx"),),
     "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
     "nmea": (NMEA,),
+    "logs": (LOGS,),
+    "xarray": (XARRAY,),
+    "minari": (MINARI,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),
     "ray": ((*BENCHMARK, "results", "--engine", "ray", "--no-page"),),
 }
 
 
-def check(extra: str) -> str:
-    """What went wrong with an extra at its lowest versions; empty if nothing did."""
+#: How versions are chosen, in words.
+RESOLUTIONS = {"lowest-direct": "lowest", "highest": "newest"}
+UV = [sys.executable, "-m", "uv"]
+
+
+def check(wheel: Path, extra: str, resolution: str) -> str:
+    """What went wrong with the wheel and an extra in a clean environment; empty if nothing did."""
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         python = str(home / "env" / "bin" / "python")
         plain = {**os.environ, "SHIPGYM_CACHE": str(home / "cache"), "PYTHONWARNINGS": "ignore"}
         if extra != "core":
             plain["NUMBA_DISABLE_JIT"] = "1"  # the core is tried compiled
-        wanted = str(ROOT) if extra == "core" else f"{ROOT}[{extra}]"
-        if extra == "ray":
-            wanted = f"{ROOT}[ray,benchmark]"
+        wanted = {"core": str(wheel), "ray": f"{wheel}[ray,benchmark]"}.get(extra, f"{wheel}[{extra}]")
         pinned = home / "constraints.txt"
         lines = (ROOT / "constraints.txt").read_text().splitlines()
         pinned.write_text("\n".join(line for line in lines if line.startswith("torch==")))
-        uv = [sys.executable, "-m", "uv"]
         commands = [
-            [*uv, "venv", "--quiet", "--python", sys.executable, str(home / "env")],
-            [*uv, "pip", "install", "--quiet", "--python", python, "--resolution", "lowest-direct",
+            [*UV, "venv", "--quiet", "--python", sys.executable, str(home / "env")],
+            [*UV, "pip", "install", "--quiet", "--python", python, "--resolution", resolution,
              "--constraint", str(pinned), wanted],
             *([python, *(["-c", one] if isinstance(one, str) else ["-m", "agents.cli", *one])]
               for one in TRIED[extra]),
@@ -103,15 +139,37 @@ def check(extra: str) -> str:
     return ""
 
 
+def build(folder: Path) -> Path:
+    """The wheel, built from the files that git knows."""
+    source = folder / "source"
+    source.mkdir()
+    archive = subprocess.run(["git", "stash", "create"], cwd=ROOT, capture_output=True, text=True, check=True)
+    tree = archive.stdout.strip() or "HEAD"  # with what is not committed yet
+    packed = subprocess.run(["git", "archive", tree], cwd=ROOT, capture_output=True, check=True).stdout
+    subprocess.run(["tar", "-x", "-C", str(source)], input=packed, check=True)
+    subprocess.run([*UV, "build", "--quiet", "--wheel", "--out-dir", str(folder), str(source)], check=True)
+    (wheel,) = folder.glob("*.whl")
+    print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
+    return wheel
+
+
 def main() -> None:
     """Check the extras that are named, or all."""
-    names = sys.argv[1:] or list(TRIED)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("names", nargs="*", choices=[*TRIED, []], help="core, or extras; default: all")
+    for resolution, word in RESOLUTIONS.items():
+        parser.add_argument(f"--{word}", dest="only", action="append_const", const=resolution)
+    given = parser.parse_args()
     failed = []
-    for name in names:
-        wrong = check(name)
-        print(f"{name}: {wrong or 'works at its lowest versions'}", flush=True)
-        failed += [name] * bool(wrong)
-    sys.exit(f"do not work: {', '.join(failed)}" if failed else 0)
+    with tempfile.TemporaryDirectory() as folder:
+        wheel = build(Path(folder))
+        for name in given.names or TRIED:
+            for resolution in given.only or RESOLUTIONS:
+                wrong = check(wheel, name, resolution)
+                told = f"{name}, {RESOLUTIONS[resolution]} versions"
+                print(f"{told}: {wrong or 'works'}", flush=True)
+                failed += [told] * bool(wrong)
+    sys.exit(f"do not work: {'; '.join(failed)}" if failed else 0)
 
 
 if __name__ == "__main__":

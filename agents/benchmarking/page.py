@@ -24,7 +24,8 @@ from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
 from agents.suites.suite import N_EPISODES, load_suite
 from shipgym.files import write_text
-from shipgym.pages import plotly_script, render
+from shipgym.pages import render
+from shipgym.plots import graph_objects
 
 if TYPE_CHECKING:
     from agents.verification.chain import Progress
@@ -85,7 +86,7 @@ def write_page(
     """
     target = Path(path)
     check_page(target)
-    plotly_script()  # refuse a missing extra before the work
+    graph_objects()  # refuse a missing extra before the work
     count, episodes = replayable(result, worst)
     again = rerun(result, episodes, controllers, workers, progress)
     write_text(_page(result, again, count), target)

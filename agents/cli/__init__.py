@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -46,8 +47,8 @@ if TYPE_CHECKING:
 app = typer.Typer(
     cls=Commands,
     help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
+    epilog="Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out report/",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -71,22 +72,49 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
-app.command("new-ship")(new_ship_command)
-app.command("look")(look_command)
-app.command("identify", cls=IdentifyCommand)(identify_command)
-app.command("advise", cls=IdentifyCommand)(advise_command)
-app.command("reduce", cls=IdentifyCommand)(reduce_command)
-app.command("export")(export_command)
-app.command("steer")(steer_command)
-app.command("simulate")(simulate_command)
-app.command("train")(train_command)
-app.command("tune")(tune_command)
-app.command("benchmark")(benchmark_command)
-app.command("reproduce")(reproduce_command)
-app.command("warm")(warm_command)
+#: What stands below the help of each command.
+EXAMPLES = {
+    "new-ship": "zigzag.csv circle.csv --length 160.9",
+    "look": "ship.toml --out look.html",
+    "identify": "ship.toml --structure abkowitz --out my_ship/",
+    "advise": "ship.toml --criterion c --number 2",
+    "reduce": "ship.toml --direction backward --out my_ship/",
+    "trials": "my_ship/model.json --out trials.html",
+    "autopilot": "ship.toml --draws 200 --out report/",
+    "export": "report/lq.json --c lq/",
+    "steer": "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45",
+    "simulate": "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate",
+    "train": "sac --env path-following --model my_ship/model.json --out run/",
+    "tune": "sac --trials 40 --workers 2 --out study/",
+    "benchmark": "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
+    "reproduce": "cao2015 --markdown tables.md",
+    "warm": "my_ship/model.json",
+    "replay": "recordings/episode-0.json --out replay.html",
+    "doctor": "--json",
+}
 
 
-@app.command("trials")
+def add(name: str, **settings: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Add a command with its example to the command line."""
+    return app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", **settings)
+
+
+add("new-ship")(new_ship_command)
+add("look")(look_command)
+add("identify", cls=IdentifyCommand)(identify_command)
+add("advise", cls=IdentifyCommand)(advise_command)
+add("reduce", cls=IdentifyCommand)(reduce_command)
+add("export")(export_command)
+add("steer")(steer_command)
+add("simulate")(simulate_command)
+add("train")(train_command)
+add("tune")(tune_command)
+add("benchmark")(benchmark_command)
+add("reproduce")(reproduce_command)
+add("warm")(warm_command)
+
+
+@add("trials")
 @answered
 def trials_command(
     model: Annotated[
@@ -102,7 +130,6 @@ def trials_command(
     depth: Annotated[
         float | None, typer.Option(metavar="M", help="Depth of the water, m; default: deep water.")
     ] = None,
-    as_json: Json = False,
 ) -> None:
     """Simulate the standard manoeuvres of a model and assess them by the IMO criteria.
 
@@ -110,7 +137,7 @@ def trials_command(
     indices of an identified model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
-    from agents.cli.terminal import print_json, progress_bars
+    from agents.cli.terminal import answer, progress_bars
     from agents.cli.trials_page import check_page, write_page
     from shipgym.ships import load_model
 
@@ -119,15 +146,13 @@ def trials_command(
     ship.check_depth(water_depth)
     if out is not None:
         check_page(out)
-    with progress_bars(not as_json) as progress:
+    with progress_bars() as progress:
         tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
         found = standard_trials(ship, draws, seed, tell, water_depth)
     if out is not None:
         write_page(ship, found, out)
-    if as_json:
-        print_json({"model": ship.name, "seed": seed, **found.to_dict()})
-    else:
-        _print_trials(found, out)
+    answer({"model": ship.name, "seed": seed, **found.to_dict()})
+    _print_trials(found, out)
 
 
 def _print_trials(found: StandardTrials, page: Path | None) -> None:
@@ -149,7 +174,7 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
         console.print(f"\nwritten: {page}", soft_wrap=True)
 
 
-@app.command("autopilot", cls=IdentifyCommand)
+@add("autopilot", cls=IdentifyCommand)
 @answered
 def autopilot_command(
     ship: ShipFileArgument,
@@ -226,7 +251,7 @@ def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bo
         console.print(f"report: {report}", soft_wrap=True)
 
 
-@app.command("replay")
+@add("replay")
 @answered
 def replay_command(
     episodes: Annotated[
@@ -235,30 +260,30 @@ def replay_command(
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
     """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
+    from agents.cli.terminal import answer
     from agents.cli.terminal import out as console
     from agents.rollouts.replay_page import write_replay
 
     write_replay(episodes, out)
+    answer({"written": str(out)})
     console.print(f"written: {out}", soft_wrap=True)
 
 
-@app.command("doctor")
+@add("doctor")
 @answered
-def doctor_command(as_json: Json = False) -> None:
+def doctor_command() -> None:
     """Check the installation: versions, cache, optional packages, the import name agents.
 
     Exits with 1 if something does not work.
     """
     from agents.cli.doctor import examine_installation
+    from agents.cli.terminal import answer
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import print_json
 
     findings = examine_installation()
-    if as_json:
-        print_json({"findings": [finding.to_dict() for finding in findings]})
-    else:
-        for finding in findings:
-            console.print(finding.line(), soft_wrap=True)
+    answer({"findings": [finding.to_dict() for finding in findings]})
+    for finding in findings:
+        console.print(finding.line(), soft_wrap=True)
     if any(finding.state == "wrong" for finding in findings):
         raise typer.Exit(FAILED)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from agents.cli.command import FAILED, INTERRUPTED, Json, answered, fail
+from agents.cli.command import FAILED, INTERRUPTED, Address, EngineName, answered, fail
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
@@ -68,8 +68,8 @@ def benchmark_command(
     suite: Annotated[str, typer.Option(help="Tasks by the name of their suite.")] = "shipgym-v1",
     tasks: Annotated[str | None, typer.Option(help="Only these tasks of it, separated by commas.")] = None,
     workers: Workers = None,
-    engine: Annotated[str, typer.Option(help="local processes, or ray.")] = "local",
-    address: Annotated[str | None, typer.Option(help="Of a ray cluster.")] = None,
+    engine: EngineName = "local",
+    address: Address = None,
     resume: Resume = False,
     episodes: Episodes = 100,
     page: Page = True,
@@ -78,14 +78,13 @@ def benchmark_command(
     sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
     tolerance: Tolerance = None,
     allow_code: AllowCode = None,
-    as_json: Json = False,
 ) -> None:
     """Run controllers through the tasks of a suite, in the same episodes, and rank them.
 
     With --verify: exits with 1 if what is run again differs from the file.
     """
     if verify is not None:
-        _verify(verify, sample, tolerance, workers, allow_code or [], as_json)
+        _verify(verify, sample, tolerance, workers, allow_code or [])
         return
     if allow_code or tolerance is not None:
         fail("--allow-code and --tolerance are for --verify alone, leave them out", 2)
@@ -101,7 +100,7 @@ def benchmark_command(
         fail("--out: no folder found, expected one for the results: --out results/", 2)
         return
     try:
-        with progress_bars(not as_json) as progress:
+        with progress_bars() as progress:
             result = benchmark(
                 controllers if controllers is not None else CLASSICAL, suite,
                 None if tasks is None else tasks.split(","), out, workers, engine, progress,
@@ -115,7 +114,7 @@ def benchmark_command(
     except KeyboardInterrupt:
         fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
         return
-    _print_result(result, out, as_json)
+    _print_result(result, out)
 
 
 def _remove_page(out: Path) -> None:
@@ -136,15 +135,13 @@ def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progres
         warn(f"there is no {PAGE}: {error}")
 
 
-def _print_result(result: BenchmarkResult, out: Path, as_json: bool) -> None:
+def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
     from agents.cli.benchmark_tables import costs_table, ranking_table
+    from agents.cli.terminal import answer, warn
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import print_json, warn
 
-    if as_json:
-        print_json(result.summary)
-        return
+    answer(result.summary)
     console.print(ranking_table(result))
     console.print()
     console.print(costs_table(result))
@@ -161,21 +158,18 @@ def _print_result(result: BenchmarkResult, out: Path, as_json: bool) -> None:
 
 
 def _verify(
-    path: Path, sample: int, tolerance: float | None, workers: int | None, allow_code: list[str],
-    as_json: bool,
+    path: Path, sample: int, tolerance: float | None, workers: int | None, allow_code: list[str]
 ) -> None:  # fmt: skip
     """Print what was compared; fail where it differs."""
     from agents.benchmarking.verification import verify
     from agents.cli.benchmark_tables import verification_table
-    from agents.cli.terminal import err, print_json
+    from agents.cli.terminal import answer, err
     from agents.cli.terminal import out as console
 
     with err.status("running a sample again"):
         checks = verify(path, sample=sample, tolerance=tolerance, workers=workers, allow_code=allow_code)
-    if as_json:
-        print_json({"checks": [check.to_dict() for check in checks]})
-    else:
-        console.print(verification_table(checks))
+    answer({"checks": [check.to_dict() for check in checks]})
+    console.print(verification_table(checks))
     wrong = [f"{check.contestant} on {check.task}" for check in checks if not check.passed]
     if wrong:
         fail(f"{path}: {len(wrong)} of {len(checks)} differ: {'; '.join(wrong)}", FAILED)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import os
 import sys
 from collections.abc import Callable
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
-from typing import Annotated, Any, ParamSpec
+from typing import Annotated, Any, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
-
-P = ParamSpec("P")
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
@@ -44,16 +43,25 @@ Address = Annotated[
 ]
 IdentifyOptions = Annotated[dict[str, Any], typer.Option(parser=dict, hidden=True)]  # see IdentifyCommand
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors alone, and the result with --json.")]
+SHARED = {"as_json": Json, "quiet": Quiet}  # options of every command
 
 
-def answered(command: Callable[P, None]) -> Callable[P, None]:
-    """Turn what goes wrong in a command into one message and the exit code it stands for."""
+def answered(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that all share, and turn what goes wrong into one message and an exit code.
+
+    It prints to the terminal's `out`, which is silent with `--json` and `--quiet`, and gives its result as
+    fields to `answer`.
+    """
+    own = typed_parameters(command)
 
     @functools.wraps(command)
-    def wrapped(*args: P.args, **kwargs: P.kwargs) -> None:
+    def wrapped(*args: Any, **kwargs: Any) -> None:
+        from agents.cli.terminal import set_output
         from agents.engines.jobs import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
+        set_output(*(kwargs.get(name, False) if name in own else kwargs.pop(name, False) for name in SHARED))
         try:
             command(*args, **kwargs)
             sys.stdout.flush()
@@ -66,7 +74,30 @@ def answered(command: Callable[P, None]) -> Callable[P, None]:
         except OSError as error:
             raise typer.Exit(told_failure(error)) from None
 
-    return wrapped
+    shared = {
+        name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        for name, kind in SHARED.items()
+        if name not in own
+    }
+    return take_parameters(wrapped, own | shared)
+
+
+def typed_parameters(command: Callable[..., None]) -> dict[str, inspect.Parameter]:
+    """The parameters of a command, keyword only, their annotations as objects."""
+    hints = get_type_hints(command, include_extras=True)
+    return {
+        name: one.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
+        for name, one in inspect.signature(command).parameters.items()
+    }
+
+
+def take_parameters(
+    command: Callable[..., None], parameters: dict[str, inspect.Parameter]
+) -> Callable[..., None]:
+    """Tell typer which parameters a command takes."""
+    command.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
+    command.__annotations__ = {name: one.annotation for name, one in parameters.items()}
+    return command
 
 
 def told_failure(error: OSError) -> int:
@@ -113,5 +144,5 @@ class IdentifyCommand(TyperCommand):
 
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
         whole = takes_identify_options(self.callback.__wrapped__)  # type: ignore[union-attr]
-        app.command(self.name)(answered(whole))
+        app.command(self.name, epilog=self.epilog)(answered(whole))
         return typer.main.get_command(app).make_context(*args, **kwargs)

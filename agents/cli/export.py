@@ -38,8 +38,8 @@ def export_command(
 ) -> None:
     """Write an autopilot or a ship model as C99, as an FMU or, of a learned policy, as ONNX."""
     from agents.agent_file import load_agent
+    from agents.cli.terminal import answer, warn
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import warn
     from agents.deployment.fmu import write_fmu
     from agents.output import whole_folder
     from agents.policies.onnx_export import export_onnx
@@ -62,7 +62,9 @@ def export_command(
         write_fmu(source, fmu, fmi)
     if onnx:
         export_onnx(load_agent(what), onnx)
-    for path in filter(None, (onnx, c, fmu)):
+    written = [str(path) for path in (onnx, c, fmu) if path]
+    answer({"written": written})
+    for path in written:
         console.print(f"written: {path}", soft_wrap=True)
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from agents.cli.command import FAILED, IdentifyOptions, Json, ShipFileArgument, answered, fail
+from agents.cli.command import FAILED, IdentifyOptions, ShipFileArgument, answered, fail
 
 if TYPE_CHECKING:
     from identification import IdentificationResult
@@ -32,7 +32,6 @@ def identify_command(
     structures: Annotated[
         str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or auto.")
     ] = None,
-    as_json: Json = False,
 ) -> None:
     """Identify a manoeuvring model from recorded trials; write model, metrics, settings and report.
 
@@ -44,9 +43,9 @@ def identify_command(
     """
     read, settings = _chosen(ship, options)
     if compare or methods is not None or structures is not None:
-        _compare(read, settings, out, (structures, methods), as_json)
+        _compare(read, settings, out, (structures, methods))
     else:
-        _identify(read, settings, out, as_json)
+        _identify(read, settings, out)
 
 
 def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFile, dict[str, Any]]:
@@ -58,8 +57,8 @@ def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFil
     return read, identification_settings(read, options, *unnamed)
 
 
-def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool) -> None:
-    from agents.cli.terminal import err, prediction_table, print_json, selection_table
+def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
+    from agents.cli.terminal import answer, err, prediction_table, selection_table
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
     from agents.output import whole_folder
@@ -70,18 +69,16 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path, as_json: bool
         result = identify_ship(read, settings)
         result.save(draft)
     instability = why_unstable(result)
-    if as_json:
-        print_json({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
-    else:
-        if "selection" in result.metrics:
-            console.print(selection_table(result.metrics["selection"]))
-            for name, reason in result.metrics["selection"]["refused"].items():
-                console.print(f"{name} was not fitted: {reason}", soft_wrap=True)
-        if instability is None:
-            console.print(result.summary(), soft_wrap=True)
-            console.print(prediction_table(result))
-            console.print(held_out_error(result), soft_wrap=True)
-        console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
+    answer({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
+    if "selection" in result.metrics:
+        console.print(selection_table(result.metrics["selection"]))
+        for name, reason in result.metrics["selection"]["refused"].items():
+            console.print(f"{name} was not fitted: {reason}", soft_wrap=True)
+    if instability is None:
+        console.print(result.summary(), soft_wrap=True)
+        console.print(prediction_table(result))
+        console.print(held_out_error(result), soft_wrap=True)
+    console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
     _check_stable(result)
 
 
@@ -99,9 +96,9 @@ def _check_stable(result: IdentificationResult) -> None:
 
 
 def _compare(
-    read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None], as_json: bool
+    read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None]
 ) -> None:
-    from agents.cli.terminal import err, print_json, selection_table, warn
+    from agents.cli.terminal import answer, err, selection_table, warn
     from agents.cli.terminal import out as console
     from agents.identifying import compare_ship
     from agents.output import whole_folder
@@ -111,11 +108,9 @@ def _compare(
     with whole_folder(out, (*COMPARISON_FILES, *own)) as draft, err.status("comparing"):
         found = compare_ship(read, settings, *names)
         found.save(draft)
-    if as_json:
-        print_json(found.to_dict())
-    else:
-        console.print(selection_table(found.to_dict()))
-        console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
+    answer(found.to_dict())
+    console.print(selection_table(found.to_dict()))
+    console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
     for name, left in found.left_out.items():
@@ -137,7 +132,6 @@ def advise_command(
     number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
     *,
     options: IdentifyOptions,
-    as_json: Json = False,
 ) -> None:
     """Show how much the trials say about each coefficient, and which manoeuvres to run next.
 
@@ -145,7 +139,7 @@ def advise_command(
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
     is least certain.
     """
-    from agents.cli.terminal import err, print_json
+    from agents.cli.terminal import answer, err
     from agents.cli.terminal import out as console
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
@@ -155,9 +149,7 @@ def advise_command(
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
         advice = advise(result.model, used, None, criterion, coefficient, number)
-    if as_json:
-        print_json(advice.to_dict())
-        return
+    answer(advice.to_dict())
     console.print(str(advice), soft_wrap=True)
     console.print(f"run next: {', then '.join(advice.chosen)}", soft_wrap=True)
 
@@ -174,14 +166,13 @@ def reduce_command(
     ] = 1e-3,
     *,
     options: IdentifyOptions,
-    as_json: Json = False,
 ) -> None:
     """Drop the terms that the trials do not need, and identify with those that are left.
 
     Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
     model is unstable.
     """
-    from agents.cli.terminal import err, prediction_table, print_json
+    from agents.cli.terminal import answer, err, prediction_table
     from agents.cli.terminal import out as console
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
@@ -194,14 +185,12 @@ def reduce_command(
         fields = found.to_dict()
         found.reduced.save(draft)
         write_json(fields, draft / "reduction.json")
-    if as_json:
-        print_json(fields)
-    else:
-        for q, reduction in found.reductions.items():
-            console.print(f"equation of {q}")
-            console.print(str(reduction), soft_wrap=True)
-        console.print(prediction_table(found.full, "with all terms"))
-        console.print(prediction_table(found.reduced, "with the terms left"))
-        count = fields["terms"]
-        console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
+    answer(fields)
+    for q, reduction in found.reductions.items():
+        console.print(f"equation of {q}")
+        console.print(str(reduction), soft_wrap=True)
+    console.print(prediction_table(found.full, "with all terms"))
+    console.print(prediction_table(found.reduced, "with the terms left"))
+    count = fields["terms"]
+    console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
     _check_stable(found.reduced)

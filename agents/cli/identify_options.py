@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 
+from agents.cli.command import take_parameters, typed_parameters
 from shipgym.files import named_values
 from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
@@ -27,18 +28,10 @@ def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
         named = {name: arguments.pop(name) for name in COMMON}
         command(options=given_options(named, arguments.pop(SET) or ()), **arguments)
 
-    hints = get_type_hints(command, include_extras=True)
-    parameters: list[inspect.Parameter] = []
-    for parameter in inspect.signature(command).parameters.values():
-        if parameter.name == "options":
-            parameters += _parameters()
-        else:
-            parameters.append(
-                parameter.replace(annotation=hints[parameter.name], kind=parameter.KEYWORD_ONLY)
-            )
-    wrapped.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    wrapped.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
-    return wrapped
+    parameters: dict[str, inspect.Parameter] = {}
+    for name, one in typed_parameters(command).items():
+        parameters |= {each.name: each for each in (_parameters() if name == "options" else [one])}
+    return take_parameters(wrapped, parameters)
 
 
 def _parameters() -> list[inspect.Parameter]:

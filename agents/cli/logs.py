@@ -28,8 +28,8 @@ def new_ship_command(
     """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
     import numpy as np
 
+    from agents.cli.terminal import answer, warn
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import warn
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -50,6 +50,8 @@ def new_ship_command(
         files=[json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
     )  # fmt: skip
     write_text(page, out)
+    columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses}
+    answer({"written": str(out), "columns": columns, "rudder_positive": side, "notes": list(trial.notes)})
     told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
     told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
     told += [f"a positive rudder steers to {side}, by the yaw that follows it"] if "delta" in trial else []
@@ -65,8 +67,8 @@ def look_command(
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
     """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
+    from agents.cli.terminal import answer, warn
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import warn
     from agents.cli.trials_page import check_page
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -80,6 +82,12 @@ def look_command(
     histories = [history_figure({"measured": one}, HISTORIES) for one in trials]
     shown = zip(trials, tracks, histories, strict=True)
     write_text(render("shipgym.pages/look.html", name=log.name, trials=shown), out)
+    fields = [
+        {"name": one.name, "samples": len(one), "duration_s": one.duration, "channels": [*one.channels],
+         "notes": [*one.notes]}
+        for one in trials
+    ]  # fmt: skip
+    answer({"written": str(out), "trials": fields})
     for trial in trials:
         about = f"{len(trial)} samples over {trial.duration:.5g} s: {', '.join(trial.channels)}"
         console.print(f"{trial.name}: {about}", soft_wrap=True)

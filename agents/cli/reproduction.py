@@ -32,6 +32,8 @@ def reproduce_command(
 
     Needs a checkout of the project. Exits with 1 if an aim is missed.
     """
+    from agents.cli.terminal import out
+
     if not SCRIPT.is_file():
         fail(
             "the papers' tables are not part of the installed package: in a checkout of the project run "
@@ -39,4 +41,6 @@ def reproduce_command(
             WRONG_INPUT,
         )
     options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if as_json else [])]
-    raise typer.Exit(subprocess.run([sys.executable, str(SCRIPT), paper, *options], check=False).returncode)
+    command = [sys.executable, str(SCRIPT), paper, *options]
+    printed = subprocess.DEVNULL if out.quiet and not as_json else None
+    raise typer.Exit(subprocess.run(command, stdout=printed, check=False).returncode)

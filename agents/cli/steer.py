@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from agents.cli.command import FAILED, Json, answered, fail
+from agents.cli.command import FAILED, answered, fail
 
 Address = Annotated[
     str, typer.Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
@@ -33,7 +33,6 @@ def steer_command(
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
-    as_json: Json = False,
 ) -> None:
     """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB and XTE in, ROR and HTD out.
 
@@ -42,8 +41,8 @@ def steer_command(
     more. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
     """
     from agents.agent_file import load_agent
+    from agents.cli.terminal import answer
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import print_json
     from agents.deployment.steering import Limits, steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values
@@ -54,11 +53,10 @@ def steer_command(
     found = asyncio.run(
         steer(
             load_agent(agent), nmea, heading=course, limits=Limits(**limits), duration=duration,
-            speed_up=speed_up, told=lambda line: None if as_json else console.print(line, soft_wrap=True),
+            speed_up=speed_up, told=lambda line: console.print(line, soft_wrap=True),
         )
     )  # fmt: skip
-    if as_json:
-        print_json({"state": found.state, "alarm": found.alarm, **found.counts})
+    answer({"state": found.state, "alarm": found.alarm, **found.counts})
     if found.alarm:
         fail(f"handed over: {found.alarm}", FAILED)
 
@@ -85,7 +83,8 @@ def simulate_command(
 
     Over TCP it waits to be connected to, by the autopilot and a chart plotter at once.
     """
-    from agents.deployment.simulated import SimulatedShip, simulate_ship
+    from agents.cli.terminal import answer
+    from agents.deployment.simulated import STEP, SimulatedShip, simulate_ship
     from shipgym.checks import check_number
     from shipgym.files import named_values
     from shipgym.ships import load_model
@@ -94,3 +93,4 @@ def simulate_command(
     dropped = {kind.upper(): check_number(after, f"--drop {kind}") for kind, after in given.items()}
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
     asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))
+    answer({"model": ship.model.name, "duration_s": round(ship.steps * STEP, 1), "state": ship.now})

@@ -6,6 +6,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -53,6 +54,7 @@ def _console(**settings: Any) -> Console:
     return console
 
 
+AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
 out = _console(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
 err = _console(stderr=True)
 
@@ -69,6 +71,18 @@ def plain_table(title: str, *headings: str) -> Table:
     return table
 
 
+def set_output(as_json: bool, quiet: bool) -> None:
+    """Say what is printed from now on: JSON in place of tables, nothing but errors and JSON, or all."""
+    AS_JSON.set(as_json)
+    out.quiet, err.quiet = as_json or quiet, quiet
+
+
+def answer(fields: Mapping[str, Any]) -> None:
+    """The result of a command, printed where `--json` asks for it."""
+    if AS_JSON.get():
+        print_json(fields)
+
+
 def print_json(fields: Mapping[str, Any]) -> None:
     """One JSON object and nothing else, for programs to read."""
     print(json.dumps(fields, indent=1, allow_nan=False))
@@ -81,6 +95,7 @@ def warn(message: str) -> None:
 
 def fail(message: str) -> None:
     """The one message of an error on standard error, as it is."""
+    err.quiet = False
     err.print(Text.assemble(("error: ", "bold red"), message), soft_wrap=True)
 
 
@@ -88,15 +103,17 @@ def fail(message: str) -> None:
 def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage.
 
-    Yields a function to be told the stage, units done and total; None where nothing is `shown`.
+    Yields a function to be told the stage, units done and total; None where nothing is `shown`, as with
+    `--json` and `--quiet`. The time is what remains, and what it took in the end.
     """
-    if not shown or not err.is_terminal:
+    if not shown or out.quiet or not err.is_terminal:
         yield None
         return
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     described = TextColumn("{task.description:<30}", markup=False)
-    with Progress(described, BarColumn(bar_width=32), TimeElapsedColumn(), console=err) as bars:
+    left = TimeRemainingColumn(elapsed_when_finished=True)
+    with Progress(described, BarColumn(bar_width=32), TaskProgressColumn(), left, console=err) as bars:
         tasks: dict[str, Any] = {}
 
         def tell(stage: str, done: int, total: int) -> None:
@@ -113,7 +130,7 @@ def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | No
 
     Yields a function to be told the progress; None where nothing is `shown`.
     """
-    if not shown:
+    if not shown or out.quiet:
         yield None
         return
     if not err.is_terminal:

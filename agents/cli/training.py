@@ -14,7 +14,6 @@ from agents.cli.command import (
     Algorithm,
     Environment,
     EnvironmentOptions,
-    Json,
     Model,
     Sea,
     TaskName,
@@ -46,6 +45,9 @@ def train_command(
         list[str] | None,
         typer.Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
     ] = None,
+    from_nothing: Annotated[
+        bool, typer.Option("--from-nothing", help="Learn without a base: --set base=none.")
+    ] = False,
     seed: Annotated[int | None, typer.Option(min=0, max=799, help="Of everything drawn; default: 0.")] = None,
     randomise: Annotated[
         bool | None,
@@ -58,7 +60,6 @@ def train_command(
         float | None, typer.Option(min=0.0, help="Stop after this time; --resume goes on.")
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
-    as_json: Json = False,
 ) -> None:
     """Train an autopilot by reinforcement learning; write its policy, learning curve and checkpoints.
 
@@ -69,15 +70,16 @@ def train_command(
     from agents.training.settings import parsed_settings
 
     own = parsed_settings(set_ or ()) | ({} if total_steps is None else {"total_steps": total_steps})
+    own |= {"base": "none"} if from_nothing else {}
     given = Given(
         algorithm, env, model, sea, task, parsed_settings(environment_options or (), "--option"), settings,
         own, seed, randomise, threads,
     )  # fmt: skip
-    result = _train(given, out, resume, max_seconds, as_json)
-    _print_result(result, out, as_json)
+    result = _train(given, out, resume, max_seconds)
+    _print_result(result, out)
 
 
-def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_json: bool) -> TrainingResult:
+def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> TrainingResult:
     """Check what is given before anything heavy is imported or written, then train."""
     from agents.cli.terminal import training_bar, warn
     from agents.training import run_folder
@@ -97,7 +99,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_
 
     command = shlex.join(["shipgym", *sys.argv[1:]])
     try:
-        with training_bar(not as_json) as tell:
+        with training_bar() as tell:
             return train(plan, out, resume=resume, max_seconds=max_seconds, tell=tell, command=command)
     except KeyboardInterrupt:
         kept = (out / run_folder.CHECKPOINT).is_file()
@@ -105,14 +107,12 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None, as_
         raise  # not reached: `fail` leaves
 
 
-def _print_result(result: TrainingResult, out: Path, as_json: bool) -> None:
+def _print_result(result: TrainingResult, out: Path) -> None:
     """Print costs, and where the agent was written."""
+    from agents.cli.terminal import answer
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import print_json
 
-    if as_json:
-        print_json({**result.to_dict(), "agent": str(out / "agent.json")})
-        return
+    answer({**result.to_dict(), "agent": str(out / "agent.json")})
     if result.resumed_from is not None:
         console.print(f"resumed at step {result.resumed_from:,}")
     lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"

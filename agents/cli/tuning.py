@@ -13,7 +13,6 @@ from agents.cli.command import (
     EngineName,
     Environment,
     EnvironmentOptions,
-    Json,
     Model,
     Sea,
     TaskName,
@@ -55,7 +54,6 @@ def tune_command(
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
-    as_json: Json = False,
 ) -> None:
     """Search the settings with which an agent learns best (Optuna), and write them for `train --settings`.
 
@@ -78,29 +76,22 @@ def tune_command(
     )
     if "evaluate_every" not in fixed:
         plan = evaluated_evenly(plan)
-    with progress_bars(not as_json) as bars:
+    with progress_bars() as bars:
         tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
         found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
-    _print_result(found, out, as_json)
+    _print_result(found, out)
 
 
-def _print_result(found: Tuning, out: Path, as_json: bool) -> None:
+def _print_result(found: Tuning, out: Path) -> None:
     """Print trials and where the best settings are."""
     from dataclasses import asdict
 
+    from agents.cli.terminal import answer, plain_table
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import plain_table, print_json
     from agents.training.tuning import BEST
 
-    if as_json:
-        print_json(
-            {
-                "trials": [asdict(trial) for trial in found.trials],
-                "best": found.best.number,
-                "settings": str(out / BEST),
-            }
-        )
-        return
+    trials = [asdict(trial) for trial in found.trials]
+    answer({"trials": trials, "best": found.best.number, "settings": str(out / BEST)})
     title = "Trials by the mean cost of a held-out episode, best first"
     table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
     for trial in sorted(found.trials, key=lambda one: (one.cost is None, one.cost or 0.0)):

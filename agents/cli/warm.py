@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from agents.cli.command import Json, answered
+from agents.cli.command import answered
 
 Wanted = Annotated[
     list[str] | None,
@@ -32,14 +32,14 @@ class Warmed:
 
 
 @answered
-def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json = False) -> None:
+def warm_command(wanted: Wanted = None, everything: All = False) -> None:
     """Compile ships beforehand; without arguments, both tasks and the Mariner.
 
     An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
     simulations in calm water. Writes nothing but the cache (SHIPGYM_CACHE, else the user's cache folder).
     """
+    from agents.cli.terminal import answer
     from agents.cli.terminal import out as console
-    from agents.cli.terminal import print_json
     from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
 
@@ -56,14 +56,10 @@ def warm_command(wanted: Wanted = None, everything: All = False, as_json: Json =
                 raise
             refused = str(error)  # not every ship has the particulars that a sea asks for
         done.append(Warmed(what, round(time.perf_counter() - begin, 2), refused))
-        if not as_json:
-            console.print(
-                f"{number}/{len(jobs)}  {what}: {refused or f'{done[-1].seconds:.1f} s'}", soft_wrap=True
-            )
-    if as_json:
-        print_json({"cache": str(folder), "ready": [asdict(one) for one in done]})
-    else:
-        console.print(f"kept in {folder}", soft_wrap=True)
+        told = refused or f"{done[-1].seconds:.1f} s"
+        console.print(f"{number}/{len(jobs)}  {what}: {told}", soft_wrap=True)
+    answer({"cache": str(folder), "ready": [asdict(one) for one in done]})
+    console.print(f"kept in {folder}", soft_wrap=True)
 
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:

@@ -2,12 +2,15 @@
 
 import argparse
 import logging
+import time
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+import ray
 import torch
 from numpy.typing import NDArray
+from ray.cluster_utils import Cluster
 from ray.rllib.algorithms.ppo import PPOConfig
 from ray.tune.registry import register_env
 
@@ -41,8 +44,17 @@ def main() -> None:
     parser.add_argument("--model", default="mariner", help="name of a shipped model, or a model file")
     parser.add_argument("--iterations", type=int, default=12)
     parser.add_argument("--runners", type=int, default=0, help="processes that sail; 0: this one")
+    parser.add_argument("--address", help="of a Ray cluster on which shipgym is installed; auto: this one's")
+    parser.add_argument("--nodes", type=int, default=0, help="start a cluster of so many nodes here")
     options = parser.parse_args()
     logging.getLogger("ray").setLevel(logging.ERROR)
+    if options.nodes:
+        cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+        for _ in range(options.nodes - 1):
+            cluster.add_node(num_cpus=1)
+        options.address = cluster.address
+    if options.address:
+        ray.init(address=options.address, log_to_driver=False)
     register_env("course-keeping", lambda config: gym.make("shipgym/CourseKeeping-v0", **config))
     config = (
         PPOConfig()
@@ -60,6 +72,11 @@ def main() -> None:
         .debugging(seed=1, log_level="ERROR")
     )
     algorithm = config.build_algo()
+    places = algorithm.env_runner_group.foreach_env_runner(
+        lambda _: ray.get_runtime_context().get_node_id(), local_env_runner=not options.runners
+    )
+    print(f"{len(places)} processes sail on {len(set(places))} nodes", flush=True)
+    begin = time.perf_counter()
     for iteration in range(1, options.iterations + 1):
         found = algorithm.train()["env_runners"]
         episode = found.get("episode_return_mean")
@@ -68,6 +85,8 @@ def main() -> None:
             f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f} steps, mean return {told}",
             flush=True,
         )
+    seconds = time.perf_counter() - begin
+    print(f"{found['num_env_steps_sampled_lifetime'] / seconds:.0f} steps per second, {seconds:.0f} s")
     ship = shipgym.load_model(options.model)
     seeds = 1_000_000 + np.arange(100)
     for name, controller in (("RLlib PPO", Steersman(algorithm.get_module())), ("LQ", LQ.from_model(ship))):

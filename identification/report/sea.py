@@ -47,6 +47,8 @@ def _current(row: Mapping[str, Any]) -> str:
         north, east = (NORMAL_95 * error for error in row["standard_errors"])
         text += f", north {row['north']:.3f} ± {north:.3f}, east {row['east']:.3f} ± {east:.3f} m/s (95 %)"
         text += f", which {'differs' if row['probability'] < SIGNIFICANT else 'does not differ'} from zero"
+    elif row["source"] in ("trial", "all trials"):
+        text += ", a guess without an interval, as the trials keep to one heading"
     return text + ("; taken out" if row["taken_out"] else "; left in")
 
 

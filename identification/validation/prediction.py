@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.validation.closed_loop import closed_loop
+from identification.validation.start import with_start
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 from shipgym.ships import ShipModel
@@ -20,9 +21,12 @@ TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder; None where the model runs away."""
+    """Simulate a trial from its initial state and measured rudder; None where the model runs away.
+
+    Initial velocities that were derived are estimated (`with_start`).
+    """
     try:
-        return open_loop(model, trial)
+        return open_loop(model, with_start(model, trial))
     except UnstableModelError:
         return None
 

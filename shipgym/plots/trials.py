@@ -26,7 +26,7 @@ AXES: dict[str, tuple[str, float]] = {
 }  # fmt: skip
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels
-MOST_SAMPLES = 3000  # drawn of one line; spirals have many more
+MOST_SAMPLES = 1500  # drawn of one line, more than a page has pixels; spirals have many more
 
 
 def quantity(trial: Trial, name: str) -> NDArray[np.float64] | None:
@@ -44,7 +44,7 @@ def quantity(trial: Trial, name: str) -> NDArray[np.float64] | None:
 
 def thinned(trial: Trial) -> slice:
     """The samples that a figure draws."""
-    return slice(None, None, max(len(trial) // MOST_SAMPLES, 1))
+    return slice(None, None, -(-len(trial) // MOST_SAMPLES))
 
 
 def history_figure(

@@ -45,17 +45,20 @@ __all__ = [
 ]  # fmt: skip
 
 
-def state_space(model: ShipModel, heading: bool = False, gear: bool = False) -> StateSpace:
+def state_space(
+    model: ShipModel, heading: bool = False, gear: bool = False, speed: float | None = None
+) -> StateSpace:
     """A ship's steering about straight running as a linear system.
 
     States are v (q in a table with a memory of yaw), r, and psi and delta where `heading` and `gear` ask for
     them: deviations from straight running in SI units, rudder positive to starboard. The input is `delta`, or
-    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. Raises
-    InputError if the model has no straight course, or its gear no lag to make a state of.
+    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. The speed,
+    m/s, is the service speed by default. Raises InputError if the model has no straight course, or its gear
+    no lag to make a state of.
     """
     import control  # here, because it takes a second to import
 
-    A, B = steering_state_space(model)
+    A, B = steering_state_space(model, speed)
     names = ["q" if "q" in model.state_names else "v", "r"]
     if heading:
         A = np.block([[A, np.zeros((2, 1))], [np.array([[0.0, 1.0, 0.0]])]])

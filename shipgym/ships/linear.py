@@ -174,12 +174,12 @@ def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Flo
     return A, B
 
 
-def steering_state_space(model: ShipModel) -> tuple[Floats, Floats]:
+def steering_state_space(model: ShipModel, speed: float | None = None) -> tuple[Floats, Floats]:
     """Linear steering dynamics about straight running: A and B of `linearise`.
 
-    Raises InputError if the model has no straight course.
+    Speed in m/s, the service speed by default. Raises InputError if the model has no straight course.
     """
-    return linearise(model, straight_running(model))
+    return linearise(model, straight_running(model, speed))
 
 
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:

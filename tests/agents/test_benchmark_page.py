@@ -224,7 +224,7 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):
 @pytest.mark.parametrize("there", [True, False])
 def test_the_command_writes_the_page_where_plotly_is_there(tmp_path, monkeypatch, there):
     if not there:
-        monkeypatch.setitem(sys.modules, "plotly.offline", None)
+        monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     out = tmp_path / "results"
     words = [
         "benchmark",

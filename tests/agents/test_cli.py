@@ -1,11 +1,13 @@
 import json
 import os
+import shlex
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from agents.cli import app
@@ -48,6 +50,61 @@ def test_help_is_fast():
     assert time.perf_counter() - start < 1.5
     for command in ("identify", "trials", "autopilot", "doctor"):
         assert command in answer.stdout
+
+
+def commands():
+    """Each command by its name, with the parameters that it has when it is called."""
+    group = typer.main.get_command(app)
+    context = typer.Context(group, info_name="shipgym")
+    return {
+        name: command.make_context(name, [], resilient_parsing=True, parent=context).command
+        for name, command in group.commands.items()
+    }
+
+
+@pytest.mark.parametrize("name", commands())
+def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
+    command = commands()[name]
+    assert {"--json", "--quiet"} <= {flag for one in command.params for flag in one.opts}
+    begin, *example = shlex.split(command.epilog.removeprefix("Example: shipgym "))
+    assert begin == name
+    assert not command.make_context(name, example).args
+    assert command.epilog in " ".join(shipgym(name, "--help").stdout.split())
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["look", "SHIP", "--out", "OUT/look.html"],
+        ["new-ship", "SHIP/../zigzag_10_10.csv", "--out", "OUT/new.toml"],
+        ["trials", "mariner", "--draws", "0"],
+        ["export", "mariner", "--c", "OUT/mariner"],
+        ["simulate", "mariner", "--nmea", "udp:127.0.0.1:9", "--duration", "0.1"],
+    ],
+)
+def test_json_is_all_that_is_printed_and_with_quiet_nothing(words, demo, tmp_path):
+    for flags in (["--json", "--quiet"], ["--quiet"]):
+        out = tmp_path / str(len(flags))
+        out.mkdir()
+        places = {"SHIP/..": demo.parent, "SHIP": demo, "OUT": out}
+        given = words
+        for place, path in places.items():
+            given = [word.replace(place, str(path)) for word in given]
+        answer = shipgym(*given, *flags)
+        assert (answer.exit_code, answer.stderr) == (0, "")
+        assert json.loads(answer.stdout) if "--json" in flags else answer.stdout == ""
+
+
+@pytest.mark.parametrize(
+    ("typed", "completed"), [("shipgym auto", "autopilot"), ("shipgym identify --struct", "--structure")]
+)
+def test_a_shell_completes_commands_and_the_options_of_identify(typed, completed):
+    words = {"COMP_WORDS": typed, "COMP_CWORD": str(typed.count(" ")), "_SHIPGYM_COMPLETE": "complete_bash"}
+    answer = subprocess.run(
+        [sys.executable, "-c", "from agents.cli import main; main()"],
+        cwd=ROOT, env=os.environ | words, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert completed in answer.stdout.split(), answer.stderr
 
 
 def test_help_imports_nothing_heavy():

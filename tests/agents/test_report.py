@@ -68,7 +68,11 @@ def test_nothing_is_loaded_from_anywhere(source, page):
 
 
 def test_plotly_stands_in_the_page_once(source):
-    assert source.count("plotly.js v") == 1
+    assert source.count("plotly.js (cartesian - minified) v") == 1
+
+
+def test_a_report_has_less_than_3_megabytes(source):
+    assert len(source.encode()) < 3e6
 
 
 def test_all_sections_are_there_and_in_the_contents(page):
@@ -97,12 +101,20 @@ def test_every_figure_has_a_caption_and_a_place(source):
 
 
 @pytest.mark.skipif(COMMAND is None, reason="no chromium is installed")
-def test_a_browser_without_network_draws_every_figure(chain):
+def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
     address = (chain[0] / "report.html").as_uri()
     browser = Browser()
     try:
         browser.open(address)
         browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
+        browser.run("window.print = () => { window.printed = true; }")
+        browser.click(".print")
+        browser.wait("window.printed")
+        widths = "[...document.querySelectorAll('.js-plotly-plot')].map((plot) => plot._fullLayout.width)"
+        browser.run("window.dispatchEvent(new Event('beforeprint'))")
+        assert browser.run(widths) == 7 * [690]  # as wide as the paper
+        browser.run("window.dispatchEvent(new Event('afterprint'))")
+        assert min(browser.run(widths)) > 690
         assert (browser.complaints, browser.requests) == ([], [address])
     finally:
         browser.close()
@@ -152,7 +164,7 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     )  # fmt: skip
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
-    assert Page(source).scripts == 8  # plotly.js and seven figures
+    assert Page(source).scripts == 9  # plotly.js, seven figures, printing
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)
@@ -165,7 +177,7 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     found = StandardTrials({"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0)
     write_page(replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html")
     source = (tmp_path / "trials.html").read_text()
-    assert Page(source).scripts == 1
+    assert Page(source).scripts == 2
     assert " ".join(Page(source).text).count(HOSTILE) == 5  # window, title, head, and why it was refused
 
 

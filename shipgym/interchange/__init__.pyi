@@ -1,0 +1,10 @@
+from .frames import from_frame as from_frame
+from .frames import from_xarray as from_xarray
+from .frames import to_frame as to_frame
+from .frames import to_xarray as to_xarray
+from .minari_datasets import from_minari as from_minari
+from .minari_datasets import to_minari as to_minari
+from .mss import from_mss as from_mss
+from .mss import to_mss as to_mss
+from .shipmmg import from_shipmmg as from_shipmmg
+from .shipmmg import to_shipmmg as to_shipmmg

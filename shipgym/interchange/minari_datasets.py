@@ -1,0 +1,98 @@
+"""Episodes as a Minari dataset, for offline reinforcement learning and imitation, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import gymnasium
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.envs.episode import Episode
+from shipgym.errors import InputError
+from shipgym.interchange.frames import KEY, library, padded, put_together, taken_apart
+
+if TYPE_CHECKING:
+    from minari import MinariDataset
+
+DEVIATION = 1e-6  # of rewards that are run again, relative: another processor rounds differently
+
+
+def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> MinariDataset:
+    """Write episodes of one environment as a Minari dataset, with all that was recorded in its infos.
+
+    Their observations are not recorded: each episode is run again from its seed with its actions.
+
+    Parameters
+    ----------
+    episodes : sequence of Episode
+        As `RecordEpisode` writes them, of one environment with the same arguments.
+    dataset_id : str
+        Name of the dataset, such as "shipgym/mariner/lq-v0".
+    **metadata
+        Of `minari.create_dataset_from_buffers`: author, algorithm_name, description and so on.
+
+    Raises
+    ------
+    InputError
+        If there is no episode, they are of several environments, one has no seed or costs something else when
+        it is run again, or Minari is not installed.
+    """
+    minari = library("minari")
+    kinds = {(one.environment, repr(one.arguments)) for one in episodes}
+    if len(kinds) != 1:
+        raise InputError(f"episodes: of {len(kinds)} environments found, expected all of one")
+    env = gymnasium.make(episodes[0].environment, **episodes[0].arguments)
+    buffers, facts = [], []
+    for k, episode in enumerate(episodes):
+        t, series, fact = taken_apart(episode)
+        facts.append({KEY: fact})
+        last = np.arange(episode.n_steps) == episode.n_steps - 1
+        buffers.append(
+            minari.data_collector.EpisodeBuffer(
+                id=k, seed=episode.seed, observations=_observations(env, episode, f"episodes[{k}]"),
+                actions=episode.actions.astype(np.float32), rewards=episode.rewards,
+                terminations=last & episode.terminated, truncations=last & (not episode.terminated),
+                infos=padded(series, len(t)),
+            )
+        )  # fmt: skip
+    options = {"data_format": "arrow", "eval_env": env, **metadata}
+    dataset = minari.create_dataset_from_buffers(dataset_id, buffers, env=env, **options)
+    dataset.storage.update_episode_metadata(facts, range(len(facts)))
+    env.close()
+    return dataset
+
+
+def from_minari(dataset: MinariDataset) -> list[Episode]:
+    """The episodes that `to_minari` wrote. Raises InputError for those of another dataset."""
+    found = []
+    for one, facts in zip(dataset, _facts(dataset), strict=True):
+        series = {name: np.asarray(values) for name, values in one.infos.items()}
+        t = np.arange(len(one.rewards) + 1)  # an episode knows its times
+        found.append(put_together(t, series, facts, "expected a dataset of to_minari"))
+    return found
+
+
+def _facts(dataset: MinariDataset) -> Iterable[dict[str, Any]]:
+    return dataset.storage.get_episode_metadata(dataset.episode_indices)
+
+
+def _observations(env: gymnasium.Env[Any, Any], episode: Episode, where: str) -> Floats:
+    """What the agent was shown, shape (n_steps + 1, n_observations)."""
+    if episode.seed is None:
+        raise InputError(f"{where}: no seed found, expected one: without it an episode cannot be run again")
+    observation, _ = env.reset(seed=episode.seed)
+    for _ in range(episode.number):
+        observation, _ = env.reset()
+    shown, rewards = [observation], []
+    for action in episode.actions:
+        observation, reward, *_ = env.step(action.astype(np.float32))
+        shown.append(observation)
+        rewards.append(reward)
+    if not np.allclose(rewards, episode.rewards, rtol=DEVIATION, atol=DEVIATION):
+        raise InputError(
+            f"{where}: cost {-sum(rewards):.6g} when run again and {-episode.rewards.sum():.6g} as recorded; "
+            "expected the same: record without wrappers that change actions or rewards"
+        )
+    return np.array(shown)

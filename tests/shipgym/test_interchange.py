@@ -1,0 +1,151 @@
+"""To other libraries and back: nothing is lost, and their own programs say the same."""
+
+import json
+
+import gymnasium
+import numpy as np
+import pandas
+import pytest
+
+import shipgym
+from shipgym import Episode, InputError, Trial, interchange, load_model
+from shipgym.ships.catalogue import kvlcc2_l7
+
+TRIAL = Trial(
+    [0.0, 0.1, 0.3], {"psi": [0.0, 0.1, 0.3], "delta": [0.1, 1 / 3, 0.0]}, name="a", kind="zigzag",
+    use="validate", derived=["psi"], length=7.0, repaired={"psi": 1}, notes=["one", "two"],
+)  # fmt: skip
+FACTS = ("name", "kind", "use", "derived", "length", "repaired", "over_ground", "notes", "sha256")
+CARD = {"author": "a", "author_email": "b", "code_permalink": "c", "description": "d", "algorithm_name": "e"}
+
+
+@pytest.fixture(scope="module")
+def episodes(tmp_path_factory):
+    """Two of one environment, the second one cut off and begun without a seed of its own."""
+    folder = tmp_path_factory.mktemp("recorded")
+    env = shipgym.RecordEpisode(gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=5), folder)
+    for seed, steps in ((3, 5), (None, 2)):
+        env.reset(seed=seed)
+        for k in range(steps):
+            env.step(np.array([0.1 * k], dtype=np.float32))
+    env.close()
+    return [Episode.load(path) for path in sorted(folder.glob("*.json"))]
+
+
+def same(one, other):
+    return json.dumps(content(one)) == json.dumps(content(other))
+
+
+def content(episode):
+    from shipgym.envs.episode_file import to_file
+
+    return to_file(vars(episode))
+
+
+@pytest.mark.parametrize("form", ["frame", "xarray"])
+def test_trials_and_episodes_come_back_from_frames_and_datasets(form, episodes):
+    there, back = getattr(interchange, f"to_{form}"), getattr(interchange, f"from_{form}")
+    trial = back(there(TRIAL))
+    assert [getattr(trial, name) for name in FACTS] == [getattr(TRIAL, name) for name in FACTS]
+    assert all(same(one, back(there(one))) for one in episodes)
+
+
+def test_a_frame_says_what_it_holds_in_parquet_too(tmp_path, episodes):
+    interchange.to_frame(episodes[0]).to_parquet(tmp_path / "episode.parquet")
+    frame = pandas.read_parquet(tmp_path / "episode.parquet")
+    assert same(interchange.from_frame(frame), episodes[0])
+    assert frame.index.tolist() == episodes[0].t.tolist()
+    assert np.isnan(frame["rewards"].iloc[-1])
+    assert frame["rewards"].sum() == pytest.approx(episodes[0].rewards.sum())
+
+
+def test_a_dataset_has_units():
+    dataset = interchange.to_xarray(TRIAL)
+    assert (dataset["psi"].units, dataset["t"].units) == ("rad", "s")
+
+
+def test_a_frame_of_something_else_is_refused():
+    with pytest.raises(InputError, match=r"none of shipgym's found; Trial\.from_frame reads that of a log"):
+        interchange.from_frame(pandas.DataFrame({"psi": [0.0, 1.0]}))
+
+
+def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monkeypatch, episodes):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    dataset = interchange.to_minari(episodes, "shipgym/mariner/test-v0", **CARD)
+    assert [len(one) for one in dataset] == [5, 2]
+    assert dataset[0].observations.shape == (6, *dataset.observation_space.shape)
+    env = dataset.recover_environment()
+    assert dataset[0].observations[0] == pytest.approx(env.reset(seed=3)[0])
+    assert (dataset[0].truncations.tolist(), dataset[1].terminations.any()) == ([False] * 4 + [True], False)
+    assert all(map(same, interchange.from_minari(dataset), episodes))
+    env.close()
+
+
+def test_an_episode_that_ran_otherwise_is_no_dataset(tmp_path, monkeypatch, episodes):
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    other = Episode(**(vars(episodes[0]) | {"rewards": episodes[0].rewards - 1.0}))
+    with pytest.raises(InputError, match=r"episodes\[0\]: cost .* when run again"):
+        interchange.to_minari([other], "shipgym/mariner/other-v0", **CARD)
+
+
+@pytest.mark.parametrize("name", ["mariner", "mariner-tls-svm", "container"])
+def test_parameters_of_mss_come_back(name):
+    model = load_model(name)
+    back = interchange.from_mss(json.loads(json.dumps(interchange.to_mss(model))))
+    assert dict(back.coefficients) == pytest.approx(dict(model.coefficients))
+    assert (back.steering, back.structure) == (model.steering, model.structure)
+    for known in ("length", "mass", "xg", "yaw_gyradius", "speed", "Y_vdot", "N_rdot"):
+        assert back.particulars[known] == pytest.approx(model.particulars[known])
+
+
+def test_parameters_have_the_names_and_signs_of_the_files_of_mss():
+    mariner, container = (interchange.to_mss(load_model(name)) for name in ("mariner", "container"))
+    named = {"m": 798e-5, "Iz": 39.2e-5, "xG": -0.023, "Nvdot": 4.646e-5, "Xrv": 798e-5, "Yvu": -1160e-5,
+             "Nd": -139e-5, "Yvvd": 1190e-5, "Xudd": -190e-5, "N0uu": 3e-5, "U0": 7.7175}  # fmt: skip
+    assert {key: mariner[key] for key in named} == pytest.approx(named)
+    rolling = {"Xphiphi": -0.00020, "Yvvphi": 0.04605, "Krphiphi": 0.00003569, "kk": 0.631, "cRrrv": 1.96,
+               "alphay": 0.05, "ga": 0.088}  # fmt: skip
+    assert {key: container[key] for key in rolling} == rolling
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"Nvd": 1.0}, "MSS parameters: unknown key 'Nvd'"),
+        ({"Nd": "much"}, "MSS parameters: Nd: 'much' found"),
+        ({"Xphiphi": 1.0}, "MSS parameters: unknown key"),
+    ],
+)
+def test_wrong_parameters_are_refused(changes, message):
+    with pytest.raises(InputError, match=message):
+        interchange.from_mss(interchange.to_mss(load_model("mariner")) | changes)
+    with pytest.raises(InputError, match="structure 'kvlcc2' found, expected abkowitz or container"):
+        interchange.to_mss(load_model("kvlcc2"))
+
+
+def test_the_turn_of_shipmmg_is_ours():
+    """At 35 deg, with the rudder at 15.8 deg/s, as `scripts/ecosystem.py shipmmg` simulates it there."""
+    ship = kvlcc2_l7("shipmmg")
+    parameters = interchange.to_shipmmg(ship)
+    assert parameters["basic_params"]["m"] == 3.27 * 1025.0
+    back = interchange.from_shipmmg(parameters, 1.179, shaft_speed=ship.service_shaft_speed)
+    assert dict(back.coefficients) == pytest.approx(dict(ship.coefficients), abs=1e-12)
+    turn = back.simulate(np.tile([np.radians(35.0), ship.service_shaft_speed], (1000, 1)), 0.2)
+    theirs = {"u": 0.410837, "v": -0.143888, "r": 0.055712, "x": 4.9501, "y": 12.2047, "psi": 11.48811}
+    assert {name: turn[name][-1] for name in theirs} == pytest.approx(theirs, rel=2e-4)
+
+
+def test_published_kvlcc2_is_not_that_of_shipmmg():
+    with pytest.raises(InputError, match="whose wake is another"):
+        interchange.to_shipmmg(load_model("kvlcc2-l7"))
+    fields = interchange.to_shipmmg(kvlcc2_l7("shipmmg"))
+    del fields["basic_params"]["η"]
+    with pytest.raises(InputError, match="basic_params: field 'η' is missing"):
+        interchange.from_shipmmg(fields, 1.179)
+
+
+def test_k_and_t_come_back():
+    kt = interchange.to_shipmmg(load_model("mariner"))
+    assert kt["kt_params"] == pytest.approx({"K": 0.1848, "T": 107.2}, rel=1e-3)
+    ship = interchange.from_shipmmg(kt, 7.7175, length=160.93)
+    assert interchange.to_shipmmg(ship)["kt_params"] == pytest.approx(kt["kt_params"])
