@@ -41,7 +41,8 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
 
     def errors(start: Floats) -> Floats:
         run = open_loop(model, _begun(opening, names, start))
-        return (np.array([run[name] for name in channels]) - measured)[:, 1:]
+        found: Floats = np.array([run[name] for name in channels])[:, 1:] - measured[:, 1:]
+        return found
 
     try:
         for _ in range(ROUNDS):
