@@ -39,5 +39,8 @@ from .search import (
     SearchResult as SearchResult,
     minimise as minimise,
 )
-from .validation.comparison import Comparison as Comparison, compare_methods as compare_methods
-from .validation.cross_validation import cross_validate as cross_validate
+from .validation.comparison import (
+    Comparison as Comparison,
+    compare_methods as compare_methods,
+    cross_validate as cross_validate,
+)

@@ -17,10 +17,10 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 
 from identification.estimators.decomposition import scales_of
-from identification.estimators.linear import LinearRegressor, settings
+from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
@@ -88,8 +88,7 @@ class Recursion(LinearRegressor):
         those that it will find from them), shape (n_samples, n_features).
         """
         self._check()
-        features, targets = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
-        targets = np.asarray(targets, dtype=np.float64)
+        features, targets = validated(self, X, y)
         self._begin(features, targets[:, None])
         gathered = min(self.start_samples * self.start_interval, len(targets))
         picked = slice(0, gathered, self.start_interval)

@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
-from sklearn.utils.validation import validate_data
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.linear import LinearRegressor, settings
+from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
@@ -106,9 +105,7 @@ class RMSVM(LinearRegressor):
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         self.check()
-        checked = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
-        features: Floats = checked[0]
-        target = np.asarray(checked[1], dtype=np.float64)
+        features, target = validated(self, X, y)
         weight = 1.0 if self.C is None else float(self.C)
         self._fit(features, target, weight or WEIGHTS[1])
         if weight == NO_CORRECTION:  # its uncertainty is that of the weakest correction

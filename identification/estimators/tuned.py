@@ -107,7 +107,7 @@ class TunedLSSVM(LinearRegressor):
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
         fitted = vars(self._estimator(C).fit(X, y))
-        vars(self).update({name: value for name, value in fitted.items() if name.endswith("_")})
+        self.__dict__.update({name: value for name, value in fitted.items() if name.endswith("_")})
         self.C_, self.search_ = C, search
         found = {"value": search.value, "evaluations": search.evaluations}
         self.chosen_ = {"C": C, "objective": self.objective, **found}

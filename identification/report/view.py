@@ -12,7 +12,7 @@ from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import kernel_text
-from identification.validation.warnings import EQUATIONS, model_warnings
+from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.trials.trial import Trial
@@ -116,7 +116,7 @@ def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
 def _heading(fit: Fit) -> dict[str, Any] | None:
     """Heading error on the trials that were not fitted, else on those that were, degrees."""
     unseen = any(metrics["use"] == "validate" for metrics in fit.metrics["trials"].values())
-    errors = fit.heading_errors_deg("validate" if unseen else None)
+    errors = heading_errors_deg(fit, "validate" if unseen else None)
     if not errors:
         return None
     worst = max(errors, key=lambda name: errors[name])

@@ -174,6 +174,18 @@ class _Problem:
             self.kept = {key: self.simulated(z, which)}
         return self.kept[key]
 
+    def rows(self, z: Floats, which: Rows, scales: Floats, strength: float) -> tuple[Floats, Floats]:
+        """Errors of some segments in their scales, then those of the prior, and their slopes.
+
+        Shapes (n_rows + 41,) and (n_rows + 41, 41).
+        """
+        errors, slopes = self.at(z, which)
+        with np.errstate(invalid="ignore"):
+            scaled = np.clip(np.nan_to_num(errors / scales, nan=LARGEST), -LARGEST, LARGEST).ravel()
+            steep = np.nan_to_num(slopes / scales[:, None], posinf=0.0, neginf=0.0)
+        own = strength * np.eye(len(z))
+        return np.append(scaled, strength * z), np.vstack([steep.reshape(len(scaled), -1), own])
+
     def simulated(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
         """Errors of the simulated channels and their slopes, of some segments.
 
@@ -215,13 +227,14 @@ class _Problem:
         everything, z, evaluations = np.arange(len(self.segments)), start, 0
         for last in (False, False, True) if not start.any() else (False, True):
             scales = self.scales(self.at(z, everything)[0], everything)
-            shots = _Shots(self, everything, scales, strength)
-            tolerance = 1e-4 if last else 1e-2
+            given, tolerance = (everything, scales, strength), 1e-4 if last else 1e-2
             found = least_squares(
-                shots.residuals, z, shots.jacobian, method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30
-            )
+                lambda x, *a: self.rows(x, *a)[0], z, lambda x, *a: self.rows(x, *a)[1], args=given,
+                method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30,
+            )  # fmt: skip
             z, evaluations = found.x, evaluations + found.nfev
-        return Estimate(z, scales, strength, _covariance(shots.at(z)[1]), evaluations)
+        covariance = _covariance(self.rows(z, *given)[1][: -len(z)])
+        return Estimate(z, scales, strength, covariance, evaluations)
 
     def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
         """Error of each group of segments by a fit of the others, and the factor on the standard errors.
@@ -235,12 +248,10 @@ class _Problem:
             rest, held = np.flatnonzero(self.groups != group), np.flatnonzero(self.groups == group)
             z = whole.z
             for _ in range(STEPS_HELD_OUT):
-                shots = _Shots(self, rest, whole.scales, whole.strength)
-                jacobian = shots.jacobian(z)
-                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ shots.residuals(z))
+                residuals, jacobian = self.rows(z, rest, whole.scales, whole.strength)
+                z = z - np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ residuals)
             covariance = _covariance(jacobian[: -len(z)])
-            tested = _Shots(self, held, whole.scales, 0.0)
-            error, slopes = tested.at(z)
+            error, slopes = (part[: -len(z)] for part in self.rows(z, held, whole.scales, 0.0))
             weight = sum(self._weight(self.segments[k]) for k in held) * len(scales)
             errors.append(np.sum((error.reshape(-1, len(scales)) * (whole.scales / scales)) ** 2) / weight)
             excess += float(error @ error) - weight
@@ -253,32 +264,6 @@ def _covariance(slopes: Floats) -> Floats:
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
     symmetric: Floats = 0.5 * (inverse + inverse.T)
     return symmetric
-
-
-@dataclass(frozen=True, eq=False)
-class _Shots:
-    """The least-squares problem of some segments."""
-
-    problem: _Problem
-    which: Rows
-    scales: Floats
-    strength: float
-
-    def at(self, z: Floats) -> tuple[Floats, Floats]:
-        """Errors in their scales, shape (n_rows,), and their slopes, shape (n_rows, 41)."""
-        errors, slopes = self.problem.at(z, self.which)
-        with np.errstate(invalid="ignore"):
-            scaled = np.clip(np.nan_to_num(errors / self.scales, nan=LARGEST), -LARGEST, LARGEST)
-            steep = np.nan_to_num(slopes / self.scales[:, None], posinf=0.0, neginf=0.0)
-        return scaled.ravel(), steep.reshape(scaled.size, -1)
-
-    def residuals(self, z: Floats) -> Floats:
-        """Of the segments and the prior."""
-        return np.concatenate([self.at(z)[0], self.strength * z])
-
-    def jacobian(self, z: Floats) -> Floats:
-        """Of the residuals."""
-        return np.vstack([self.at(z)[1], self.strength * np.eye(len(z))])
 
 
 def _groups(segments: Sequence[Segment]) -> Rows:

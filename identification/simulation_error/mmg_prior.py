@@ -151,12 +151,9 @@ def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, d
             f"reference_model: {model.name!r} found, which is not written in the MMG form, expected one of "
             f"{quoted(of_form)}, a model file of structure 'mmg', or none: prior = 'yoshimura' takes formulas"
         )
-    candidates = {
-        name: make().particulars.completed() for name, make in REFERENCE_SHIPS.items() if name != "mariner"
-    }
-    vectors = {
-        name: similarity_vector(p) for name, p in ({model.name: model.particulars} | candidates).items()
-    }
+    others = {name: make().particulars for name, make in REFERENCE_SHIPS.items() if name != "mariner"}
+    vectors = {model.name: similarity_vector(model.particulars)}
+    vectors |= {name: similarity_vector(one.completed()) for name, one in others.items()}
     try:
         found = correlations(similarity_vector(ship), vectors)
     except InputError:  # too little is known to compare

@@ -175,8 +175,7 @@ class _Problem:
         _check_refinable(blank, settings.extra_trials)
         self.sizes = np.concatenate([_term_sizes(task.samples, q) for q in blank.table.equations])
         channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
-        free, offsets = settings.segment_start == "free", settings.rudder_offsets
-        self.shooter = Shooter(blank, channels, self.sizes, free, offsets)
+        self.shooter = Shooter(blank, channels, self.sizes, settings.segment_start == "free")
         self.segments = self._segments(task.trials)
         self.own, count = len(self.segments), len(task.trials)
         turns = [] if settings.anchor is None else reference_turns(settings.anchor, blank)
@@ -190,18 +189,15 @@ class _Problem:
             ]
             count += len(further)
         values = np.concatenate([start.estimators[q].coef_ for q in blank.table.equations])
-        self.first = np.concatenate([values / self.sizes, np.zeros(len(task.trials) if offsets else 0)])
-        self.scales = self._scales(
-            self.shoot(self.first, self.segments, self.shooter.units), self.shooter.units
+        self.first = np.concatenate(
+            [values / self.sizes, np.zeros(len(task.trials) * settings.rudder_offsets)]
         )
+        units = self.shooter.units
+        self.scales = self._scales(self.shooter.shoot(self.first, self.segments, units), units)
 
     def _segments(self, trials: Sequence[Trial]) -> list[Segment]:
-        settings = self.settings
-        channels = self.shooter.channels
-        return cut(trials, self.start.model, channels, settings.segment_lengths, settings.staggered)
-
-    def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
-        return self.shooter.shoot(parameters, segments, scales, len(self.trials))
+        lengths, staggered = self.settings.segment_lengths, self.settings.staggered
+        return cut(trials, self.start.model, self.shooter.channels, lengths, staggered)
 
     def finite(self) -> bool:
         """Whether the start sails all segments."""
@@ -224,7 +220,7 @@ class _Problem:
         evaluations, before = 0, 0.0
         for _ in range(ROUNDS):
             weights = self._prior_weights(prior, segments)
-            before = self._mean_cost(self.shoot(self.first, segments, scales))
+            before = self._mean_cost(self.shooter.shoot(self.first, segments, scales))
             found, shooting = self._round(parameters, segments, scales, weights)
             evaluations += found.nfev
             parameters = found.x
@@ -241,7 +237,7 @@ class _Problem:
 
         @lru_cache(maxsize=1)
         def shot(z: bytes) -> Shooting:
-            return self.shoot(np.frombuffer(z), segments, scales)
+            return self.shooter.shoot(np.frombuffer(z), segments, scales)
 
         found = least_squares(
             lambda z: np.concatenate([shot(z.tobytes()).residuals, weights * (z - self.first)]),

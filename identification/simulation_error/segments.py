@@ -172,38 +172,31 @@ class Shooter:
         Coefficients of the accelerations (SI) that stand for a parameter of 1.
     free : bool
         Whether each segment's start is fitted with it, else it is the smoothed measurement.
-    offsets : bool
-        Whether each trial has an offset of its rudder among the parameters, rad.
     """
 
-    def __init__(
-        self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool, offsets: bool
-    ) -> None:
+    def __init__(self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool) -> None:
         self.model, self.channels, self.sizes = model, tuple(channels), term_sizes
         self.columns = [model.state_names.index(name) for name in channels]
         self.free = self.columns if free else []
-        self.offsets = offsets
         self.numbers = model.ship_numbers()
         self.units = channel_units(model, channels)
 
-    def shoot(
-        self, parameters: Floats, segments: Sequence[Segment], scales: Floats, n_trials: int
-    ) -> Shooting:
+    def shoot(self, parameters: Floats, segments: Sequence[Segment], scales: Floats) -> Shooting:
         """Residuals and Jacobian at some parameters, the starts of the segments projected out.
 
         The residual of a segment that may choose its start is what a linear step of the start leaves
         (variable projection, Golub & Pereyra 1973, SIAM J. Numer. Anal. 10(2), with the Jacobian of Kaufman
-        1975). `parameters`: coefficients by `term_sizes`, then offsets of the rudder, rad (where there are
-        any), of which only the differences from their mean matter, shape (n_coefficients + n_trials,);
-        `scales`: residuals that count as 1, shape (n_channels,); `n_trials`: trials with an offset. Not
-        finite where a ship ran away.
+        1975). `parameters`: coefficients by `term_sizes`, then offsets of the rudder, rad, of the first
+        trials or of none, of which only the differences from their mean matter, shape (n_coefficients +
+        n_offsets,); `scales`: residuals that count as 1, shape (n_channels,). Not finite where a ship ran
+        away.
         """
         residuals, jacobians, moves, rows = [], [], [], []
         n_terms, at = len(self.sizes), 0
         offsets = about_mean(parameters[n_terms:])
         shares = about_mean(np.eye(len(offsets)))
         for segment in segments:
-            offset = offsets[segment.trial] if self._has_offset(segment, n_trials) else 0.0
+            offset = offsets[segment.trial] if segment.trial < len(offsets) else 0.0
             nominal, slopes = self._slopes(parameters[:n_terms], offset, segment)
             counts = np.diff(segment.blocks, append=len(segment.measured))
             factor = np.sqrt(segment.weight * counts)[:, None] / scales
@@ -213,7 +206,7 @@ class Shooter:
             value, slope, move = _without_start(value, slope, len(self.free))
             jacobian = np.zeros((len(value), len(parameters)))
             jacobian[:, :n_terms] = slope[:, :n_terms]
-            if self._has_offset(segment, n_trials):
+            if segment.trial < len(offsets):
                 jacobian[:, n_terms:] = np.outer(slope[:, n_terms], shares[segment.trial])
             residuals.append(value)
             jacobians.append(jacobian)
@@ -229,9 +222,6 @@ class Shooter:
             start[self.free] += move * self.units[: len(self.free)]
             found.append(replace(segment, start=start))
         return found
-
-    def _has_offset(self, segment: Segment, n_trials: int) -> bool:
-        return self.offsets and segment.trial < n_trials
 
     def _slopes(self, parameters: Floats, offset: float, segment: Segment) -> tuple[Floats, Floats]:
         """Simulated channels, and their derivatives by coefficients, rudder offset and start."""

@@ -92,7 +92,8 @@ def select_reference(
         If too little is known of the target.
     """
     ships = {name: load_model(name) for name in candidates}
-    usable = {name: ship for name, ship in ships.items() if channels is None or _fits(ship, channels)}
+    rolls = channels is None or {"p", "phi"} <= set(channels)
+    usable = {name: ship for name, ship in ships.items() if rolls or "phi" not in ship.state_names}
     if not usable:
         raise InputError(
             f"reference_model: none of {quoted(ships)} can be evaluated at {quoted(channels or ())}, "
@@ -114,10 +115,6 @@ def check_alike(name: str, similarity: float, otherwise: str) -> None:
             f"similarity of {similarity:.2f}, expected at least {LEAST_SIMILARITY:g}; {otherwise}, or name "
             f"the ship all the same: reference_model = {name!r}"
         )
-
-
-def _fits(ship: ShipModel, channels: Collection[str]) -> bool:
-    return "phi" not in ship.state_names or {"p", "phi"} <= set(channels)
 
 
 def _known(name: str, ship: ShipModel) -> Particulars:

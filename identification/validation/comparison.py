@@ -14,9 +14,9 @@ from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
-from identification.validation.cross_validation import cross_validate
-from identification.validation.ranking import Ranking, Standing, named, standing
+from identification.validation.ranking import Ranking, Standing, in_turn, named, standing
 from identification.validation.selection import RM_SVM, STRUCTURES, methods_of, reference_of
+from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
 from shipgym.ships import Structure, list_structures
@@ -116,6 +116,38 @@ def compare_methods(
     found.sort(key=lambda pair: pair[0].rank)
     results = {named(one.structure, one.method) if several else one.method: result for one, result in found}
     return Comparison(tuple(one for one, _ in found), results, refused, left_out, not held)
+
+
+def cross_validate(trials: Sequence[Trial], folds: int | None = None, **arguments: Any) -> dict[str, Any]:
+    """Predict each trial by a model identified from others.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        Those with `use` "fit" take part.
+    folds : int, optional
+        Groups of trials that are held out together, in their order; by default each by itself.
+    **arguments
+        Of `identify`.
+
+    Returns
+    -------
+    dict
+        For each trial by its name the metrics (`IdentificationResult.metrics`) of its prediction.
+
+    Raises
+    ------
+    InputError
+        For fewer than 2 trials or more folds than trials.
+    """
+    used = [trial for trial in trials if trial.use == "fit"]
+    if len(used) < 2:
+        raise InputError(f"trials: {len(used)} to fit found, expected at least 2 to hold one out")
+    n = len(used)
+    if folds is not None:
+        n = int(check_number(folds, "folds", at_least=2, at_most=len(used), hint="at most one per trial"))
+    own = {"model_error": False, **arguments}
+    return in_turn(lambda held: identify(used, hold_out=held, **own), used, n)[0]
 
 
 def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bool) -> list[tuple[Any, Any]]:

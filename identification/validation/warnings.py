@@ -77,6 +77,12 @@ def model_warnings(fit: Fit) -> list[str]:
     return found
 
 
+def heading_errors_deg(fit: Fit, use: str | None = None) -> dict[str, float]:
+    """Root mean square error of the predicted heading by trial, of all or of one use, where known."""
+    found = {n: m["rmse"]["psi"] for n, m in fit.metrics["trials"].items() if use in (None, m["use"])}
+    return {name: float(np.degrees(error)) for name, error in found.items() if error is not None}
+
+
 def held_out_error(fit: Fit) -> str:
     """The worst errors on the trials held out, of heading and of an index, in one sentence."""
     unseen = {n: found for n, found in fit.metrics["trials"].items() if found["use"] == "validate"}
@@ -85,7 +91,7 @@ def held_out_error(fit: Fit) -> str:
     lost = [PurePath(name).name for name, found in unseen.items() if found["diverged"]]
     if lost:
         return f"On {lost[0]}, held out, the model runs away."
-    told, headings = [], fit.heading_errors_deg("validate")
+    told, headings = [], heading_errors_deg(fit, "validate")
     if headings:
         worst = max(headings, key=lambda name: headings[name])
         told.append(f"heading {headings[worst]:.2g} deg rms ({PurePath(worst).name})")
@@ -173,7 +179,7 @@ def _shaft_ignored(fit: Fit) -> list[str]:
 
 def _lost_headings(fit: Fit) -> list[str]:
     """The trials whose heading the model does not predict, and the likely cause."""
-    errors = {name: error for name, error in fit.heading_errors_deg().items() if error > LOST_HEADING_DEG}
+    errors = {name: error for name, error in heading_errors_deg(fit).items() if error > LOST_HEADING_DEG}
     if not errors:
         return []
     worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in errors.items())

@@ -24,7 +24,7 @@ def parameters(model: ShipModel) -> np.ndarray:
 @pytest.fixture(scope="module")
 def shooter(mariner: ShipModel, cao_zigzag: Trial) -> Shooter:
     channels = compared_channels(mariner, [cao_zigzag])
-    return Shooter(mariner, channels, np.abs(parameters(mariner)), free=False, offsets=True)
+    return Shooter(mariner, channels, np.abs(parameters(mariner)), free=False)
 
 
 def test_the_ship_itself_sails_every_segment_as_recorded(
@@ -32,7 +32,7 @@ def test_the_ship_itself_sails_every_segment_as_recorded(
 ) -> None:
     segments = cut([cao_zigzag], mariner, shooter.channels, 3.4, True)
     truth = np.append(np.sign(parameters(mariner)), 0.0)
-    shooting = shooter.shoot(truth, segments, shooter.units, 1)
+    shooting = shooter.shoot(truth, segments, shooter.units)
     assert np.median(np.abs(shooting.residuals)) < 1e-8
     assert np.abs(shooting.residuals).max() < 3e-4  # a corner of the rudder inside a sampling step
 
@@ -57,10 +57,10 @@ def test_jacobian_is_that_of_central_differences(
     two = [cao_zigzag, cao_zigzag]
     segments = cut(two, mariner, shooter.channels, 4.0, False)[1:8:6]  # one of each trial
     at = np.append(1.01 * np.sign(parameters(mariner)), [0.002, -0.001])
-    jacobian = shooter.shoot(at, segments, shooter.units, 2).jacobian
+    jacobian = shooter.shoot(at, segments, shooter.units).jacobian
     for k in (3, 12, 38, len(at) - 1):
         step = 1e-4 * np.eye(len(at))[k]
-        ahead, behind = (shooter.shoot(at + s, segments, shooter.units, 2).residuals for s in (step, -step))
+        ahead, behind = (shooter.shoot(at + s, segments, shooter.units).residuals for s in (step, -step))
         slope = (ahead - behind) / 2e-4
         np.testing.assert_allclose(jacobian[:, k], slope, atol=2e-4 * np.abs(slope).max())
 
