@@ -54,7 +54,7 @@ def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> 
                 id=k, seed=episode.seed, observations=_observations(env, episode, f"episodes[{k}]"),
                 actions=episode.actions.astype(np.float32), rewards=episode.rewards,
                 terminations=last & episode.terminated, truncations=last & (not episode.terminated),
-                infos=padded(series, len(t)),
+                infos={name: values.tolist() for name, values in padded(series, len(t)).items()},
             )
         )  # fmt: skip
     options = {"data_format": "arrow", "eval_env": env, **metadata}
