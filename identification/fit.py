@@ -42,6 +42,11 @@ class Fit:
         """Coefficients by name, in the normalisation of the structure, rudder positive to starboard."""
         return self.model.coefficients
 
+    def heading_errors_deg(self, use: str | None = None) -> dict[str, float]:
+        """Root mean square error of the predicted heading by trial, of all or of one use, where known."""
+        found = {n: m["rmse"]["psi"] for n, m in self.metrics["trials"].items() if use in (None, m["use"])}
+        return {name: float(np.degrees(error)) for name, error in found.items() if error is not None}
+
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard error of each coefficient, in its units."""

@@ -7,13 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import shipgym
 from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.kernel_residual import BLACK_BOX, fit_kernel, reference_options, stabilised
 from identification.estimators.methods import Method, get_method
-from identification.estimators.threads import on_one_thread
+from identification.estimators.threads import single_threaded
 from identification.options import Given, Options, name_of, provenance_settings, whole_call
 from identification.regression.grey_box import bare_metrics, explained_samples
 from identification.regression.problem import Problem, held_out, pose
@@ -30,20 +29,18 @@ from identification.validation.guard import reasons_unstable
 from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
+from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
 from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
-
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 
-@on_one_thread
+@single_threaded()
 def identify(
     trials: Sequence[Trial],
     structure: str | Structure = "abkowitz",
@@ -95,8 +92,7 @@ def identify(
     fit, refined = _fitted(chosen, asked, problem)
     provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
-    call = whole_call(asked, problem.trials, particulars, steering)
-    return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance, call)
+    return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance)
 
 
 def _identified_best(
@@ -131,15 +127,15 @@ def _identified_with_kernel(
         ).model
         fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
         blank, box = fitted, fitted_box(fitted)
-    found = fit_kernel(blank, problem.used, box, options, _sampling(options, steering))
+    found = fit_kernel(blank, problem.used, box, options, problem.sampling)
     fit = _simulated(found.model, found.estimators, problem.used)
-    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples)
+    call = whole_call(options, problem.trials, particulars, steering)
+    problem = replace(problem, blank=found.model, table=found.model.table, samples=found.samples, call=call)
     named = replace(options, structure=beneath.structure)
     provenance = _provenance(named, name_of(options.method), options.settings(), fit, problem)
     provenance["kernel"] = found.report
     covariance = _scaled_covariance(options, fit, None, problem, provenance)
-    call = whole_call(options, problem.trials, particulars, steering)
-    return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance, call)
+    return _evaluated(replace(found.model, covariance=covariance), fit, problem, provenance)
 
 
 def _identified_mmg(
@@ -148,18 +144,11 @@ def _identified_mmg(
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
     found = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, found.model, **_sampling(options, steering))
+    samples, estimators = explained_samples(problem.used, found.model, **problem.sampling)
     fit = _simulated(found.model, estimators, problem.used)
     problem = replace(problem, samples=samples, blank=found.model)
     provenance = _provenance(options, MAP, {}, fit, problem) | found.report
-    call = whole_call(options, problem.trials, particulars, steering)
-    return _evaluated(found.model, fit, problem, provenance, call)
-
-
-def _sampling(options: Options, steering: SteeringGear | None) -> dict[str, Any]:
-    """Arguments of `build_samples`."""
-    smooth = options.preprocessing or options.smooth
-    return {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+    return _evaluated(found.model, fit, problem, provenance)
 
 
 def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
@@ -178,7 +167,7 @@ def _fitted(method: Method, options: Options, problem: Problem) -> tuple[Guarded
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
         return fit, None
-    refined = refine(fit, task, refinement, _memory(task.blank.particulars))
+    refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
     return refined.fit, refined
 
 
@@ -227,11 +216,6 @@ def _fitted_provenance(
     return found
 
 
-def _memory(ship: Particulars) -> float:
-    """Time over which errors are correlated, s."""
-    return float(MEMORY * ship["length"] / ship["speed"])
-
-
 def _scaled_covariance(
     options: Options, fit: GuardedFit, refined: Refined | None, problem: Problem, provenance: dict[str, Any]
 ) -> Floats:
@@ -249,8 +233,7 @@ def _covariance(
     fit: GuardedFit, regression: Samples, blank: ShipModel, refined: Refined | None, uncertainty: str
 ) -> Floats:
     """Covariance of the coefficients, with errors correlated over the time to sail one ship length."""
-    ship = blank.particulars
-    memory, bootstrap = _memory(ship), uncertainty == "bootstrap"
+    memory, bootstrap = MEMORY * blank.travel_time, uncertainty == "bootstrap"
     if refined is None or refined.covariance is None:
         by_estimators = bootstrap_covariance if bootstrap else joint_covariance
         covariance = by_estimators(fit.estimators, regression, memory)
@@ -258,9 +241,7 @@ def _covariance(
         covariance = influence_covariance(refined.influences, max(round(memory / refined.width), 1))
     else:
         covariance = refined.covariance
-    return coefficient_covariance(
-        covariance, blank.table.acceleration_matrix(ship, blank.service_shaft_speed)
-    )
+    return coefficient_covariance(covariance, blank.acceleration_matrix)
 
 
 def _left_out(
@@ -279,24 +260,21 @@ def _left_out(
             )
             for estimators, rows in without
         ]
-    matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
     values, most = np.array(list(fit.model.coefficients.values())), count / max(count - 1, 1)
     return [
-        replace(
-            fit.model,
-            coefficients=dict(zip(fit.model.coefficients, (values - change).tolist(), strict=True)),
-            covariance=most * covariance,
+        replace(fit.model.with_coefficients(values - most * change), covariance=most * covariance)
+        for change in (
+            np.linalg.solve(blank.acceleration_matrix, part.sum(axis=0)) for part in refined.influences
         )
-        for change in (most * np.linalg.solve(matrix, part.sum(axis=0)) for part in refined.influences)
     ]
 
 
 def _evaluated(
-    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any], call: dict[str, Any]
+    model: ShipModel, fit: GuardedFit, problem: Problem, provenance: dict[str, Any]
 ) -> IdentificationResult:
     """The model with its provenance, its predictions of all trials that are not skipped, and diagnostics."""
     provenance |= problem.sea
-    provenance["steering"] = "estimated" if call["steering"] is None else "given"
+    provenance["steering"] = "estimated" if problem.call["steering"] is None else "given"
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
     lost = [name for name, predicted in predictions.items() if predicted is None]
@@ -319,6 +297,6 @@ def _evaluated(
         trials=trials,
         samples=problem.samples,
         estimators=fit.estimators,
-        settings=call,
+        settings=problem.call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
     )

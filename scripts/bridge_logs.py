@@ -125,7 +125,7 @@ def logged(run: Trial, seed: int) -> Trial:
     every = slice(None, None, 2)
     channels = {name: values[every] for name, values in channels.items()}
     t = read.t[every]
-    made, derived = to_project_conventions(t, channels, Conventions(), run.name)
+    made, derived, *_ = to_project_conventions(t, channels, Conventions(), run.name)
     return Trial(t, made, name=run.name, kind=run.kind, use=run.use, derived=derived, length=run.length)
 
 
@@ -246,7 +246,7 @@ def wind_table() -> str:
     columns = dict(zip(names, names, strict=True)) | {
         "x": "x0", "y": "y0", "wind_speed": "wind_true_speed", "wind_from": "wind_true_dir"
     }  # fmt: skip
-    paths = [entry.path for entry in ship.entries if "zigzag" in entry.file]
+    paths = [path for entry in ship.entries for path in entry.paths if "zigzag" in path.name]
     runs = [under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag")) for path in paths]
     rows = []
     for title, recipe in ESSO_OSAKA.items():

@@ -9,7 +9,9 @@ does not run; a library that is not installed is said and counts as failed too.
 
 from __future__ import annotations
 
+import os
 import sys
+import tempfile
 import traceback
 import warnings
 from collections.abc import Callable
@@ -99,6 +101,64 @@ def tianshou_single() -> None:
     np.testing.assert_array_equal(seen[1], expected)
 
 
+def tianshou_native() -> None:
+    """Tianshou's collector on a native vector environment (`TianshouShips`)."""
+    import torch
+    from tianshou.algorithm.modelfree.reinforce import ProbabilisticActorPolicy
+    from tianshou.data import Collector, VectorReplayBuffer
+    from tianshou.utils.net.common import Net
+    from tianshou.utils.net.continuous import ContinuousActorProbabilistic
+
+    envs = TianshouShips(many(autoreset_mode="Disabled"))
+    spaces = envs.native.single_observation_space, envs.native.single_action_space
+    net = Net(state_shape=spaces[0].shape, hidden_sizes=[16])
+    actor = ContinuousActorProbabilistic(preprocess_net=net, action_shape=spaces[1].shape, unbounded=True)
+    policy = ProbabilisticActorPolicy(
+        actor=actor,
+        dist_fn=lambda mean: torch.distributions.Independent(torch.distributions.Normal(*mean), 1),
+        action_space=spaces[1],
+    )
+    buffer = VectorReplayBuffer(4 * STEPS, 4)
+    collected = Collector(policy, envs, buffer).collect(n_step=4 * STEPS, reset_before_collect=True)
+    assert collected.n_collected_steps == 4 * STEPS, collected
+    assert collected.n_collected_episodes == 8, collected
+    kept, _ = buffer.sample(0)
+    assert kept.obs.shape == (4 * STEPS, 15), kept.obs.shape
+    begun = (kept.obs[1:STEPS] == kept.obs_next[: STEPS - 1]).all(axis=1)  # of the first ship
+    assert list(np.flatnonzero(~begun)) == list(np.flatnonzero(kept.done[: STEPS - 1])), "episodes"
+
+
+class TianshouShips:
+    """A native vector environment made with `autoreset_mode="Disabled"`, as Tianshou's collector uses it.
+
+    For `collect(n_step=...)`, in which every ship takes every step.
+    """
+
+    is_async, waiting_id = False, ()
+
+    def __init__(self, native: Any) -> None:
+        self.native, self.env_num = native, native.num_envs
+        self.action_space = [native.single_action_space] * self.env_num
+
+    def __len__(self) -> int:
+        return self.env_num
+
+    def reset(self, env_id: Any = None, **reset: Any) -> tuple[Any, Any]:
+        """Begin episodes of all ships or of some; observations and infos of these."""
+        chosen = np.arange(self.env_num) if env_id is None else np.asarray(env_id)
+        if env_id is not None:
+            reset["options"] = {"reset_mask": np.isin(np.arange(self.env_num), chosen)}
+        observations, _ = self.native.reset(**reset)
+        return observations[chosen], np.array([{"env_id": one} for one in chosen])
+
+    def step(self, action: Any, id: Any = None) -> tuple[Any, ...]:
+        """One step of all ships."""
+        if id is not None and len(id) != self.env_num:
+            raise ValueError(f"{len(id)} ships found, expected all {self.env_num}: collect n_step")
+        *found, _ = self.native.step(np.asarray(action, np.float32))
+        return *found, np.array([{"env_id": one} for one in range(self.env_num)])
+
+
 def pufferlib_single() -> None:
     """PufferLib's emulation and its serial vector of it."""
     import pufferlib.emulation
@@ -114,6 +174,59 @@ def pufferlib_single() -> None:
     assert seen.shape == (3, 15)
     assert np.isfinite(rewards).all()
     envs.close()
+
+
+def pufferlib_native() -> None:
+    """PufferLib's vector of native environments, with ours as one of them (`puffer_ships`)."""
+    import pufferlib.vector
+
+    envs = pufferlib.vector.make(puffer_ships(), backend=pufferlib.PufferEnv)
+    seen, _ = envs.reset(seed=0)
+    ended, ours = 0, many(autoreset_mode="SameStep")
+    expected, _ = ours.reset(seed=0)
+    for _ in range(STEPS):
+        np.testing.assert_array_equal(seen, expected)
+        seen, rewards, terminals, truncations, _ = envs.step(np.zeros((4, 1), np.float32))
+        expected, *_ = ours.step(np.zeros((4, 1), np.float32))
+        ended += int((terminals | truncations).sum())
+    assert np.isfinite(rewards).all()
+    assert ended == 8, ended
+
+
+def puffer_ships() -> Any:
+    """The class of a native vector environment as one of PufferLib's, which share arrays with its vectors."""
+    import pufferlib
+
+    class Ships(pufferlib.PufferEnv):  # type: ignore[misc]
+        """Four ships."""
+
+        def __init__(self, buf: Any = None, seed: int = 0) -> None:
+            self.native = many(autoreset_mode="SameStep")
+            self.single_observation_space = self.native.single_observation_space
+            self.single_action_space = self.native.single_action_space
+            self.num_agents = self.native.num_envs
+            super().__init__(buf)
+
+        def reset(self, seed: int | None = None) -> tuple[Any, list[Any]]:
+            """Begin all episodes."""
+            self.observations[:], _ = self.native.reset(seed=seed)
+            return self.observations, []
+
+        def step(self, actions: Any) -> tuple[Any, ...]:
+            """One step of all ships."""
+            found = self.native.step(actions)
+            for own, new in zip(self._arrays(), found, strict=False):
+                own[:] = new
+            return *self._arrays(), []
+
+        def _arrays(self) -> tuple[Any, ...]:
+            return self.observations, self.rewards, self.terminals, self.truncations
+
+        def close(self) -> None:
+            """Let go of the ships."""
+            self.native.close()
+
+    return Ships
 
 
 def cleanrl_single() -> None:
@@ -181,8 +294,8 @@ def shipmmg_turn() -> None:
 CHECKS: dict[str, tuple[Callable[[], None], ...]] = {
     "skrl": (skrl_single, skrl_native),
     "torchrl": (torchrl_single, torchrl_native),
-    "tianshou": (tianshou_single,),  # it makes its vectors of single environments alone
-    "pufferlib": (pufferlib_single,),  # likewise
+    "tianshou": (tianshou_single, tianshou_native),
+    "pufferlib": (pufferlib_single, pufferlib_native),
     "cleanrl": (cleanrl_single, cleanrl_native),
     "stable-baselines3": (sb3_wrapped,),
     "shipmmg": (shipmmg_turn,),
@@ -193,6 +306,7 @@ def main(names: list[str]) -> int:
     """Run the checks of some libraries, by default of all; the number that failed."""
     warnings.filterwarnings("ignore", category=DeprecationWarning)
     failed = 0
+    os.chdir(tempfile.mkdtemp())  # PufferLib leaves a link in the working folder
     for name in names or CHECKS:
         for check in CHECKS[name]:
             try:

@@ -17,7 +17,7 @@ parallel); Bertsekas 2019, Reinforcement Learning and Optimal Control, 2.4 (roll
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -120,7 +120,7 @@ def run_oracle(
     model: ShipModel,
     task: Task,
     seeds: ArrayLike,
-    start: Policy | None = None,
+    start: Policy | Sequence[Policy] | None = None,
     settings: OracleSettings | None = None,
     randomisation: Randomisation | None = None,
 ) -> OracleRun:
@@ -134,8 +134,9 @@ def run_oracle(
         Steered by the rudder alone.
     seeds : array-like of int, shape (n_episodes,)
         Of the episodes.
-    start : Policy, optional
-        What each plan begins with; by default `LQ.from_model(model)`.
+    start : Policy or sequence of Policy, optional
+        What each plan begins with, of several that which costs least in the episode; by default
+        `LQ.from_model(model)`.
     settings : OracleSettings, optional
         How hard is searched.
     randomisation : Randomisation, optional
@@ -155,11 +156,12 @@ def run_oracle(
         raise InputError(f"action: '{task.action}' found, expected 'rudder': the oracle steers by it alone")
     asked = settings or OracleSettings()
     numbers = np.atleast_1d(np.asarray(seeds))
-    feedback = _feedback(start, model, task)
+    starts = list(start) if isinstance(start, Sequence) else [] if start is None else [start]
+    feedback = _feedback(starts[0] if len(starts) == 1 else None, model, task)
     groups = np.split(numbers, range(asked.group, len(numbers), asked.group))
     runs = [
         _Search(Engine(model, len(one), task, randomisation), one, feedback, asked, randomisation).run(
-            start or feedback
+            starts or [feedback]
         )
         for one in groups
     ]
@@ -235,10 +237,14 @@ class _Search:
             (self.n, engine.task.episode_steps), dtype=np.bool_
         )  # a new course at this step
 
-    def run(self, start: Policy) -> OracleRun:
-        """Start from an autopilot's sequence and improve it in passes."""
-        costs, added, actions = self._steered_by(start)
-        best = OracleRun(costs.copy(), costs, actions)
+    def run(self, starts: Sequence[Policy]) -> OracleRun:
+        """Start from the best of some autopilots' sequences and improve it in passes."""
+        costs, added, actions = self._steered_by(starts[0])
+        best = OracleRun(costs, costs.copy(), actions)
+        for start in starts[1:]:
+            found, plan, rudder = self._steered_by(start)
+            self._keep_better(best, added, found, plan, rudder)
+        best.start_costs[:] = best.costs
         self._keep_better(best, added, *self._sailed(np.zeros_like(added)))
         for number in range(self.settings.passes):
             self._keep_better(best, added, *self._pass(added, number))

@@ -1,12 +1,18 @@
-"""Train the agents of `agents/pretrained` again, and say how good they are.
+"""Train the agents of `agents/pretrained` again, for the suite whose ships contestants know by models.
 
     python scripts/train_pretrained.py                                   # every task's missing runs
-    python scripts/train_pretrained.py --tasks mariner-calm --seeds 0,1,2
-    python scripts/train_pretrained.py --table                           # markdown for docs/pretrained.md
+    python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
+    python scripts/train_pretrained.py --table results                   # markdown for docs/pretrained.md
+    python scripts/train_pretrained.py --shield 50                       # what the shield costs, 50 episodes
 
-Each task of the suite is learned with its settings in `agents/training/hyperparameters`, once for each
-training seed. Of all evaluations of all runs the policy that costs least on held-out episodes is kept; only
-then is it run on the episodes that are scored. Killed at any moment, it goes on where it was.
+Each task is learned with its settings in `agents/training/hyperparameters`, once for each training seed, in
+the design model and over the models drawn from its covariance. Of each run the policy that costs least on
+held-out episodes of the model is kept; the runs are all shipped and all scored, none is chosen. All tasks
+learn with the first seed before any learns with the second, so that a set that was cut short is balanced.
+Killed at any moment, it goes on where it was.
+
+`results` is a folder of `shipgym benchmark --suite shipgym-v2` with the agents and the baselines; more
+folders may follow, of contestants that were run in fewer episodes.
 """
 
 from __future__ import annotations
@@ -19,48 +25,52 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
-from agents.controllers.controller import Policy
-from agents.controllers.designs import tuned
+from agents.benchmarking.contestants import pretrained
+from agents.benchmarking.results import BenchmarkResult, load_results
+from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.policies.policy import LearnedPolicy
-from agents.rollouts.rollout import episode_costs
-from agents.suites.reference import reference_costs
-from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite
+from agents.policies.shield import Shielded
+from agents.rollouts.rollout import rollout
+from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask, load_suite
 from agents.training import run_folder
 from agents.training.plan import Given, make_plan
 from agents.training.training import Progress, train
 from shipgym.files import read_json, write_json
 
-AGENTS = Path(__file__).parents[1] / "agents"
-PRETRAINED = AGENTS / "pretrained"
+PRETRAINED = Path(__file__).parents[1] / "agents" / "pretrained"
 RESULT = "result.json"
 LARGEST_KB = 300.0
-FRESH = range(2_000_000, 2_000_100)  # never scored, trained or tuned on
-ENOUGH = 0.05  # room between the best classical controller and the oracle from which half of it is asked for
-CLOSE = 0.02  # how near the best classical controller is asked for elsewhere
 BROKEN = "delete it and train again"
+GAIN, CLOSE = 0.05, 0.01  # what is asked of five tasks, and of the others
 
 
 def main() -> None:
     """Train what is missing, or print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--suite", default="shipgym-v2")
     parser.add_argument("--algorithm", default="ppo")
     parser.add_argument("--tasks", default="", help="names, separated by commas; by default all")
-    parser.add_argument("--seeds", default="0,1,2", help="training seeds, separated by commas")
+    parser.add_argument("--seeds", default="0,1,2,3,4", help="training seeds, separated by commas")
     parser.add_argument("--runs", type=Path, default=Path("runs/pretrained"), help="folder of the runs")
-    parser.add_argument("--table", action="store_true", help="only print what the agents cost")
+    parser.add_argument("--table", type=Path, nargs="+", help="only print what the agents cost in results")
+    parser.add_argument("--shield", type=int, help="only print what the shield costs, in so many episodes")
     asked = parser.parse_args()
-    suite = load_suite()
-    tasks = [suite.task(name) for name in asked.tasks.split(",") if name] or list(suite.tasks)
+    suite = load_suite(asked.suite)
+    named = [suite.task(name) for name in asked.tasks.split(",") if name]
+    tasks = named or [task for task in suite.tasks if task.on == "ship"]
     if asked.table:
-        print(table(tasks, asked.algorithm))
+        print(table(tasks, [load_results(folder) for folder in asked.table], asked.algorithm))
         return
-    seeds = [int(seed) for seed in asked.seeds.split(",")]
-    for task in tasks:
-        for seed in seeds:
+    if asked.shield:
+        print(shield_table(tasks, asked.algorithm, asked.shield))
+        return
+    for seed in map(int, asked.seeds.split(",")):
+        for task in tasks:
             learn(asked.algorithm, task, seed, asked.runs)
-        publish(asked.algorithm, task, seeds, asked.runs)
+            publish(asked.algorithm, task, seed, asked.runs)
 
 
 def folder_of(runs: Path, algorithm: str, task: BenchmarkTask, seed: int) -> Path:
@@ -79,7 +89,7 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     if (folder / RESULT).is_file():
         return
     runs.mkdir(parents=True, exist_ok=True)
-    began, shown = time.process_time(), -np.inf
+    began, shown = time.process_time(), time.monotonic()
 
     def tell(progress: Progress) -> None:
         nonlocal shown
@@ -95,94 +105,118 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     resume = (folder / run_folder.RUN).is_file()
     result = train(plan, folder, resume=resume, tell=tell, command=command_of(algorithm, task, seed))
     write_json(result.to_dict(), folder / RESULT)
-    spent = time.process_time() - began
+    first, spent = result.curve[0]["cost"], time.process_time() - began
     print(
-        f"{task.name} {seed}: best {result.best_cost:.2f} at {result.best_steps}, {spent:.0f} s", flush=True
-    )
-
-
-def publish(algorithm: str, task: BenchmarkTask, seeds: Sequence[int], runs: Path) -> None:
-    """Write the best of the runs with the record of all of them."""
-    told, policies = [], []
-    for seed in seeds:
-        folder = folder_of(runs, algorithm, task, seed)
-        result = read_json(folder / RESULT, "result of a run", BROKEN)
-        policy = load_agent(folder / run_folder.AGENT)
-        assert isinstance(policy, LearnedPolicy)
-        policies.append(policy)
-        told.append({
-            "seed": seed,
-            "held_out_cost": result["best_cost"],
-            "best_steps": result["best_steps"],
-            "steps": result["steps"],
-            "scored_cost": scored_cost(policy, task),
-            "curve": [[row["steps"], round(row["cost"], 3)] for row in result["curve"]],
-        })  # fmt: skip
-    chosen = min(range(len(seeds)), key=lambda number: float(told[number]["held_out_cost"]))
-    best, listed = policies[chosen], ",".join(map(str, seeds))
-    record: dict[str, Any] = {
-        **best.training,
-        "command": command_of(algorithm, task, seeds[chosen]),
-        "script": f"python scripts/train_pretrained.py --tasks {task.name} --seeds {listed}",
-        "score": {"cost": told[chosen]["scored_cost"], "seeds": [int(task.seeds[0]), int(task.seeds[-1])]},
-        "runs": told,
-    }
-    PRETRAINED.mkdir(exist_ok=True)
-    path = PRETRAINED / f"{task.name}-{algorithm}.json"
-    replace(best, training=record).save(path)
-    size = sum(file.stat().st_size for file in (path, path.with_suffix(".safetensors"))) / 1000.0
-    if size > LARGEST_KB:
-        raise SystemExit(f"{path}: {size:.0f} kB with its weights, expected at most {LARGEST_KB:.0f}")
-    print(
-        f"{task.name}: seed {seeds[chosen]}, scored {told[chosen]['scored_cost']:.2f}, {size:.0f} kB",
+        f"{task.name} {seed}: {first:.2f} -> {result.best_cost:.2f} at {result.best_steps}, {spent:.0f} s",
         flush=True,
     )
 
 
-def scored_cost(policy: Policy, task: BenchmarkTask) -> float:
-    """Mean cost of the scored episodes."""
-    return float(episode_costs(policy, task.engine(len(task.seeds)), task.seeds).mean())
+def publish(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
+    """Write a run's policy with its record."""
+    folder, name = folder_of(runs, algorithm, task, seed), f"{task.name}-{algorithm}-s{seed}.json"
+    result = read_json(folder / RESULT, "result of a run", BROKEN)
+    policy = load_agent(folder / run_folder.AGENT)
+    assert isinstance(policy, LearnedPolicy)
+    record: dict[str, Any] = {
+        **policy.training,
+        "command": command_of(algorithm, task, seed),
+        "script": f"python scripts/train_pretrained.py --tasks {task.name} --seeds {seed}",
+        "held_out_cost": result["best_cost"],
+        "best_steps": result["best_steps"],
+        "steps": result["steps"],
+        "curve": [[row["steps"], round(row["cost"], 3)] for row in result["curve"]],
+    }
+    path = PRETRAINED / name
+    replace(policy, training=record).save(path)
+    size = sum(file.stat().st_size for file in (path, path.with_suffix(".safetensors"))) / 1000.0
+    if size > LARGEST_KB:
+        raise SystemExit(f"{path}: {size:.0f} kB with its weights, expected at most {LARGEST_KB:.0f}")
 
 
-def table(tasks: Sequence[BenchmarkTask], algorithm: str) -> str:
-    """Costs of the best classical controller, of the best known and of the agent; whether the aim is met."""
-    reference = reference_costs(DEFAULT_SUITE)
+def table(tasks: Sequence[BenchmarkTask], results: Sequence[BenchmarkResult], algorithm: str) -> str:
+    """Costs of the best baseline and of every training seed, the gain, and whether the aim is met."""
     lines = [
-        "| Task | Best classical | Cost | Best known | Learned | Room closed | Aim | Gain: scored, fresh "
-        "| Training seeds |",
+        "| task | best baseline | its cost | agents, by training seed | gain on the ship, % | on the model "
+        "| far from the design | lost far: agents, baseline | aim |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for task in tasks:
-        path = PRETRAINED / f"{task.name}-{algorithm}.json"
-        if task.name not in reference or not path.is_file():
-            lines.append(f"| {task.name} | | | | not trained | | missed | | |")
-            continue
-        policy = load_agent(path)
-        assert isinstance(policy, LearnedPolicy)
-        lines.append(_row(task, reference[task.name], policy))
+    for number, task in enumerate(tasks):
+        best = best_baseline(results, task.name, algorithm)
+        gain, *others = (
+            gain_of(*paired(results, task.name + end, algorithm, best), number) for end in SETS.values()
+        )
+        learned, theirs = paired(results, task.name, algorithm, best)
+        lost = [
+            f"{one.mean():.0%}" for one in paired(results, f"{task.name}-far", algorithm, best, "terminated")
+        ]
+        seeds, n = ", ".join(f"{cost:.1f}" for cost in learned.mean(axis=1)), theirs.shape[1]
+        named = best if n == N_EPISODES else f"{best} ({n} episodes)"
+        met = "gain" if gain.value >= GAIN and gain.low > 0 else "near" if gain.value >= -CLOSE else "missed"
+        cells = [named, f"{theirs.mean():.1f}", seeds, *map(_shown, (gain, *others)), ", ".join(lost), met]
+        lines.append(f"| {' | '.join([task.name, *cells])} |")
     return "\n".join(lines)
 
 
-def _row(task: BenchmarkTask, known: tuple[float, float], policy: LearnedPolicy) -> str:
-    """One task's line."""
-    best = tuned("best", task, DEFAULT_SUITE)
-    classical, least, learned = scored_cost(best, task), known[1], scored_cost(policy, task)
-    gain, room = 1.0 - learned / classical, 1.0 - least / classical
-    asked = room > ENOUGH
-    met = gain >= 0.5 * room if asked else gain >= -CLOSE
-    every = ", ".join(f"{run['scored_cost']:.1f}" for run in policy.training["runs"])
-    share = f"{gain / room:.0%} of {room:.1%}" if asked else f"room {room:.1%}, {-gain:+.1%} to classical"
-    return (
-        f"| {task.name} | {best.name} | {classical:.1f} | {least:.1f} | {learned:.1f} "
-        f"| {share} | {'met' if met else 'missed'} | {gain:.1%}, {fresh_gain(policy, task):.1%} | {every} |"
+def best_baseline(results: Sequence[BenchmarkResult], task: str, algorithm: str) -> str:
+    """The one of the lowest mean cost; one that was run in fewer episodes is compared in these."""
+    names = {name for one in results for name in one.summary["contestants"]} - {algorithm, "best-known"}
+    costs = {name: figures(results, name, task) for name in sorted(names)}
+    best, *others = sorted(
+        (name for name in costs if costs[name].size), key=lambda name: (-costs[name].size, costs[name].mean())
     )
+    for name in others:
+        ours, theirs = paired(results, task, best, name)
+        best = name if theirs.mean() < ours.mean() else best
+    return best
 
 
-def fresh_gain(policy: LearnedPolicy, task: BenchmarkTask) -> float:
-    """What a policy costs less than the best classical controller on fresh episodes, a part of that."""
-    engine, seeds = task.engine(len(FRESH)), np.array(FRESH)
-    classical = episode_costs(tuned("best", task, DEFAULT_SUITE), engine, seeds)
-    return float(1.0 - episode_costs(policy, engine, seeds).mean() / classical.mean())
+def figures(
+    results: Sequence[BenchmarkResult], name: str, task: str, figure: str = "cost"
+) -> NDArray[np.float64]:
+    """A figure of a contestant where most episodes of it were run, shape (n_runs, n_episodes)."""
+    held = [one for one in results if name in one.summary["contestants"] and task in one.tasks]
+    return max((one.figures(name, task, figure) for one in held), key=np.size, default=np.zeros((0, 0)))
+
+
+def paired(
+    results: Sequence[BenchmarkResult], task: str, one: str, other: str, figure: str = "cost"
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A figure of two contestants in the episodes that both were run in."""
+    first, second = (figures(results, name, task, figure) for name in (one, other))
+    n = min(first.shape[1], second.shape[1])
+    return first[:, :n], second[:, :n]
+
+
+def shield_table(tasks: Sequence[BenchmarkTask], algorithm: str, episodes: int) -> str:
+    """What the agents of the first training seed cost with a shield and without, and how often it steers."""
+    lines = [
+        "| task | without | with shield | with / without | time it steers |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    for task in tasks:
+        agent = load_agent(pretrained(task.name, algorithm)[0])
+        engine, seeds = task.engine(episodes), task.seeds[:episodes]
+        free, safe = (
+            rollout(one, engine, seeds, record=("heading_error",))
+            for one in (agent, Shielded.from_model(task.ship, agent))
+        )
+        without, held = float(free.costs.mean()), float(safe.costs.mean())
+        steers = safe.shielded[safe.sailing].mean()
+        lines.append(f"| {task.name} | {without:.1f} | {held:.1f} | {held / without:.3f} | {steers:.2%} |")
+    return "\n".join(lines)
+
+
+def gain_of(learned: NDArray[np.float64], theirs: NDArray[np.float64], number: int) -> Interval:
+    """What part of a baseline's cost the agents cost less, drawn over episodes and training seeds."""
+    draws = Draws(number + 1, learned.shape[1])
+    drawn = 1.0 - draws.means(learned, number, 1).mean(axis=1) / draws.means(theirs, number).mean(axis=1)
+    return interval(float(1.0 - learned.mean() / theirs.mean()), drawn)
+
+
+def _shown(gain: Interval) -> str:
+    """A gain with its interval, in percent."""
+    return f"{100 * gain.value:.1f} ({100 * gain.low:.1f} to {100 * gain.high:.1f})"
 
 
 if __name__ == "__main__":

@@ -8,6 +8,7 @@ A contestant is named on the command line as
     best-known                 the lowest cost that anything reached in each episode, kept with the suite
     ppo                        the pretrained agents of `agents/pretrained`
     runs/agent.json            a file of an agent or controller
+    runs/model.zip             an agent as stable-baselines3 saves it
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
     a.json+b.json              training runs, one by one
     my_module:factory          your own function: given a `BenchmarkTask`, it returns a controller
@@ -38,6 +39,7 @@ from agents.controllers.controller import Controller, Policy, model_hash
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
 from agents.engines.job import working_folder
+from agents.policies.sb3_zip import read_sb3
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_table, check_text, did_you_mean, quoted
@@ -126,11 +128,12 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     if not one.is_text or names_code(one.source):
         return
     pairs = [(path, task) for task in tasks for path in _files(one.source, task)]
-    agents = {path: load_agent(path) for path in {path for path, _ in pairs}}
+    agents = {path: _loaded(path) for path in {path for path, _ in pairs}}
     refusals: list[str] = []
     for path, task in pairs:
         try:
-            check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
+            policy = _policy(agents[path], task)
+            check_fits(policy, task.task, task.ship, f"'{path}' on task '{task.name}'")
         except InputError as error:
             refusals.append(str(error))
     if pairs and len(refusals) == len(pairs):
@@ -212,7 +215,7 @@ def _check_text(text: str) -> None:
 def _short_name(text: str) -> str:
     if names_code(text):
         return text.rpartition(":")[2]
-    if text.endswith(".json"):
+    if text.endswith((".json", ".zip")):
         stem = Path(text.split("+")[0]).stem.replace("{task}", "").replace("*", "").strip("-_.")
         return stem or "agent"
     return text
@@ -279,7 +282,15 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not paths:
         what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"
         raise InputError(f"there is no file of {what} for task '{task.name}'")
-    return [load_agent(path) for path in paths]
+    return [_policy(_loaded(path), task) for path in paths]
+
+
+def _loaded(path: Path) -> Any:
+    """A policy, or, of a zip, a function that makes it for a task."""
+    if path.suffix != ".zip":
+        return load_agent(path)
+    agent = read_sb3(path)
+    return lambda task: agent.policy(task.task, task.ship)
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:

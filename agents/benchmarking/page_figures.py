@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -123,20 +122,18 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
     go, style = graph_objects(), styles(names)
     figure = go.Figure()
     first = next(iter(episodes.values()))
-    if first.waypoints is not None:
-        north, east = first.waypoints.T
-        for band in _corridor(first.waypoints, first.corridor or 0.0):
-            figure.add_trace(
-                go.Scatter(
-                    x=compact(band[:, 1]), y=compact(band[:, 0]), mode="lines", line={"width": 0},
-                    fill="toself", fillcolor="#e3efe5", hoverinfo="skip", name="corridor",
-                )
-            )  # fmt: skip
-        dashed = {"color": "#2f6b3c", "width": 1.4, "dash": "dash"}
-        figure.add_trace(
-            go.Scatter(x=compact(east), y=compact(north), mode="lines+markers", name="path", line=dashed,
-                       marker={"size": 7, "color": "#2f6b3c"}, hoverinfo="skip")
-        )  # fmt: skip
+    if first.waypoints is not None and first.path is not None:
+        green = {"color": "#2f6b3c"}
+        for (north, east), style_of_path in (
+            (
+                _corridor(first.path, first.corridor or 0.0),
+                {"name": "corridor", "line": {"width": 0}, "fill": "toself", "fillcolor": "#e3efe5"},
+            ),
+            (first.path.T, {"name": "path", "line": {**green, "width": 1.4, "dash": "dash"}}),
+            (first.waypoints.T, {"name": "waypoints", "mode": "markers", "marker": {**green, "size": 7}}),
+        ):
+            points = {"x": compact(east), "y": compact(north), "mode": "lines", "hoverinfo": "skip"}
+            figure.add_trace(go.Scatter({**points, **style_of_path}))
     for name, episode in episodes.items():
         at = _thinned(episode.n_steps)
         figure.add_trace(_line(episode.states["y"][at], episode.states["x"][at], name, style[name], 1.8))
@@ -145,16 +142,19 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
     return figure
 
 
-def _corridor(waypoints: Floats, half: float) -> list[Floats]:
-    """The corridor of each leg, and a disc about each waypoint between two: north and east, m."""
-    bands = []
-    for start, end in pairwise(waypoints):
-        along = (end - start) / max(float(np.hypot(*(end - start))), 1e-9)
-        aside = half * np.array([-along[1], along[0]])
-        bands.append(np.array([start + aside, end + aside, end - aside, start - aside]))
+def _corridor(path: Floats, half: float) -> Floats:
+    """Strips along the pieces of a path and discs about the points between, north and east, m.
+
+    NaN parts one from the next. Returns an array of shape (2, n).
+    """
+    ahead = np.diff(path, axis=0)
+    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    aside = half * np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1)
+    strips = np.stack([path[:-1] + aside, path[1:] + aside, path[1:] - aside, path[:-1] - aside], axis=1)
     angles = np.linspace(0.0, 2.0 * np.pi, 25)
-    circle = half * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
-    return bands + [point + circle for point in waypoints[1:-1]]
+    discs = path[1:-1, None] + half * np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    parted = [np.pad(one, ((0, 0), (0, 1), (0, 0)), constant_values=np.nan) for one in (strips, discs)]
+    return np.concatenate([one.reshape(-1, 2) for one in parted]).T
 
 
 def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:

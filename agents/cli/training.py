@@ -45,6 +45,9 @@ def train_command(
         list[str] | None,
         typer.Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
     ] = None,
+    from_nothing: Annotated[
+        bool, typer.Option("--from-nothing", help="Learn without a base: --set base=none.")
+    ] = False,
     seed: Annotated[int | None, typer.Option(min=0, max=799, help="Of everything drawn; default: 0.")] = None,
     randomise: Annotated[
         bool | None,
@@ -67,6 +70,7 @@ def train_command(
     from agents.training.settings import parsed_settings
 
     own = parsed_settings(set_ or ()) | ({} if total_steps is None else {"total_steps": total_steps})
+    own |= {"base": "none"} if from_nothing else {}
     given = Given(
         algorithm, env, model, sea, task, parsed_settings(environment_options or (), "--option"), settings,
         own, seed, randomise, threads,

@@ -107,6 +107,7 @@ def _metadata(policy: LearnedPolicy) -> dict[str, str]:
         "action": policy.action,
         "authority": policy.authority,
         "action_repeat": policy.action_repeat,
+        "rate_limit": policy.rate_limit,
         "history": policy.frame_stack,
         "hold": policy.action_repeat,
         "base": None if policy.base is None else policy.base.to_dict(),

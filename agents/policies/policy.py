@@ -4,7 +4,8 @@ A policy is a network on `[observation(t - frame_stack + 1), ..., observation(t)
 observations in the scales of the environment; the base's action only if there is a base. Where an episode
 begins, the first observation fills the frame stack. Without a base the network's output, limited to [-1, 1],
 is the action. With one the action is `clip(base + authority * output, -1, 1)`: residual policy learning. The
-output is repeated for `action_repeat` control intervals, while the base goes on with its feedback.
+output is repeated for `action_repeat` control intervals, while the base goes on with its feedback; from one
+output to the next the part goes by at most `rate_limit` in an interval, from 0 where an episode begins.
 
 Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
 al. 2019, Residual reinforcement learning for robot control, ICRA.
@@ -37,6 +38,7 @@ ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 #: Number of the network's outputs by the kind of action.
 OUTPUTS = {"rudder": 1, "rudder-discrete": len(RUDDER_ORDERS), "rudder-shaft": 2}
 LARGEST_AUTHORITY = 2.0
+NO_LIMIT = 2.0  # of the rate: outputs are in [-1, 1]
 #: Options of an environment that decide what is observed and in which scales.
 SHOWING = ("action", "roll", "corridor", "ground")
 
@@ -48,8 +50,8 @@ class Memory(NamedTuple):
     #: frame_stack - 1, n_observations)
     seen: Numbers
     base: Any  # state of the base
-    #: control intervals until the next decision, and the network's outputs of the last one; for a single
-    #: observation without the first axis, shape (n, 1 + n_outputs)
+    #: control intervals until the next decision, the network's outputs of the last one, and those in force,
+    #: limited in rate; for a single observation without the first axis, shape (n, 1 + 2 n_outputs)
     repeated: Numbers
 
 
@@ -75,6 +77,8 @@ class LearnedPolicy:
         Share of the rudder limit by which it may differ from the base; 1 without a base.
     action_repeat : int
         Control intervals for which an output of the network holds.
+    rate_limit : float
+        Largest change of the output in force in a control interval; 2, its whole range, does not limit it.
     env_id : str
         Environment that it learned in.
     env_options : dict
@@ -98,6 +102,7 @@ class LearnedPolicy:
     base: Controller | None = None
     authority: float = 1.0
     action_repeat: int = 1
+    rate_limit: float = NO_LIMIT
     env_id: str = "shipgym/CourseKeeping-v0"
     env_options: Mapping[str, Any] = field(default_factory=dict)
     model_name: str = "unknown"
@@ -109,6 +114,9 @@ class LearnedPolicy:
         check_whole(self.frame_stack, "frame_stack", at_least=1)
         check_whole(self.action_repeat, "action_repeat", at_least=1)
         check_number(self.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
+        check_number(self.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
+        if self.action == "rudder-discrete" and self.rate_limit < NO_LIMIT:
+            raise InputError(f"rate_limit: {self.rate_limit:g} found with discrete orders, expected 2")
         n = len(self.observation_names)
         if len(self.observation_scales) != n:
             raise InputError(
@@ -149,12 +157,12 @@ class LearnedPolicy:
         """See `Policy.predict`: the mean of what was learned, or of discrete orders the most likely one.
 
         Of discrete orders the order itself is returned, not its number (`order_numbers` gives it). The state
-        is a `Memory` if there is a frame stack, a base or an action repeat, else as given.
+        is a `Memory` if there is a frame stack, a base, an action repeat or a rate limit, else as given.
         """
         n = len(self.observation_names)
         given = checked_observation(observation, self.observation_names, np.float32)
         rows = given.reshape(-1, given.shape[-1])
-        if self.frame_stack == 1 and self.base is None and self.action_repeat == 1:
+        if (self.frame_stack, self.base, self.action_repeat, self.rate_limit) == (1, None, 1, NO_LIMIT):
             action = self.commands(self.network(rows[:, :n]), None)
             return action.reshape(*given.shape[:-1], -1), state
         seen, inner, held = self._recalled(state, episode_start, rows[:, :n], given.ndim)
@@ -165,7 +173,7 @@ class LearnedPolicy:
             proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), -1)
             inputs = np.concatenate([inputs, proposed], axis=1)
         held = self._decided(inputs, held)
-        action = self.commands(held[:, 1:], proposed)
+        action = self.commands(held[:, 1 + OUTPUTS[self.action] :], proposed)
         kept = window[:, 1:].copy()
         memory = Memory(kept, inner, held) if given.ndim == 2 else Memory(kept[0], inner, held[0])
         return action.reshape(*given.shape[:-1], -1), memory
@@ -173,15 +181,17 @@ class LearnedPolicy:
     def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
         """Outputs in use: new ones of the ships whose last decision is over, or was not a number."""
         due = (held[:, 0] <= 0.0) | ~np.isfinite(held).all(axis=1)
-        now = held if not due.any() else np.where(due[:, None], self._outputs(inputs), held)
-        now[:, 0] -= 1.0
-        return now
+        left, outputs, before = np.split(held, [1, 1 + OUTPUTS[self.action]], axis=1)
+        if due.any():
+            left = np.where(due[:, None], np.float32(self.action_repeat), left)
+            outputs = np.where(due[:, None], self.network(inputs), outputs)
+        return np.concatenate([left - 1.0, outputs, self._in_force(outputs, before)], axis=1)
 
-    def _outputs(self, inputs: Numbers) -> Numbers:
-        """The network's outputs, behind the control intervals for which they are repeated."""
-        return np.column_stack(
-            [np.full(len(inputs), self.action_repeat, dtype=np.float32), self.network(inputs)]
-        )
+    def _in_force(self, outputs: Numbers, before: Numbers) -> Numbers:
+        """Outputs limited in size and rate; those before that were not a number limit nothing."""
+        if self.rate_limit == NO_LIMIT:
+            return outputs
+        return toward(outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit)
 
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
@@ -196,7 +206,7 @@ class LearnedPolicy:
         """What each ship remembers, as in `Memory`; where an episode begins, the present fills the past."""
         past, n = self.frame_stack - 1, len(rows)
         present = np.repeat(rows[:, None], past, axis=1)
-        nothing = np.zeros((n, 1 + OUTPUTS[self.action]), dtype=np.float32)
+        nothing = np.zeros((n, 1 + 2 * OUTPUTS[self.action]), dtype=np.float32)
         if state is None:
             return present, None, nothing
         if not isinstance(state, tuple) or len(state) != len(Memory._fields):
@@ -260,11 +270,19 @@ class LearnedPolicy:
             "base": None if self.base is None else self.base.to_dict(),
             "authority": self.authority,
             "action_repeat": self.action_repeat,
+            "rate_limit": self.rate_limit,
             "environment": {"id": self.env_id, "options": as_json(self.env_options)},
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "training": as_json(self.training),
         }  # fmt: skip
         return content, tensors
+
+
+def toward(outputs: Numbers, before: Numbers, rate_limit: float) -> Numbers:
+    """Outputs limited to [-1, 1], and to what can be reached in one control interval from those before."""
+    step = np.float32(rate_limit)
+    limited: Numbers = np.clip(np.clip(outputs, -1.0, 1.0), before - step, before + step)
+    return limited
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

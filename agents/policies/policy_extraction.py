@@ -7,7 +7,8 @@ guessed.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import chain, count, takewhile
 from typing import Any
 
 import gymnasium
@@ -15,16 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller, model_hash
-from agents.policies.network import Layer, Network
+from agents.policies.network import Network
 from agents.policies.weights_file import as_json
+from shipgym.checks import quoted
 from shipgym.envs.registration import env_id
 from shipgym.errors import InputError
 
+#: What acts in a policy: its hidden layers, the last one where it stands apart, what follows that, and the
+#: usual activation; PPO and A2C, SAC and TQC, TD3 and DDPG.
+ACTORS = (
+    ("mlp_extractor.policy_net", "action_net", "linear", "Tanh"),
+    ("actor.latent_pi", "actor.mu", "tanh", "ReLU"),
+    ("actor.mu", "", "tanh", "ReLU"),
+)
+NOT_ACTING = (
+    "mlp_extractor.value_net.", "value_net.", "log_std", "actor.log_std.", "actor_target.", "critic",
+)  # fmt: skip
+DENSE = "dense layers with ReLU or Tanh between them"
+SDE = "state-dependent exploration (use_sde) found, expected an agent without"
 ACTIVATION_OF = {"ReLU": "relu", "Tanh": "tanh"}
 #: Keywords of a vector environment that say how it runs, not what is asked.
 RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorization_mode", "render_mode")
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
+#: What the wrapper has that adds to a controller.
+RESIDUAL = ("base", "authority", "frame_stack", "action_repeat", "rate_limit")
 N_COMPARED = 16
 AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
@@ -76,15 +92,16 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """History, base and authority of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if all(name in vars(wrapper) for name in ("base", "authority", "frame_stack", "action_repeat")):
+        if all(name in vars(wrapper) for name in RESIDUAL):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 raise InputError(
                     f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
                     "hold"
                 )
-            numbers = {"frame_stack": int(wrapper.frame_stack), "action_repeat": int(wrapper.action_repeat)}
-            return {"base": base, "authority": float(wrapper.authority), **numbers}
+            whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
+            parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
+            return {"base": base, **whole, **parts}
     return {}
 
 
@@ -119,45 +136,37 @@ def _network(agent: Any) -> Network:
     actor: Any = getattr(policy, "actor", None)
     _check_features(policy if actor is None else actor)
     if getattr(agent, "use_sde", False):
-        raise InputError("agent: state-dependent exploration (use_sde) found, expected an agent without")
-    if hasattr(policy, "action_net") and hasattr(policy, "mlp_extractor"):  # PPO, A2C
-        return _dense([*policy.mlp_extractor.policy_net, policy.action_net])
-    if hasattr(actor, "latent_pi") and hasattr(actor, "mu"):  # SAC, TQC
-        return _dense([*actor.latent_pi, actor.mu], "tanh")
-    if actor is not None and hasattr(actor, "mu"):  # TD3, DDPG
-        *modules, last = actor.mu
-        if type(last).__name__ == "Tanh":
-            return _dense(modules, "tanh")
-    raise InputError(
-        f"agent: {type(agent).__name__} with {type(policy).__name__} found, expected PPO, A2C, SAC, TD3, "
-        f"DDPG or TQC with 'MlpPolicy'"
-    )
+        raise InputError(f"agent: {SDE}")
+    what = f"{type(agent).__name__} with {type(policy).__name__}"
+    activation = getattr(getattr(policy, "activation_fn", None), "__name__", None)
+    return actor_network(policy.state_dict(), activation, what)
+
+
+def actor_network(weights: Mapping[str, Any], activation: str | None, what: str) -> Network:
+    """The network that commands, of the tensors of a policy by name.
+
+    `activation`: torch's class between the layers, by default the algorithm's own; `what`: whose they are.
+    Raises InputError for those of another algorithm, and for what is no dense layer.
+    """
+    found = [one for one in ACTORS if f"{one[1] or one[0] + '.0'}.weight" in weights]
+    if not found:
+        raise InputError(f"agent: {what} found, expected PPO, A2C, SAC, TD3, DDPG or TQC with 'MlpPolicy'")
+    body, head, output, own = found[0]
+    if (between := activation or own) not in ACTIVATION_OF:
+        raise InputError(f"agent: layer 1 of the network is {between}, expected {DENSE}")
+    hidden = takewhile(lambda layer: f"{layer}.weight" in weights, (f"{body}.{2 * i}" for i in count()))
+    layers = [(f"{layer}.weight", f"{layer}.bias") for layer in (*hidden, *filter(None, [head]))]
+    odd = set(chain(*layers)) ^ {name for name in weights if not name.startswith(NOT_ACTING)}
+    if odd:
+        raise InputError(f"agent: weights {quoted(sorted(odd))} missing or not known, expected {DENSE}")
+    pairs = tuple((_array(weights[weight]), _array(weights[bias])) for weight, bias in layers)
+    return Network(pairs, ACTIVATION_OF[between], output)
 
 
 def _check_features(owner: Any) -> None:
     name = type(getattr(owner, "features_extractor", None)).__name__
     if name not in ("FlattenExtractor", "NoneType"):
         raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
-
-
-def _dense(modules: Sequence[Any], output: str = "linear") -> Network:
-    """Linear layers with one activation between them."""
-    layers: list[Layer] = []
-    names = set()
-    for i, module in enumerate(modules):
-        kind = type(module).__name__
-        if not (kind in ACTIVATION_OF if i % 2 else kind == "Linear"):
-            raise InputError(
-                f"agent: layer {i} of the network is {kind}, expected dense layers with ReLU or Tanh between "
-                "them"
-            )
-        if i % 2:
-            names.add(kind)
-        else:
-            layers.append((_array(module.weight), _array(module.bias)))
-    if len(names) > 1:
-        raise InputError(f"agent: activations {sorted(names)} found, expected one")
-    return Network(tuple(layers), ACTIVATION_OF[names.pop()] if names else "relu", output)
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:

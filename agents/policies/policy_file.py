@@ -13,6 +13,7 @@ They are written by `agents.policies.weights_file`. Format 1 of kind "learned":
     base                 null or a classical controller (see `controller_file.py`), whose rudder it adds to
     authority            share of the rudder limit by which it may differ from the base
     action_repeat        control intervals for which an output of the network is repeated
+    rate_limit           largest change of the output in force in a control interval
     environment          {"id", "options"}: where it learned
     model                {"name", "sha256"}: the model it learned on
     training             how it was made: any JSON
@@ -44,7 +45,7 @@ from numpy.typing import NDArray
 from agents.controllers.controller import FORMAT, check_names
 from agents.controllers.controller_file import read_controller, read_scales
 from agents.policies.network import Layer, Network
-from agents.policies.policy import LearnedPolicy
+from agents.policies.policy import NO_LIMIT, LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
 from shipgym.checks import (
@@ -63,9 +64,9 @@ from shipgym.tasks.task import OBSERVATION_NAMES
 
 LEARNED = (
     "format", "kind", "observation_names", "observation_scales", "action", "network", "frame_stack", "base",
-    "authority", "action_repeat", "environment", "model", "training",
+    "authority", "action_repeat", "rate_limit", "environment", "model", "training",
 )  # fmt: skip
-LATER = {"action_repeat": 1}  # what older files lack, and what it means
+LATER = {"action_repeat": 1, "rate_limit": NO_LIMIT}  # what older files lack, and what it means
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
@@ -96,13 +97,15 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
 
 def _current(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields by their present names."""
-    return {RENAMED.get(name, name): value for name, value in content.items()}
+    return (LATER if content["kind"] == "learned" else {}) | {
+        RENAMED.get(name, name): value for name, value in content.items()
+    }
 
 
 def _check_fields(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
     """All fields there, none besides, and of this format."""
     check_format(content, FORMAT, where)
-    check_keys(content, expected, where, [name for name in expected if name not in LATER])
+    check_keys(content, expected, where, expected)
 
 
 def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> LearnedPolicy:
@@ -121,7 +124,8 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             frame_stack=content["frame_stack"],
             base=None if base is None else read_controller(_table(base, "base", where), f"{where}: base"),
             authority=content["authority"],
-            action_repeat=content.get("action_repeat", LATER["action_repeat"]),
+            action_repeat=content["action_repeat"],
+            rate_limit=content["rate_limit"],
             env_id=place["id"],
             env_options=dict(check_table(place.get("options"), f"{where}: environment.options")),
             model_name=model["name"],

@@ -11,6 +11,7 @@ from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
 from shipgym.arrays import Floats
+from shipgym.envs.engine import Engine
 from shipgym.envs.episode import Episode
 from shipgym.envs.recording import SUCCESS, plain
 
@@ -36,13 +37,11 @@ def recorded(policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples:
     engine = task.engine(len(seeds))
     run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
     stride = -(-task.task.episode_steps // samples)
-    episodes = [_episode(run, task, lane, engine.waypoints(lane), stride) for lane in range(len(seeds))]
+    episodes = [_episode(run, task, lane, engine, stride) for lane in range(len(seeds))]
     return Recorded(episodes, np.where(run.failed, np.nan, run.costs))
 
 
-def _episode(
-    run: Rollout, task: BenchmarkTask, lane: int, waypoints: Floats | None, stride: int
-) -> Episode | None:
+def _episode(run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, stride: int) -> Episode | None:
     """One lane of a rollout that recorded everything."""
     ship, failed, steps = run.model, bool(run.failed[lane]), int(run.steps[lane])
     count = steps // stride if failed else -(-steps // stride)  # where the policy failed she drifts on
@@ -52,7 +51,6 @@ def _episode(
     states = {name: values[at, lane] for name, values in run.states.items()}
     infos = {name: values[: steps + 1, lane] for name, values in run.infos.items()}
     success = [bool(np.any(infos[name][1:] > 0.0)) for name in SUCCESS if name in infos]
-    corridor = getattr(task.task, "corridor", None)
 
     def summed(values: Floats) -> Floats:
         together: Floats = np.diff(np.append(0.0, np.cumsum(values))[at])
@@ -75,8 +73,9 @@ def _episode(
         info=_finite(
             {name: infos[name][at] for name in infos if name not in {*task.task.reward_parts, *SUCCESS}}
         ),
-        waypoints=waypoints,
-        corridor=None if corridor is None else corridor * ship.particulars["length"],
+        waypoints=engine.waypoints(lane),
+        corridor=engine.path_metres("corridor"),
+        turn_radius=engine.path_metres("turn_radius"),
         arguments=plain({"model": task.model, **task.options}),
         seed=int(run.seeds[lane]),
         terminated=not failed and bool(run.terminated[lane]),

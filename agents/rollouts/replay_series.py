@@ -42,13 +42,17 @@ QUANTITIES = (
 )
 
 
+def _points(path: Floats | None) -> list[list[float | None]] | None:
+    return None if path is None else [rounded(point) for point in path]
+
+
 def run(name: str, episode: Episode) -> dict[str, Any]:
     """An episode ready for the page's JSON.
 
     `name`: what the legend calls it. Returns what it is, the ship to draw, the path, series of n + 1 values
     each, and under `other` what was recorded besides, SI units.
     """
-    recorded, path = {**episode.info, **episode.states}, episode.waypoints
+    recorded = {**episode.info, **episode.states}
     shown = {*SHOWN, _first(COURSE_ORDERS, recorded), _first(CROSS_TRACK, recorded)}
     other = {key: values for key, values in recorded.items() if key not in shown}
     return {
@@ -64,7 +68,8 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
-        "waypoints": None if path is None else [rounded(point) for point in path],
+        "waypoints": _points(episode.waypoints),
+        "path": _points(episode.path),
         "corridor": episode.corridor,
         "series": {key: rounded(values) for key, values in series(episode).items()},
         "parts": {key: rounded(values) for key, values in _after_steps(episode.reward_parts).items()},

@@ -174,6 +174,25 @@ def load_suite(name: str = DEFAULT_SUITE) -> Suite:
     return parse_suite(_suite_text(name), f"suite '{name}'")
 
 
+def suite_of(task: str) -> str | None:
+    """Name of the shipped suite that has a task of this name to design for; None if there is none."""
+    return next((name for name in list_suites() if task in _designed_for(name)), None)
+
+
+def find_task(name: str) -> BenchmarkTask:
+    """What contestants of a shipped suite are made for: its task, without the ship behind the model.
+
+    Raises InputError for an unknown name, with the nearest known one of any suite.
+    """
+    known = {one: task for suite in list_suites() for one, task in _designed_for(suite).items()}
+    return known[check_choice(name, known, "task")]
+
+
+def _designed_for(suite: str) -> dict[str, BenchmarkTask]:
+    """Tasks of a suite by name, as they are handed out."""
+    return {task.name: task.handed_out for task in load_suite(suite).tasks if task.on == "ship"}
+
+
 def suite_hash(name: str = DEFAULT_SUITE) -> str:
     """SHA-256 of the file of a shipped suite; an InputError for an unknown name."""
     return hashlib.sha256(_suite_text(name).encode()).hexdigest()

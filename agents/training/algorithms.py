@@ -14,6 +14,7 @@ from stable_baselines3.common.noise import NormalActionNoise
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from agents.controllers.controller import Controller
+from agents.policies.policy import NO_LIMIT
 from agents.training.plan import Plan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
@@ -60,13 +61,15 @@ def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
         **training_options(plan),
     )
     settings = plan.settings
-    if base is not None or settings.frame_stack > 1 or settings.action_repeat > 1:
+    changed = settings.frame_stack > 1 or settings.action_repeat > 1 or settings.rate_limit < NO_LIMIT
+    if base is not None or changed:
         ships = ResidualVecEnv(
             ships,
             base,
             authority=settings.authority,
             frame_stack=settings.frame_stack,
             action_repeat=settings.action_repeat,
+            rate_limit=settings.rate_limit,
         )
     return scaled_rewards(ships, settings)
 
@@ -135,7 +138,7 @@ def _rate(settings: Settings) -> float | Callable[[float], float]:
     """Learning rate by the part of the training that is left."""
     if settings.schedule == "constant":
         return settings.learning_rate
-    return lambda left: settings.learning_rate * left
+    return lambda left: settings.learning_rate * max(left, 0.0)  # the last rollout ends after the last step
 
 
 def set_deviation(agent: Any, settings: Settings) -> None:

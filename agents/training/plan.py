@@ -9,7 +9,7 @@ from typing import Any
 
 from agents.controllers.controller import model_hash
 from agents.policies.weights_file import as_json
-from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, load_suite
+from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, find_task
 from agents.training.settings import (
     ALGORITHMS,
     Settings,
@@ -170,7 +170,7 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     if given.task is not None:
         if beside:
             raise InputError(f"--task: found beside {beside[0]}, which the task says; leave one of them out")
-        return load_suite().task(given.task)
+        return find_task(given.task)
     if stored is not None and not beside:
         return stored.task
     before = BenchmarkTask(NO_TASK, "course-keeping", "mariner") if stored is None else stored.task
@@ -197,16 +197,18 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
 def training_options(plan: Plan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
-    With `randomise` each episode has a ship drawn from the model's covariance, where it has one, an
-    approach speed of 0.8 to 1.1 times the service speed, and any of the sea states in which the ship's
-    particulars allow weather to be worked out, the task's own among them and its current in all of them.
+    With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn from the model's
+    covariance, where it has one; with `randomise` also an approach speed of 0.8 to 1.1 times the service
+    speed, and any of the sea states in which the ship's particulars allow weather to be worked out, the
+    task's own among them and its current in all of them.
     """
     options = dict(plan.task.options)
+    ship, task = plan.task.ship, plan.task.task
+    drawn = plan.randomise or plan.settings.model_uncertainty == "covariance"
+    if drawn and ship.covariance is not None:
+        options.setdefault("model_uncertainty", "covariance")
     if not plan.randomise:
         return options
-    ship, task = plan.task.ship, plan.task.task
-    if ship.covariance is not None:
-        options.setdefault("model_uncertainty", "covariance")
     options.setdefault("speed_range", SPEED_RANGE)
     names = {sea.name for sea in task.seas}
     current = task.weather.current

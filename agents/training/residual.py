@@ -19,6 +19,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
+from agents.policies.policy import NO_LIMIT, toward
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
@@ -39,8 +40,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     The agent sees `[observation(t - frame_stack + 1), ..., observation(t), base action(t)]`; where an episode
     begins the first observation fills the stack. The command is
     `clip(base action + authority * clip(output, -1, 1), -1, 1)`, with the same output for `action_repeat`
-    control intervals. A step is these intervals, its reward their sum. Where an episode ends among them, the
-    rest of the step is not counted: the next episode begins with the base alone (without base: the output).
+    control intervals, approached by at most `rate_limit` in each of them. A step is these intervals, its
+    reward their sum. Where an episode ends among them, the rest of the step is not counted: the next episode
+    begins with the base alone (without base: the output).
 
     Parameters
     ----------
@@ -56,6 +58,8 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         Number of observations that are shown, the newest last.
     action_repeat : int
         Control intervals of a step.
+    rate_limit : float
+        Largest change of the output in force in a control interval, above 0; 2 does not limit it.
 
     Raises
     ------
@@ -72,11 +76,13 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         authority: float = 1.0,
         frame_stack: int = 1,
         action_repeat: int = 1,
+        rate_limit: float = NO_LIMIT,
     ) -> None:
         self.base = base
         self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
         self.frame_stack = check_whole(frame_stack, "frame_stack", at_least=1)
         self.action_repeat = check_whole(action_repeat, "action_repeat", at_least=1)
+        self.rate_limit = check_number(rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
         low, high = (np.tile(bound, self.frame_stack) for bound in _bounds(venv))
         if base is None:
             if self.authority != 1.0:
@@ -89,6 +95,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         self._state: Any = None
         self._proposed: Floats = np.zeros((venv.num_envs, 0), np.float32)
         self._outputs: Any = None
+        self._in_force = np.zeros((venv.num_envs, *(venv.action_space.shape or (1,))), np.float32)
 
     def reset(self) -> Floats:
         """Begin an episode in each row.
@@ -97,6 +104,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         """
         observations = self.venv.reset()
         self._state = None
+        self._in_force[:] = 0.0
         every = np.ones(self.num_envs, dtype=np.bool_)
         return self._begin(observations, every)
 
@@ -124,6 +132,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         """One control interval of the ships with the agent's outputs."""
         self.venv.step_async(self._commands())
         observations, rewards, dones, infos = self.venv.step_wait()
+        self._in_force[dones] = 0.0
         self._past[:, :-1] = self._past[:, 1:]
         ended = np.flatnonzero(dones)
         if len(ended) == 0:
@@ -141,18 +150,23 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
 
     def memory(self) -> dict[str, Any]:
         """What further steps depend on here: past observations, the base's state and its proposals."""
-        return copy.deepcopy({"past": self._past, "state": self._state, "proposed": self._proposed})
+        own = {"past": self._past, "state": self._state, "proposed": self._proposed}
+        limited = {} if self.rate_limit == NO_LIMIT else {"in_force": self._in_force}
+        return copy.deepcopy({**own, **limited})
 
     def remember(self, memory: Mapping[str, Any]) -> None:
         """Go on from what `memory` gave, in place of a `reset`."""
         self._past[:], self._state, self._proposed = memory["past"], memory["state"], memory["proposed"]
+        self._in_force = memory.get("in_force", self._in_force)
 
     def _commands(self) -> Any:
         """What the ships do."""
-        if self.base is None:
+        if self.base is None and self.rate_limit == NO_LIMIT:
             return self._outputs
-        outputs = np.clip(np.asarray(self._outputs, dtype=np.float32), -1.0, 1.0)
-        return np.clip(self._proposed + np.float32(self.authority) * outputs, -1.0, 1.0)
+        self._in_force = toward(np.asarray(self._outputs, dtype=np.float32), self._in_force, self.rate_limit)
+        if self.base is None:
+            return self._in_force
+        return np.clip(self._proposed + np.float32(self.authority) * self._in_force, -1.0, 1.0)
 
     def _begin(self, observations: Floats, starts: Flags) -> Floats:
         """What the agent sees where some rows begin an episode."""

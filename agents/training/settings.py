@@ -4,7 +4,7 @@ The files in `hyperparameters/` have the tuned ones, later tables before earlier
 
     [defaults]                          # every setting of the algorithm, to learn from scratch
     [residual.path-following]           # those that differ there beside a base, by default for the rudder
-    [suite]                             # those that differ on every task of the suite
+    [suites.shipgym-v1]                 # those that differ on every task of a suite
     [tasks.mariner-rough]               # those that differ on one of them
 
 A file of a user's own, and `--set`, name settings without tables.
@@ -13,13 +13,13 @@ A file of a user's own, and `--set`, name settings without tables.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import Field, asdict, dataclass, field, fields, replace
+from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from agents.controllers.registry import controller_kinds
-from agents.suites.suite import ENVIRONMENTS, load_suite
+from agents.suites.suite import ENVIRONMENTS, suite_of
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
 from shipgym.files import named_values, parse_toml, read_toml
@@ -30,9 +30,12 @@ RUNNING, LEARNED, AUTO = "running", "learned", "auto"
 NUMBER_OR_WORD, WIDTHS = "float | str", "tuple[int, ...]"  # types of settings
 
 
-def setting(**allowed: Any) -> Any:
-    """A setting and what is allowed: bounds of `check_number`, a `word` for a number, or `options`."""
-    return field(metadata=allowed)
+def setting(default: Any = MISSING, **allowed: Any) -> Any:
+    """A setting and what is allowed: bounds of `check_number`, a `word` for a number, or `options`.
+
+    `default`: of one that older runs and files of settings do not have.
+    """
+    return field(metadata=allowed, default=default, kw_only=default is not MISSING)
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,12 @@ class Settings:
     base: str = setting()
     #: Share of the action's range by which it may differ from the base; 1 without a base.
     authority: float = setting(above=0.0, at_most=2.0)
+    #: Largest change of the output in force in a control interval, so that the rudder does not jump where a
+    #: decision gives way to the next; 2 does not limit it.
+    rate_limit: float = setting(above=0.0, at_most=2.0, default=2.0)
+    #: Whether the ships that learn are drawn from the model's covariance; evaluation is on the model itself.
+    #: Unlike `--randomise` it leaves seas and speeds as the task has them.
+    model_uncertainty: str = setting(options=("none", "covariance"), default="none")
     #: What rewards are divided by before they are limited to [-10, 10]; "running" is the standard deviation
     #: of their discounted sum so far.
     reward_scale: float | str = setting(above=0.0, word=RUNNING)
@@ -262,16 +271,12 @@ def load_settings(
     where = f"hyperparameters/{algorithm}.toml"
     text = files("agents.training").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
     content = parse_toml(text, f"{where}:")
-    check_keys(content, ("defaults", "residual", "suite", "tasks"), where)
+    check_keys(content, ("defaults", "residual", "suites", "tasks"), where)
     chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
     if action == "rudder" and (given or {}).get("base") != "none":
-        known = any(task == one.name for one in load_suite().tasks)
-        for own, table in (
-            (_of(content, "residual", environment, where), f"residual.{environment}"),
-            (content.get("suite", {}) if known else {}, "suite"),
-            (_of(content, "tasks", task, where), f"tasks.{task}"),
-        ):
-            chosen |= _settings(own, kind, f"{where}: {table}")
+        followed = environment.removesuffix("-v1")
+        for table, name in (("residual", followed), ("suites", suite_of(task) or ""), ("tasks", task)):
+            chosen |= _settings(_of(content, table, name, where), kind, f"{where}: {table}.{name}")
     return make_settings(algorithm, chosen | dict(given or {}))
 
 
@@ -288,7 +293,7 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
     table = _settings(values, kind, f"settings of {algorithm}")
     for one in fields(kind):
-        if one.name not in table:
+        if one.name not in table and one.default is MISSING:
             raise InputError(f"settings of {algorithm}: '{one.name}' is missing")
     return kind(**table)
 

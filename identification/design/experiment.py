@@ -18,7 +18,8 @@ import numpy as np
 from rich.table import Table
 
 from identification.regression.samples import Samples, build_samples
-from identification.text import as_text
+from identification.text import as_text, lined_table
+from identification.validation.diagnostics import scaled_features
 from identification.validation.guard import hard_turn_features
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
@@ -103,10 +104,8 @@ class Advice:
         return as_text(self._trials_so_far(), self._candidates(), self._errors())
 
     def _trials_so_far(self) -> Table:
-        table = Table(
-            "trial", "condition number", "largest inflation", f"information on {self.coefficient}",
-            title="Trials so far", title_justify="left",
-        )  # fmt: skip
+        last = f"information on {self.coefficient}"
+        table = lined_table("Trials so far", "trial", "condition number", "largest inflation", last)
         at = list(self.before).index(self.coefficient)
         total = sum(float(trial.information[at, at]) for trial in self.trials)
         for trial in self.trials:
@@ -119,9 +118,8 @@ class Advice:
 
     def _candidates(self) -> Table:
         title = f"Run next ({self.criterion}-optimal; least certain: {self.coefficient})"
-        table = Table("candidate", title=title, title_justify="left")
-        for k in range(len(self.steps)):
-            table.add_column(f"gain, choice {k + 1}", justify="right")
+        headings = (f">gain, choice {k + 1}" for k in range(len(self.steps)))
+        table = lined_table(title, "candidate", *headings)
         choices = list(zip(self.steps, self.chosen, strict=True))
         for name in sorted(self.steps[0], key=lambda name: self.steps[0][name], reverse=True):
             gains = (f"{gains[name]:.2f}{' *' if name == best else ''}" for gains, best in choices)
@@ -140,15 +138,11 @@ def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, f
 
     `noise` is the variance of the targets' errors, by equation. Shape (n_coefficients, n_coefficients).
     """
-    table = _table(model)
-    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
+    matrix = model.acceleration_matrix
     moments = np.zeros(matrix.shape)
-    start = 0
-    for q in table.equations:
+    for q, rows in _table(model).regression_rows.items():
         X = samples.features[q]
-        rows = slice(start, start + X.shape[1])
         moments[rows, rows] = X.T @ X / noise[q]
-        start += X.shape[1]
     information: Floats = matrix.T @ moments @ matrix
     return information
 
@@ -159,7 +153,7 @@ def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
     Zigzags and turning circles of several angles, up to the rudder's limit, and a pseudo-random binary
     rudder.
     """
-    travel = model.particulars["length"] / model.particulars["speed"]
+    travel = model.travel_time
     times = {"duration": DURATION * travel, "dt": travel / STEPS}
     limit = model.steering.rudder_limit_deg
     found: dict[str, Manoeuvre] = {}
@@ -236,14 +230,11 @@ def advise(
 
 def _most_felt(model: ShipModel, errors: Floats) -> str:
     """The coefficient whose error, shape (n_coefficients,), changes the accelerations of a hard turn most."""
-    table = _table(model)
+    table, matrix = _table(model), model.acceleration_matrix
     sizes = hard_turn_features(table, model.particulars, model.service_shaft_speed)
-    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
-    values, felt, first = matrix @ np.array(list(model.coefficients.values())), np.zeros(len(errors)), 0
-    for q in table.regressed:
-        rows = slice(first, first + len(sizes[q]))
+    values, felt = matrix @ np.array(list(model.coefficients.values())), np.zeros(len(errors))
+    for q, rows in table.regression_rows.items():
         felt = np.maximum(felt, np.abs(matrix[rows]).T @ sizes[q] / (np.abs(values[rows]) @ sizes[q]))
-        first = rows.stop
     return list(model.coefficients)[int(np.argmax(felt * errors))]
 
 
@@ -263,8 +254,7 @@ def _table(model: ShipModel) -> Structure:
 
 def _regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression over windows of the same time, whatever the sampling."""
-    travel = model.particulars["length"] / model.particulars["speed"]
-    window = max(round(WINDOW * travel / float(np.median(np.diff(trial.t)))), 1)
+    window = max(round(WINDOW * model.travel_time / float(np.median(np.diff(trial.t)))), 1)
     window = min(window, max(len(trial) // 10, 1))
     return build_samples(
         [trial], _table(model), model.particulars, "integral", window, shaft_speed=model.service_shaft_speed
@@ -273,15 +263,11 @@ def _regression(model: ShipModel, trial: Trial) -> Samples:
 
 def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]:
     """Variance of what the model leaves of the targets, by equation."""
-    table = _table(model)
-    matrix = table.acceleration_matrix(model.particulars, model.service_shaft_speed)
-    values = matrix @ np.array(list(model.coefficients.values()))
-    noise, start = {}, 0
-    for q in table.equations:
-        own = values[start : start + len(table.terms(q))]
-        start += len(own)
+    values = model.acceleration_matrix @ np.array(list(model.coefficients.values()))
+    noise = {}
+    for q, rows in _table(model).regression_rows.items():
         targets = np.concatenate([s.targets[q] for s in regressions])
-        errors = targets - np.concatenate([s.features[q] for s in regressions]) @ own
+        errors = targets - np.concatenate([s.features[q] for s in regressions]) @ values[rows]
         # data without noise leave rounding errors only
         noise[q] = max(float(np.mean(errors**2)), JITTER * float(np.mean(targets**2)), np.finfo(float).tiny)
     return noise
@@ -292,15 +278,11 @@ def _information_of(
 ) -> TrialInformation:
     condition: dict[str, float] = {}
     inflation: dict[str, float] = {}
-    for q in model.table.equations:
-        X = samples.features[q]
-        size = np.sqrt(np.mean(X**2, axis=0))
-        scaled = X / np.where(size > 0.0, size, 1.0)
-        singular = np.linalg.svd(scaled, compute_uv=False)
-        condition[q] = float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0]))
+    for q, X in samples.features.items():
+        scaled, condition[q] = scaled_features(X)
         moment = scaled.T @ scaled / len(scaled)
         factors = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
-        inflation |= dict(zip(model.table.names(q), factors.tolist(), strict=True))
+        inflation |= dict(zip(model.table.regression_names(q), factors.tolist(), strict=True))
     return TrialInformation(name, condition, inflation, fisher_information(model, samples, noise))
 
 
@@ -325,9 +307,7 @@ def _offers(
 
 def _recorded(model: ShipModel, run: Trial) -> Trial:
     """A simulated trial with its shaft speed, where that is only commanded."""
-    if "n" in run or "n_command" not in run:
-        return run
-    return Trial(run.t, {**run.channels, "n": run["n_command"]}, name=run.name, kind=run.kind)
+    return run if "n" in run or "n_command" not in run else run.with_channels({"n": run["n_command"]})
 
 
 def _size(model: ShipModel, information: Floats) -> Floats:

@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.estimators.decomposition import centre_and_scale
-from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
+from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.robust import MAD
 from shipgym.arrays import Floats
-from shipgym.checks import check_whole
-from shipgym.errors import InputError
+from shipgym.checks import check_number, check_whole
 
 ITERATIONS = 20_000
 
@@ -58,23 +57,17 @@ class LinearSupportVectorMachine(LinearRegressor):
         from sklearn.exceptions import ConvergenceWarning
         from sklearn.svm import LinearSVR
 
-        if not np.isfinite(check_weight(self.C)):
-            raise InputError(f"C: {self.C} found, expected a finite number")
+        check_number(self.C, "C", above=0.0)
         check_whole(self.seed, "seed", at_least=0, at_most=2**32 - 1, hint="which this method takes")
-        if not 0.0 <= self.epsilon < np.inf:
-            raise InputError(f"epsilon: {self.epsilon} found, expected a finite number of at least 0")
+        check_number(self.epsilon, "epsilon", at_least=0.0)
         X, y = validated(self, X, y)
         centre, scale = centre_and_scale(X, True, self.fit_intercept)
         mean = float(y.mean()) if self.fit_intercept else 0.0
         size = float(np.sqrt(np.mean((y - mean) ** 2))) or 1.0
         estimator = LinearSVR(
-            C=self.C,
-            epsilon=self.epsilon,
-            fit_intercept=self.fit_intercept,
-            intercept_scaling=10.0,
-            max_iter=ITERATIONS,
-            random_state=self.seed,
-        )
+            C=self.C, epsilon=self.epsilon, fit_intercept=self.fit_intercept, intercept_scaling=10.0,
+            max_iter=ITERATIONS, random_state=self.seed,
+        )  # fmt: skip
         scaled = (X - centre) / scale
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ConvergenceWarning)

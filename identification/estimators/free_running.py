@@ -10,7 +10,6 @@ import numpy as np
 from identification.estimators.decomposition import decompose
 from identification.estimators.estimator import FitTask
 from identification.estimators.tuned import TunedLSSVM
-from identification.regression.coefficients import with_accelerations
 from identification.search import get_optimiser
 from identification.validation.prediction import predict
 from shipgym.arrays import Floats
@@ -59,7 +58,7 @@ def fit_free_running(settings: TunedLSSVM, task: FitTask) -> dict[str, TunedLSSV
             fit = whitened[q]
             filters = fit.filters(10.0**exponent, len(fit.singular_values))
             accelerations[q] = fit.directions.T @ (filters * fit.projections) / fit.scale
-        return free_running_error(with_accelerations(blank, accelerations), trials)
+        return free_running_error(blank.with_accelerations(accelerations), trials)
 
     bounds = [settings.log_bounds()] * len(equations)
     optimiser = get_optimiser(settings.optimiser)

@@ -12,18 +12,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from sklearn.cluster import KMeans
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import ERROR_TOLERANCE, heading_error
-from identification.regression.coefficients import with_accelerations
 from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples
 from identification.validation.folds import TRIALS, held_out_rows
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import GreyBox, ShipModel
@@ -31,8 +30,6 @@ from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import AUTO, Options
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
@@ -234,7 +231,7 @@ class _Search:
                 found[q] = np.asarray(
                     np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
                 )
-            errors.append(heading_error(with_accelerations(stage.model, found), held, "rmse"))
+            errors.append(heading_error(stage.model.with_accelerations(found), held, "rmse"))
         return float(np.mean(errors))
 
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
@@ -244,5 +241,5 @@ class _Search:
             q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
             for q, X in samples.features.items()
         }
-        model = with_accelerations(stage.model, {q: one.coef_ for q, one in estimators.items()})
+        model = stage.model.with_accelerations({q: one.coef_ for q, one in estimators.items()})
         return KernelFit(model, samples, estimators)

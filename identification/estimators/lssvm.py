@@ -21,7 +21,7 @@ from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, va
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import reweighted
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_whole
+from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.errors import InputError
 
 KERNELS = ("linear", "rbf", "poly")
@@ -191,10 +191,7 @@ class TruncatedLSSVM(LinearRegressor):
         check_weight(self.C)
         if self.rank is not None:
             check_whole(self.rank, "rank", at_least=1, hint="or None")
-        if not 0.0 < self.explained_variance <= 1.0:
-            raise InputError(
-                f"explained_variance: {self.explained_variance} found, expected a share above 0 and at most 1"
-            )
+        check_number(self.explained_variance, "explained_variance", above=0.0, at_most=1.0)
         X, y = validated(self, X, y)
         self.weights_ = fit_weighted(lambda weights: self._fit(X, y, weights), y, self.robust)
         return self

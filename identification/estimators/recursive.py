@@ -95,17 +95,13 @@ class Recursion(LinearRegressor):
         picked = slice(0, gathered, self.start_interval)
         if gathered:
             self._start_from(features[picked], targets[picked])
-        history = np.concatenate(
-            [
-                np.tile(self.coef_, (gathered, 1)),
-                self._run(features[gathered:, None], targets[gathered:, None])[:, 0],
-            ]
-        )
+        start = np.tile(self.coef_, (gathered, 1))
+        rest = self._run(features[gathered:, None], targets[gathered:, None])[:, 0]
         multiplicity = np.zeros(len(targets))
         multiplicity[picked] = 1.0
         multiplicity[gathered:] = 1.0
         self._summarise(features, targets, multiplicity)
-        return history
+        return np.concatenate([start, rest])
 
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.

@@ -21,7 +21,6 @@ from sklearn.utils.validation import validate_data
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, settings
-from identification.regression.coefficients import with_accelerations
 from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
@@ -222,8 +221,8 @@ class _Tuner:
     def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         equations = zip(self.samples.features, bands, strict=True)
-        return with_accelerations(
-            self.blank, {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
+        return self.blank.with_accelerations(
+            {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
         )
 
     def weight(self) -> float:

@@ -18,15 +18,6 @@ from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 
 OBJECTIVES = ("k-fold", "training", "free-running")
-LINEAR = (
-    "coef_",
-    "intercept_",
-    "singular_values_",
-    "covariance_",
-    "inverse_moment_",
-    "noise_variance_",
-    "weights_",
-)
 
 
 @settings()
@@ -115,16 +106,11 @@ class TunedLSSVM(LinearRegressor):
     def fit_with(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
-        estimator = self._estimator(C).fit(X, y)
-        for name in LINEAR:
-            setattr(self, name, getattr(estimator, name))
+        fitted = vars(self._estimator(C).fit(X, y))
+        vars(self).update({name: value for name, value in fitted.items() if name.endswith("_")})
         self.C_, self.search_ = C, search
-        self.chosen_ = {
-            "C": C,
-            "objective": self.objective,
-            "value": search.value,
-            "evaluations": search.evaluations,
-        }
+        found = {"value": search.value, "evaluations": search.evaluations}
+        self.chosen_ = {"C": C, "objective": self.objective, **found}
         return self
 
     def _estimator(self, C: float) -> LSSVM:

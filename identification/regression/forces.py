@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
-from identification.estimators.threads import on_one_thread
+from identification.estimators.threads import single_threaded
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -212,7 +212,7 @@ def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: F
     return np.array(found)
 
 
-@on_one_thread
+@single_threaded()
 def identify_forces(
     trials: Sequence[Trial],
     structure: str = "pmm18",

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.options import Given, name_of
+from identification.options import Given, name_of, whole_call
 from identification.regression.grey_box import chosen_box, structure_samples
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
@@ -48,6 +48,8 @@ class Problem:
     #: of the candidates for the reference ship of a grey box, where it was chosen among several
     similarity: dict[str, float]
     sea: dict[str, Any]  # what is known of current and wind, for the provenance
+    sampling: dict[str, Any]  # arguments of `build_samples`
+    call: dict[str, Any]  # of `identify`, for settings.json
 
 
 def pose(
@@ -73,10 +75,9 @@ def pose(
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
-    regress = partial(
-        structure_samples, structure=table, particulars=ship, samples=options.samples, window=options.window,
-        gear=steering, smooth=options.preprocessing or options.smooth, shaft_speed=shaft,
-    )  # fmt: skip
+    smooth = options.preprocessing or options.smooth
+    sampling = {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+    regress = partial(structure_samples, structure=table, particulars=ship, shaft_speed=shaft, **sampling)
     regression = regress(used)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
@@ -87,7 +88,8 @@ def pose(
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
-    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea)
+    call = whole_call(options, everything, particulars, steering)
+    return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea, sampling, call)
 
 
 def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Trial:

@@ -26,15 +26,13 @@ from identification.regression.integrals import (
     twice_integrated,
 )
 from identification.regression.rudder import rebuild, straight
-from shipgym.arrays import integral
+from shipgym.arrays import Floats, integral
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import Structure
 from shipgym.trials.trial import Trial
-
-Floats = NDArray[np.float64]
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
@@ -138,9 +136,7 @@ def build_samples(
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
-        np.concatenate([part.start for part in parts]),
-        np.concatenate([part.duration for part in parts]),
-        np.concatenate([part.trial for part in parts]),
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "duration", "trial")),
         max(part.window for part in parts),
     )
 
@@ -226,10 +222,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
             f"{trial.t[longest + 1]:g} s) and nowhere {fewest} samples between them, expected longer "
             'stretches without a gap; export it with every sample, or leave it out (use = "skip")'
         )
-    return [
-        Trial(trial.t[piece], {c: v[piece] for c, v in trial.channels.items()}, name=trial.name)
-        for piece in rows
-    ]
+    return [trial.part(piece) for piece in rows]
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:

@@ -91,19 +91,17 @@ def _take_out_current(
     doubts: dict[str, list[str]] = {}
     for trial, current, covariance, source in _currents(list(found.values()), length, speed, option):
         mean = np.reshape(current, (2, -1)).mean(axis=1)
-        row: dict[str, Any] = {
-            "north": float(mean[0]),
-            "east": float(mean[1]),
-            "source": source,
-            "taken_out": True,
-        }
+        row: dict[str, Any] = {"north": float(mean[0]), "east": float(mean[1])}
+        row |= {"source": source, "taken_out": True}
         doubt = ""
         if covariance is not None:
             errors = np.sqrt(np.diag(covariance))
-            row |= {"standard_errors": errors.tolist(), "probability": _probability(mean, covariance)}
-            if one_heading or errors.max() > UNCERTAIN * speed:
-                keep = "the trials keep to one heading"
-                doubt = keep if one_heading else f"its standard error is {errors.max():.2g} m/s"
+            if one_heading:  # drift by the current and drift by the ship's own neutral helm look alike
+                doubt = "the trials keep to one heading"
+            else:
+                row |= {"standard_errors": errors.tolist(), "probability": _probability(mean, covariance)}
+                if errors.max() > UNCERTAIN * speed:
+                    doubt = f"its standard error is {errors.max():.2g} m/s"
         if not doubt and np.hypot(*mean) > speed:
             doubt = f"{np.hypot(*mean):.2g} m/s found, expected less than the ship's speed of {speed:.3g} m/s"
         if doubt and (option != "auto" or covariance is None):

@@ -38,10 +38,8 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
     named = WindTable.from_dict(named, "wind coefficients") if isinstance(named, Mapping) else named
     curves = wind_curves(particulars, "blendermann" if named == "auto" else named)
     speed, angle = trial["wind_speed"], trial["wind_from"]
-    air = (
-        speed * np.cos(angle),
-        speed * np.sin(angle),
-    )  # where it comes from, north and east, or ahead and aside
+    # where it comes from, north and east, or ahead and aside
+    air = speed * np.cos(angle), speed * np.sin(angle)
     if not check_flag(table.get("relative", False), "wind relative"):
         if not trial.over_ground and {"current_north", "current_east"} <= trial.channels.keys():
             air = air[0] + trial["current_north"], air[1] + trial["current_east"]

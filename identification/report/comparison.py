@@ -6,16 +6,15 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.validation.ranking import Ranking
+from shipgym.arrays import Floats
 from shipgym.pages import render
-from shipgym.plots import PALETTE, axis, graph_objects, label, layout, line, subplots
+from shipgym.plots import PALETTE, axis, graph_objects, label, layout, line, panels
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-Floats = NDArray[np.float64]
 
 SHOWN = 4  # methods in a figure of predictions
 LARGEST = 2.0  # error that the figure shows; larger ones lie on its edge
@@ -70,19 +69,17 @@ def errors_figure(comparison: Ranking) -> Figure:
 def headings_figure(comparison: Ranking) -> Figure:
     """Error of the predicted heading over time, of the trials held out by the best methods."""
     held = [t for t in comparison.best.trials if t.use == "validate" and "psi" in t]
-    rows = max(-(-len(held) // 2), 1)
-    figure = subplots(
-        rows, 2, titles=[PurePath(trial.name).name for trial in held], vertical_spacing=0.36 / max(rows, 2)
-    )
+    figure, places, rows = panels([PurePath(trial.name).name for trial in held])
     best = list(comparison.results)[:SHOWN]
-    for k, trial in enumerate(held):
-        place = {"row": k // 2 + 1, "col": k % 2 + 1}
+    for trial, place in zip(held, places, strict=True):
         for method, colour in zip(best, PALETTE, strict=False):
             prediction = comparison.results[method].predictions[trial.name]
             if prediction is not None:
                 error = _smoothed(np.degrees(prediction["psi"] - trial["psi"]))
                 time = _smoothed(trial.t)
-                figure.add_trace(line(time, error, method, colour, 1.5, showlegend=k == 0), **place)
+                figure.add_trace(
+                    line(time, error, method, colour, 1.5, showlegend=place is places[0]), **place
+                )
         below, beside = "time, s" if place["row"] == rows else "", "deg" if place["col"] == 1 else ""
         label(figure, below, axis(beside, zero=True), **place)
     figure.update_layout(layout(230 * rows + 80, titled=True))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from shipgym.plots import AXES, MEASURED, MODEL, axis, label, layout, line, subplots
+from shipgym.plots import AXES, MEASURED, MODEL, axis, label, layout, line, panels, subplots
 from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
@@ -24,16 +24,9 @@ def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | N
     """
     if not all("psi" in trial and "delta" in trial for trial in trials):
         return None
-    rows, columns = -(-len(trials) // 2), min(len(trials), 2)
-    figure = subplots(
-        rows,
-        columns,
-        titles=[PurePath(trial.name).name for trial in trials],
-        vertical_spacing=0.36 / max(rows, 2),
-    )
-    for k, trial in enumerate(trials):
-        place = {"row": k // 2 + 1, "col": k % 2 + 1}
-        first, start = k == 0, trial["psi"][0]
+    figure, places, rows = panels([PurePath(trial.name).name for trial in trials])
+    for trial, place in zip(trials, places, strict=True):
+        first, start = place is places[0], trial["psi"][0]
         rudder, heading = np.degrees(trial["delta"]), np.degrees(trial["psi"] - start)
         for values, name, colour, width in (
             (rudder, "rudder", RUDDER, 1.2),
@@ -59,15 +52,8 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
             continue
         title, factor = AXES[channel]
         place = {"row": k // 2 + 1, "col": k % 2 + 1}
-        figure.add_trace(
-            line(measured.t, factor * measured[channel], "measured", MEASURED, 1.3, showlegend=k == 0),
-            **place,
-        )
-        if predicted is not None and channel != "delta":
-            figure.add_trace(
-                line(predicted.t, factor * predicted[channel], "predicted", MODEL, 2.0, showlegend=k == 0),
-                **place,
-            )
+        for run, *style in _runs(measured, None if channel == "delta" else predicted):
+            figure.add_trace(line(run.t, factor * run[channel], *style, showlegend=k == 0), **place)
         title = title if channel != "delta" else "rudder (given), deg"
         label(figure, "time, s" if k > 2 else "", title, **place)
     if "x" in measured.channels and "y" in measured.channels:
@@ -76,22 +62,24 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     return figure
 
 
+def _runs(measured: Trial, predicted: Trial | None) -> list[tuple[Any, ...]]:
+    """Each with its name, colour and width of line."""
+    ours = [] if predicted is None else [(predicted, "predicted", MODEL, 2.0)]
+    return [(measured, "measured", MEASURED, 1.3), *ours]
+
+
 def _add_paths(figure: Figure, measured: Trial, predicted: Trial | None) -> None:
     """The paths in the last panel, along and across the first course; a turning circle to one scale."""
     place = {"row": 3, "col": 2}
     c, s = np.cos(measured["psi"][0]), np.sin(measured["psi"][0])
-    for trial, name, colour, width in (
-        (measured, "measured", MEASURED, 1.3),
-        (predicted, "predicted", MODEL, 2.0),
-    ):
-        if trial is not None:
-            north, east = trial["x"] - measured["x"][0], trial["y"] - measured["y"][0]
-            ahead, aside = north * c + east * s, east * c - north * s
-            turning = measured.kind == "turning-circle"
-            x, y = (aside, ahead) if turning else (ahead, aside)
-            figure.add_trace(line(x, y, name, colour, width, showlegend=False), **place)
+    turning = measured.kind == "turning-circle"
+    for run, *style in _runs(measured, predicted):
+        north, east = run["x"] - measured["x"][0], run["y"] - measured["y"][0]
+        ahead, aside = north * c + east * s, east * c - north * s
+        x, y = (aside, ahead) if turning else (ahead, aside)
+        figure.add_trace(line(x, y, *style, showlegend=False), **place)
     ahead_axis, aside_axis = "along the first course, m", "to starboard, m"
-    if measured.kind == "turning-circle":
+    if turning:
         label(figure, aside_axis, axis(ahead_axis, scaleanchor="x6", scaleratio=1), **place)
     else:
         label(figure, ahead_axis, axis(aside_axis, autorange="reversed"), **place)

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.fit import Fit
 from identification.regression.still_water import SIGNIFICANT
-from shipgym.plots import LIMIT, MEASURED, MODEL, axis, label, layout, line, subplots
+from shipgym.plots import LIMIT, MEASURED, MODEL, axis, label, layout, line, panels
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
@@ -47,6 +47,8 @@ def _current(row: Mapping[str, Any]) -> str:
         north, east = (NORMAL_95 * error for error in row["standard_errors"])
         text += f", north {row['north']:.3f} ± {north:.3f}, east {row['east']:.3f} ± {east:.3f} m/s (95 %)"
         text += f", which {'differs' if row['probability'] < SIGNIFICANT else 'does not differ'} from zero"
+    elif row["source"] in ("trial", "all trials"):
+        text += ", a guess without an interval, as the trials keep to one heading"
     return text + ("; taken out" if row["taken_out"] else "; left in")
 
 
@@ -62,10 +64,9 @@ def track_figure(fit: Fit) -> Figure | None:
     if not trials:
         return None
     titles = [f"{PurePath(t.name).name}: {_set_and_drift(rows[t.name])}" for t in trials]
-    lines, columns = -(-len(trials) // 2), min(len(trials), 2)
-    figure = subplots(lines, columns, titles=titles, vertical_spacing=0.36 / max(lines, 2))
-    for k, trial in enumerate(trials):
-        place, row = {"row": k // 2 + 1, "col": k % 2 + 1}, rows[trial.name]
+    figure, places, lines = panels(titles)
+    for k, (trial, place) in enumerate(zip(trials, places, strict=True)):
+        row = rows[trial.name]
         drift = np.array([row["east"], row["north"]]) * trial.duration
         end = np.array([trial["y"][-1], trial["x"][-1]])
         tracks: list[tuple[Any, Any, str, str]] = [
@@ -75,8 +76,7 @@ def track_figure(fit: Fit) -> Figure | None:
         ]
         for east, north, name, colour in tracks:
             figure.add_trace(line(east, north, name, colour, 1.7, showlegend=k == 0), **place)
-        label(
-            figure, "east, m", axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1), **place
-        )
+        own_axis = axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1)
+        label(figure, "east, m", own_axis, **place)
     figure.update_layout(layout(300 * lines + 80, titled=True, hovermode="closest"))
     return figure

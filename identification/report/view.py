@@ -115,18 +115,13 @@ def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
 
 def _heading(fit: Fit) -> dict[str, Any] | None:
     """Heading error on the trials that were not fitted, else on those that were, degrees."""
-    trials = fit.metrics["trials"]
-    unseen = {name: metrics for name, metrics in trials.items() if metrics["use"] == "validate"}
-    errors = {
-        name: float(np.degrees(metrics["rmse"]["psi"]))
-        for name, metrics in (unseen or trials).items()
-        if metrics["rmse"]["psi"] is not None
-    }
+    unseen = any(metrics["use"] == "validate" for metrics in fit.metrics["trials"].values())
+    errors = fit.heading_errors_deg("validate" if unseen else None)
     if not errors:
         return None
     worst = max(errors, key=lambda name: errors[name])
     return {
-        "unseen": bool(unseen),
+        "unseen": unseen,
         "median": float(np.median(list(errors.values()))),
         "largest": errors[worst],
         "trial": PurePath(worst).name,

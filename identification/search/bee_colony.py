@@ -11,6 +11,8 @@ from identification.search.search import MOST, Objective, Recorder, SearchResult
 from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 
+Integers = NDArray[np.int64]
+
 
 @dataclass(frozen=True)
 class ArtificialBeeColony:
@@ -47,13 +49,10 @@ class ArtificialBeeColony:
         values = record(sources)
         record.end_round()
         idle = np.zeros(n, dtype=np.int64)
-        all_sources = np.arange(n)
         for _ in range(self.rounds):
-            for bees in ("employed", "onlookers"):
-                if bees == "employed":
-                    chosen = all_sources
-                else:
-                    chosen = np.searchsorted(_chances(values), rng.random(n), side="right")
+            for employed in (True, False):
+                chances = None if employed else _chances(values)
+                chosen = np.arange(n) if chances is None else chances.searchsorted(rng.random(n), "right")
                 moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)
                 _settle(sources, values, idle, chosen, moved, record(moved))
             left = np.flatnonzero(idle > self.limit)
@@ -65,7 +64,7 @@ class ArtificialBeeColony:
         return record.result()
 
 
-def _moved(sources: Floats, chosen: NDArray[np.int64], rng: np.random.Generator) -> Floats:
+def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:
     """The chosen sources, each moved in one dimension: x + a (x - x of another), a in [-1, 1]."""
     n, dimensions = sources.shape
     draw = rng.random((3, len(chosen)))
@@ -88,12 +87,7 @@ def _chances(values: Floats) -> Floats:
 
 
 def _settle(
-    sources: Floats,
-    values: Floats,
-    idle: NDArray[np.int64],
-    chosen: NDArray[np.int64],
-    moved: Floats,
-    found: Floats,
+    sources: Floats, values: Floats, idle: Integers, chosen: Integers, moved: Floats, found: Floats
 ) -> None:
     """Take the best move of each chosen source where it improves; count the tries of those that do not."""
     idle += np.bincount(chosen, minlength=len(values))

@@ -41,16 +41,8 @@ class DifferentialEvolution:
             return np.minimum(record(np.atleast_2d(x.T)), np.finfo(float).max)
 
         differential_evolution(
-            of_columns,
-            Bounds(low, high),
-            maxiter=self.rounds,
-            popsize=self.members,
-            tol=0.0,
-            atol=0.0,
-            rng=np.random.default_rng(seed),
-            polish=False,
-            vectorized=True,
-            updating="deferred",
+            of_columns, Bounds(low, high), maxiter=self.rounds, popsize=self.members, tol=0.0, atol=0.0,
+            rng=np.random.default_rng(seed), polish=False, vectorized=True, updating="deferred",
             callback=lambda intermediate_result: record.end_round(),
-        )
+        )  # fmt: skip
         return record.result()

@@ -60,15 +60,9 @@ def held_out_error(
     """
     rows = [blocks == k for k in range(int(blocks.max()) + 1)]
     parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]
-    fits = [
-        decompose_triangle(
-            stacked([part for j, part in enumerate(parts) if j != k]),
-            len(y) - int(rows[k].sum()),
-            scale,
-            fit_intercept,
-        )
-        for k in range(len(rows))
-    ]
+    others = [stacked([part for part in parts if part is not own]) for own in parts]
+    counts = [len(y) - int(own.sum()) for own in rows]
+    fits = [decompose_triangle(R, n, scale, fit_intercept) for R, n in zip(others, counts, strict=True)]
     return _errors(fits, parts, len(y), fit_intercept)
 
 

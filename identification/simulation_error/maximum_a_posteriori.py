@@ -18,9 +18,9 @@ from scipy.optimize import least_squares
 from identification.options import Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
-from identification.simulation_error.segments import Segment, compared_channels, cut
+from identification.simulation_error.segments import Segment, channel_units, compared_channels, cut, sailed
+from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.engine.loops import ship_loop
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.errors import InputError
@@ -28,7 +28,6 @@ from shipgym.ships import ShipModel
 from shipgym.ships.mmg import IDENTIFIED
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 MAP, DEFAULT_METHOD = "map", Options.method
@@ -157,10 +156,8 @@ class _Problem:
         self.numbers = self.blank.ship_numbers()
         self.channels = compared_channels(blank, trials)
         self.columns = [blank.state_names.index(name) for name in self.channels]
-        ship = blank.particulars
-        self.travel = ship.length / ship.require("speed")
-        units = {"u": ship["speed"], "v": ship["speed"], "r": 1.0 / self.travel, "psi": 1.0}
-        self.floors = np.array([FLOORS[name] * units[name] for name in self.channels])
+        floors = np.array([FLOORS[name] for name in self.channels])
+        self.floors = floors * channel_units(blank, self.channels)
         self.segments = cut(trials, self.blank, self.channels, SEGMENT_LENGTHS, False, interval=INTERVAL)
         self.groups = _groups(self.segments)
         self.kept: dict[bytes, tuple[Floats, Floats]] = {}
@@ -187,19 +184,17 @@ class _Problem:
         ships = np.repeat(self.numbers, LANES).reshape(-1, LANES)
         ships[first : first + n] = (self.mean + z * self.prior.deviation)[:, None]
         ships[first + np.arange(n), 1 + np.arange(n)] += STEP * self.prior.deviation
-        found = np.concatenate([self._sailed(self.segments[k], ships.ravel()) for k in which])
+        found = np.concatenate([self._errors(self.segments[k], ships) for k in which])
         errors = found[:, :, 0]
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
             slopes = (found[:, :, 1:] - errors[:, :, None]) / STEP
         return errors, slopes
 
-    def _sailed(self, segment: Segment, ships: Floats) -> Floats:
+    def _errors(self, segment: Segment, ships: Floats) -> Floats:
         """Errors of the ships of all lanes in a segment, shape (n_samples - 1, n_channels, 42)."""
-        state = np.repeat(segment.start, LANES)
-        out = np.empty((len(segment.measured), len(state)))
-        loop = ship_loop(self.blank.vessel, "segments", segment.windy)
-        loop(state, ships, np.zeros(LANES), segment.inputs, segment.samples, out)
-        lanes = out.reshape(len(out), -1, LANES)[1:, self.columns, : len(IDENTIFIED) + 1]
+        starts = np.repeat(segment.start, LANES)
+        lanes = sailed(self.blank, segment, ships, starts, np.zeros(LANES))
+        lanes = lanes[1:, self.columns, : len(IDENTIFIED) + 1]
         share = np.sqrt(self._weight(segment) / len(lanes))
         found: Floats = (lanes - segment.measured[1:, :, None]) * share
         return found
@@ -213,7 +208,7 @@ class _Problem:
         return found
 
     def _weight(self, segment: Segment) -> float:
-        return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.travel)
+        return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.blank.travel_time)
 
     def solve(self, start: Floats, strength: float) -> Estimate:
         """Fit all segments, the scales of the residuals renewed between rounds, fewer from an earlier fit."""

@@ -104,12 +104,12 @@ def _at_target(reference: str | ShipModel, blank: ShipModel) -> ShipModel:
 def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]:
     """A reference ship's turning circles at the target's scale; arguments as in `reference_prior`."""
     turns = virtual_trials(_at_target(reference, blank))[len(ZIGZAGS) :]
-    return [Trial(t.t[::2], {c: v[::2] for c, v in t.channels.items()}, name=t.name) for t in turns]
+    return [turn.part(slice(None, None, 2)) for turn in turns]
 
 
 def virtual_trials(model: ShipModel) -> list[Trial]:
     """Zigzags and turning circles to both sides, up to the rudder's limit, with the channel n."""
-    travel = model.particulars["length"] / model.particulars["speed"]
+    travel = model.travel_time
     timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
     runs = [zigzag(model, min(rudder, limit), heading, port, **timing) for rudder, heading, port in ZIGZAGS]

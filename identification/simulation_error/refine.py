@@ -10,6 +10,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -172,7 +173,6 @@ class _Problem:
         self.start, self.settings, self.trials = start, settings, task.trials
         blank = start.model
         _check_refinable(blank, settings.extra_trials)
-        self.matrix = blank.table.acceleration_matrix(blank.particulars, blank.service_shaft_speed)
         self.sizes = np.concatenate([_term_sizes(task.samples, q) for q in blank.table.equations])
         channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
         free, offsets = settings.segment_start == "free", settings.rudder_offsets
@@ -224,20 +224,32 @@ class _Problem:
         evaluations, before = 0, 0.0
         for _ in range(ROUNDS):
             weights = self._prior_weights(prior, segments)
-            current = _Round(self, segments, scales, weights)
             before = self._mean_cost(self.shoot(self.first, segments, scales))
-            found = least_squares(
-                current.residuals, parameters, current.jacobian,
-                method="trf", x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30,
-            )  # fmt: skip
+            found, shooting = self._round(parameters, segments, scales, weights)
             evaluations += found.nfev
             parameters = found.x
-            shooting = current.at(parameters)
             last = (segments, scales)
             segments = self.shooter.moved(segments, shooting.moves)
             scales = self._scales(shooting, scales)
         costs = (before, self._mean_cost(shooting))
         return _Solution(parameters, last[0], last[1], shooting, costs, evaluations)
+
+    def _round(
+        self, start: Floats, segments: Sequence[Segment], scales: Floats, weights: Floats
+    ) -> tuple[Any, Shooting]:
+        """The fit between two renewals of scales and starts, and the shooting that it ends with."""
+
+        @lru_cache(maxsize=1)
+        def shot(z: bytes) -> Shooting:
+            return self.shoot(np.frombuffer(z), segments, scales)
+
+        found = least_squares(
+            lambda z: np.concatenate([shot(z.tobytes()).residuals, weights * (z - self.first)]),
+            start,
+            lambda z: np.vstack([shot(z.tobytes()).jacobian, np.diag(weights)]),
+            method="trf", x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30,
+        )  # fmt: skip
+        return found, shot(found.x.tobytes())
 
     def _mean_cost(self, shooting: Shooting) -> float:
         own = shooting.residuals[: shooting.rows[self.own - 1].stop]
@@ -251,19 +263,14 @@ class _Problem:
 
     def model(self, parameters: Floats) -> ShipModel:
         """The model of some parameters."""
-        names = self.start.model.table.coefficient_names
-        values = np.linalg.solve(self.matrix, parameters[: len(self.sizes)] * self.sizes)
-        coefficients = dict(zip(names, values.tolist(), strict=True))
-        return replace(self.start.model, coefficients=coefficients)
+        blank, accelerations = self.start.model, parameters[: len(self.sizes)] * self.sizes
+        return blank.with_coefficients(np.linalg.solve(blank.acceleration_matrix, accelerations))
 
     def estimators(self, parameters: Floats) -> dict[str, Any]:
         """Copies of the start's estimators with the refined coefficients, for the diagnostics."""
-        estimators, first = {}, 0
-        for q, estimator in self.start.estimators.items():
-            last = first + len(estimator.coef_)
-            estimators[q] = copy.copy(estimator)
-            estimators[q].coef_ = (parameters * np.resize(self.sizes, len(parameters)))[first:last]
-            first = last
+        estimators = {q: copy.copy(estimator) for q, estimator in self.start.estimators.items()}
+        for q, rows in self.start.model.table.regression_rows.items():
+            estimators[q].coef_ = parameters[rows] * self.sizes[rows]
         return estimators
 
     def covariance(self, solution: _Solution, prior: float, memory: float) -> tuple[Floats, list[Floats]]:
@@ -303,31 +310,6 @@ class _Problem:
             "residual_rms": dict(zip(self.shooter.channels, solution.scales.tolist(), strict=True)),
             "rudder_offsets_deg": dict(zip(names, offsets, strict=True)) if offsets else {},
         }
-
-
-class _Round:
-    """The least-squares problem between two renewals of scales and starts; the last shooting is kept."""
-
-    def __init__(
-        self, problem: _Problem, segments: Sequence[Segment], scales: Floats, weights: Floats
-    ) -> None:
-        self.problem, self.segments, self.scales, self.weights = problem, segments, scales, weights
-        self.shot: tuple[bytes, Shooting] | None = None
-
-    def at(self, z: Floats) -> Shooting:
-        """The shooting at some parameters."""
-        key = z.tobytes()
-        if self.shot is None or self.shot[0] != key:
-            self.shot = key, self.problem.shoot(z.copy(), self.segments, self.scales)
-        return self.shot[1]
-
-    def residuals(self, z: Floats) -> Floats:
-        """Of the segments, and of the pull toward the start."""
-        return np.concatenate([self.at(z).residuals, self.weights * (z - self.problem.first)])
-
-    def jacobian(self, z: Floats) -> Floats:
-        """Of the residuals."""
-        return np.vstack([self.at(z).jacobian, np.diag(self.weights)])
 
 
 def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from identification.regression import preprocess
 from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
+from shipgym.arrays import Floats
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
 from shipgym.ships import ShipModel, Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
 from shipgym.trials.trial import Trial
 
-Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 STEP = 1e-5  # of finite differences, of parameters that are about 1
@@ -74,7 +74,7 @@ def cut(
     `smooth` gives, of times and values, the state at its start. Compared are samples at least an `interval`
     apart, in ship lengths; where it is 0, all.
     """
-    travel = model.particulars["length"] / model.particulars["speed"]
+    travel = model.travel_time
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
@@ -125,7 +125,7 @@ def _segment(
     rudder: Rudder,
     model: ShipModel,
 ) -> Segment:
-    t, travel = trial.t[rows], model.particulars["length"] / model.particulars["speed"]
+    t, travel = trial.t[rows], model.travel_time
     steps = np.maximum(np.ceil(np.diff(t) / (LONGEST_STEP * travel) - 1e-9), 1).astype(int)
     parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], steps, strict=True)]
     inside = rudder.corners[(rudder.corners > t[0]) & (rudder.corners < t[-1])]
@@ -184,10 +184,7 @@ class Shooter:
         self.free = self.columns if free else []
         self.offsets = offsets
         self.numbers = model.ship_numbers()
-        ship = model.particulars
-        units = {"u": ship["speed"], "v": ship["speed"], "r": ship["speed"] / ship["length"], "psi": 1.0}
-        units["p"] = units["r"]
-        self.units = np.array([units[name] for name in channels])
+        self.units = channel_units(model, channels)
 
     def shoot(
         self, parameters: Floats, segments: Sequence[Segment], scales: Floats, n_trials: int
@@ -240,7 +237,7 @@ class Shooter:
         """Simulated channels, and their derivatives by coefficients, rudder offset and start."""
         n_terms, n_free = len(parameters), len(self.free)
         n_moves = n_terms + 1 + n_free
-        n_state, first = len(segment.start), len(self.numbers) - n_terms  # the terms' come last
+        first = len(self.numbers) - n_terms  # the terms' come last
         numbers = self.numbers.copy()
         numbers[first:] = parameters * self.sizes
         slopes = np.empty((len(segment.measured), len(self.channels), n_moves))
@@ -258,14 +255,29 @@ class Shooter:
                     offsets[lane] += STEP
                 else:
                     state[self.free[move - n_terms - 1], lane] += STEP * self.units[move - n_terms - 1]
-            out = np.empty((len(segment.measured), n_state * LANES))
-            sail = ship_loop(self.model.vessel, "segments", segment.windy)
-            sail(state.ravel(), ship.ravel(), offsets, segment.inputs, segment.samples, out)
-            found = out.reshape(len(out), n_state, LANES)[:, self.columns]
+            found = sailed(self.model, segment, ship, state, offsets)[:, self.columns]
             nominal = found[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
                 slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP
         return nominal, slopes
+
+
+def channel_units(model: ShipModel, channels: Sequence[str]) -> Floats:
+    """What channels are compared by: service speed, that by ship length, and 1 rad, shape (n_channels,)."""
+    speed, rate = model.particulars["speed"], model.particulars["speed"] / model.particulars["length"]
+    units = {"u": speed, "v": speed, "r": rate, "p": rate, "psi": 1.0}
+    return np.array([units[name] for name in channels])
+
+
+def sailed(model: ShipModel, segment: Segment, ships: Floats, starts: Floats, offsets: Floats) -> Floats:
+    """States of the ships of all lanes at the samples of a segment, shape (n_samples, n_state, LANES).
+
+    Numbers of the ships and states at the start, a column for each lane, and offsets of their rudders, rad.
+    """
+    out = np.empty((len(segment.measured), starts.size))
+    loop = ship_loop(model.vessel, "segments", segment.windy)
+    loop(starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, out)
+    return out.reshape(len(out), -1, LANES)
 
 
 def about_mean(values: Floats) -> Floats:

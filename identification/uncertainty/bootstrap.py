@@ -11,7 +11,7 @@ from sklearn.base import clone
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.estimators.threads import on_one_thread
+from identification.estimators.threads import single_threaded
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats
@@ -35,7 +35,7 @@ def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random
     return np.concatenate(drawn)
 
 
-@on_one_thread
+@single_threaded()
 def bootstrap_covariance(
     estimators: Mapping[str, Estimator], samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
 ) -> Floats:

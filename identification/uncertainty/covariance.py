@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.estimators.estimator import Estimator, weights
-from identification.estimators.threads import on_one_thread
+from identification.estimators.threads import single_threaded
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
 
@@ -19,7 +19,7 @@ def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:
     return {q: samples.targets[q] - estimators[q].predict(samples.features[q]) for q in estimators}
 
 
-@on_one_thread
+@single_threaded()
 def joint_covariance(estimators: Estimators, samples: Samples, memory: float = 0.0) -> Floats:
     """Covariance of the coefficients of all equations, residuals correlated across equations and in time.
 

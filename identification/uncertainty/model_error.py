@@ -9,7 +9,7 @@ one.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,9 +23,7 @@ from identification.regression.preprocess.noise import noise_level
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
-from identification.validation.prediction import COMPARED, ZIGZAG, predict
-from shipgym.errors import InputError
-from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
+from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
@@ -119,7 +117,8 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
     if predicted is None or len(runs) < DRAWS / 2:
         return []
     noise = {name: noise_level(trial.t, trial[name]) for name in COMPARED if name in trial}
-    started = [predict(own, _shifted(clean, name, START * level)) for name, level in noise.items() if level]
+    shifted = [(name, clean[name] + START * level) for name, level in noise.items() if level]
+    started = [predict(own, clean.with_channels({name: values})) for name, values in shifted]
     found = []
     for name, level in noise.items():
         values = np.array([run[name] for run in runs]) - predicted[name]
@@ -131,14 +130,9 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
     return found
 
 
-def _shifted(trial: Trial, name: str, change: float) -> Trial:
-    """The trial with another value of a channel, from which a prediction starts."""
-    return Trial(trial.t, {**trial.channels, name: trial[name] + change}, name=trial.name, kind=trial.kind)
-
-
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:
     """Of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
-    read = _reader(own, clean)
+    read = index_reader(own, clean)
     if read is None:
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
@@ -166,30 +160,7 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     return float(np.hypot(noise, timing * trial["u"].max()) / model.particulars["length"]) ** 2
 
 
-def _reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:
-    """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres."""
-    length = model.particulars["length"]
-    heading = switch_heading_deg(trial) if trial.kind == "zigzag" else None
-
-    def read(run: Trial | None) -> Any:
-        try:
-            if run is None:
-                return None
-            if heading is not None:
-                return zigzag_indices(run, length, heading)
-            return turning_indices(run, length)
-        except InputError:  # a channel such as the position is missing
-            return None
-
-    return read if heading is not None or trial.kind == "turning-circle" else None
-
-
 def smoothed(trial: Trial) -> Trial:
     """The trial without the noise of heading and velocities, which extremes would be read from."""
     names = [name for name in ("psi", "u", "v", "r") if name in trial]
-    return Trial(
-        trial.t,
-        {**trial.channels, **smoothed_channels(trial, names, "spline")},
-        name=trial.name,
-        kind=trial.kind,
-    )
+    return trial.with_channels(smoothed_channels(trial, names, "spline"))

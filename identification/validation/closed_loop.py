@@ -10,6 +10,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from identification.validation.start import with_start
 from shipgym.arrays import Floats
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres.execution import reversals, rudder
@@ -23,15 +24,16 @@ LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by th
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
 
-    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts. None where the
-    model runs away or a heading is never reached, without a reversal, and for a model whose state is not
-    recorded.
+    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts (`with_start`). None
+    where the model runs away or a heading is never reached, without a reversal, and for a model whose state
+    is not recorded.
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
     start, turns = reversals(trial)
     delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
-    state = np.array([trial[c][0] if c in trial.channels else 0.0 for c in model.state_names])
+    begun = with_start(model, trial)
+    state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
     t, states, orders = [edges[0]], [state], []
     for leg, (begin, end) in enumerate(pairwise(edges)):
         held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)

@@ -137,15 +137,13 @@ def diagnose(
     for q, estimator in estimators.items():
         names = structure.regression_names(q)
         features, target, error = samples.features[q], samples.targets[q], errors[q]
-        size = np.sqrt(np.mean(features**2, axis=0))
-        scaled = features / np.where(size > 0.0, size, 1.0)
-        singular = np.linalg.svd(scaled, compute_uv=False)
+        scaled, condition = scaled_features(features)
         groups = getattr(estimator, "collinear_groups_", ())
         found[q] = EquationDiagnostics(
             samples=len(target),
             terms=len(names),
-            rank=int(getattr(estimator, "rank_", len(singular))),
-            condition_number=float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0])),
+            rank=int(getattr(estimator, "rank_", min(features.shape))),
+            condition_number=condition,
             r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
             residual_rms=float(np.sqrt(np.mean(error**2))),
             residual_autocorrelation=autocorrelation(error[apart], 10),
@@ -154,6 +152,14 @@ def diagnose(
             dropped=tuple(tuple(names[i] for i in group) for group in groups),
         )
     return found
+
+
+def scaled_features(features: Floats) -> tuple[Floats, float]:
+    """Features divided by their root mean squares, of the same shape, and their condition number."""
+    size = np.sqrt(np.mean(features**2, axis=0))
+    scaled = features / np.where(size > 0.0, size, 1.0)
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    return scaled, float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0]))
 
 
 def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:

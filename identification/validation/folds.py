@@ -58,7 +58,4 @@ def held_out_rows(
 def pieces(trial: Trial) -> list[Trial]:
     """A trial cut into parts, which are no manoeuvres."""
     edges = np.linspace(0, len(trial), PIECES + 1).astype(int).tolist()
-    return [
-        Trial(trial.t[a:b], {k: x[a:b] for k, x in trial.channels.items()}, name=f"{trial.name}, part {n}")
-        for n, (a, b) in enumerate(pairwise(edges), start=1)
-    ]
+    return [trial.part(slice(*ends), f"{trial.name}, part {n}") for n, ends in enumerate(pairwise(edges), 1)]

@@ -71,7 +71,7 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     intervals, from short to long, which excites what a zigzag of any other angle would. Stops after the first
     kind in which it does.
     """
-    travel = model.particulars["length"] / model.particulars["speed"]
+    travel = model.travel_time
     angles = sorted({min(angle, model.steering.rudder_limit_deg) for angle in RUDDERS_DEG}, reverse=True)
     sides = [side for angle in angles for side in (angle, -angle)]
     predictions = (

@@ -8,7 +8,6 @@ from typing import Any
 
 from identification.estimators.estimator import Estimator, FitTask
 from identification.estimators.methods import Method, fit_held
-from identification.regression.coefficients import with_accelerations
 from identification.validation.guard import STRENGTHS, hard_turn_features, reasons_unstable
 from shipgym.ships import ShipModel
 
@@ -53,4 +52,4 @@ def guarded_fit(
 
 def with_coefficients(blank: ShipModel, estimators: Mapping[str, Estimator]) -> ShipModel:
     """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
-    return with_accelerations(blank, {q: estimator.coef_ for q, estimator in estimators.items()})
+    return blank.with_accelerations({q: estimator.coef_ for q, estimator in estimators.items()})

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from identification.validation.closed_loop import closed_loop
+from identification.validation.start import with_start
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
 from shipgym.ships import ShipModel
@@ -20,9 +21,12 @@ TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder; None where the model runs away."""
+    """Simulate a trial from its initial state and measured rudder; None where the model runs away.
+
+    Initial velocities that were derived are estimated (`with_start`).
+    """
     try:
-        return open_loop(model, trial)
+        return open_loop(model, with_start(model, trial))
     except UnstableModelError:
         return None
 
@@ -42,30 +46,33 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
         else float(np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2)))
         for channel in COMPARED
     }
-    length = model.particulars["length"]
     indices: dict[str, Any] = dict.fromkeys((*ZIGZAG, *TURNING))
-    if trial.kind == "zigzag":
-        heading = switch_heading_deg(trial)
-        indices |= _compared(ZIGZAG, trial, prediction, lambda t: zigzag_indices(t, length, heading))
-        again = None if prediction is None else closed_loop(model, trial)
-        found = None if again is None else zigzag_indices(again, length, heading)
-        for name in ZIGZAG:
-            if indices[name] is not None:
-                indices[name]["closed_loop"] = getattr(found, name, None)
-    elif trial.kind == "turning-circle":
-        indices |= _compared(TURNING, trial, prediction, lambda t: turning_indices(t, length))
+    read, zigzag = index_reader(model, trial), trial.kind == "zigzag"
+    measured = None if read is None else read(trial)
+    if read is None or measured is None:
+        return metrics | indices
+    runs = {"measured": measured, "predicted": read(prediction)}
+    if zigzag:
+        runs["closed_loop"] = None if prediction is None else read(closed_loop(model, trial))
+    for name in ZIGZAG if zigzag else TURNING:
+        indices[name] = {kind: getattr(found, name, None) for kind, found in runs.items()}
     return metrics | indices
 
 
-def _compared(
-    names: tuple[str, ...], trial: Trial, prediction: Trial | None, indices: Callable[[Trial], Any]
-) -> dict[str, dict[str, float | None] | None]:
-    try:
-        measured = indices(trial)
-    except InputError:  # a channel such as the position is missing
-        return dict.fromkeys(names)
-    predicted = None if prediction is None else indices(prediction)
-    return {
-        name: {"measured": getattr(measured, name), "predicted": getattr(predicted, name, None)}
-        for name in names
-    }
+def index_reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:
+    """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres.
+
+    Runs have none where a channel such as the position is missing.
+    """
+    length = model.particulars["length"]
+    heading = switch_heading_deg(trial) if trial.kind == "zigzag" else None
+
+    def read(run: Trial | None) -> Any:
+        try:
+            if run is None:
+                return None
+            return turning_indices(run, length) if heading is None else zigzag_indices(run, length, heading)
+        except InputError:
+            return None
+
+    return read if heading is not None or trial.kind == "turning-circle" else None

@@ -13,7 +13,7 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import is_course_stable, steering_state_space
 
-LOST_HEADING = np.radians(10.0)  # rms error beyond which a prediction says nothing
+LOST_HEADING_DEG = 10.0  # rms error beyond which a prediction says nothing
 DRAWS, SURE = 40, 0.95  # models drawn, and the share of them that shows a course instability
 STEADY = 0.02  # change of the shaft speed between and within trials by its mean that a structure may ignore
 WAY = 0.5  # speed by that of service below which a trial starts from rest
@@ -85,13 +85,10 @@ def held_out_error(fit: Fit) -> str:
     lost = [PurePath(name).name for name, found in unseen.items() if found["diverged"]]
     if lost:
         return f"On {lost[0]}, held out, the model runs away."
-    headings = {
-        name: found["rmse"]["psi"] for name, found in unseen.items() if found["rmse"]["psi"] is not None
-    }
-    told = []
+    told, headings = [], fit.heading_errors_deg("validate")
     if headings:
         worst = max(headings, key=lambda name: headings[name])
-        told.append(f"heading {np.degrees(headings[worst]):.2g} deg rms ({PurePath(worst).name})")
+        told.append(f"heading {headings[worst]:.2g} deg rms ({PurePath(worst).name})")
     indices = [
         (abs(pair["predicted"] / pair["measured"] - 1.0), name, key)
         for name, found in unseen.items()
@@ -165,11 +162,8 @@ def _shaft_ignored(fit: Fit) -> list[str]:
     at_rest = [PurePath(trial.name).name for trial in trials if np.hypot(trial["u"][0], trial["v"][0]) < way]
     if spread <= STEADY and not at_rest:
         return []
-    rest = (
-        f", and {', '.join(at_rest)} {'starts' if len(at_rest) == 1 else 'start'} from rest"
-        if at_rest
-        else ""
-    )
+    verb = "starts" if len(at_rest) == 1 else "start"
+    rest = f", and {', '.join(at_rest)} {verb} from rest" if at_rest else ""
     return [
         f"the shaft speed varies by {100.0 * spread:.0f} % in the trials{rest}, which structure "
         f"{fit.model.structure!r} does not know; choose one that does, such as cubic, or "
@@ -179,18 +173,13 @@ def _shaft_ignored(fit: Fit) -> list[str]:
 
 def _lost_headings(fit: Fit) -> list[str]:
     """The trials whose heading the model does not predict, and the likely cause."""
-    errors = {
-        PurePath(name).name: float(np.degrees(metrics["rmse"]["psi"]))
-        for name, metrics in fit.metrics["trials"].items()
-        if (metrics["rmse"]["psi"] or 0.0) > LOST_HEADING
-    }
+    errors = {name: error for name, error in fit.heading_errors_deg().items() if error > LOST_HEADING_DEG}
     if not errors:
         return []
-    worst = ", ".join(f"{name} ({error:.0f} deg)" for name, error in errors.items())
-    limit = f"{np.degrees(LOST_HEADING):.0f} deg rms"
+    worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in errors.items())
     return [
-        f"the predicted heading drifts from the measured one by more than {limit} on {worst}: "
-        f"{_why_lost(fit.model)}"
+        f"the predicted heading drifts from the measured one by more than {LOST_HEADING_DEG:.0f} deg rms on "
+        f"{worst}: {_why_lost(fit.model)}"
     ]
 
 

@@ -25,6 +25,7 @@ from agents.deployment.nmea import Line
 from agents.deployment.steering import Helm, Limits
 from agents.engines.jobs import run_jobs
 from agents.engines.serialisation import KeptResults, pack, serialised, unpack
+from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
 from agents.training.plan import Plan, training_options
 from agents.training.run_folder import other_versions, read_plan
@@ -207,6 +208,12 @@ def pid() -> Any:
     return load_agent(CORPUS / "controller" / "pid.json")
 
 
+def read_zip(path: Path) -> Any:
+    """An agent of stable-baselines3, as one that learned the first task."""
+    agent, task = read_sb3(path), part_job()[1]
+    return agent.policy(task.task, task.ship)
+
+
 def read_bridge(path: Path) -> Helm:
     """A helm that was told the bytes of a line, and steers by what it understood."""
     helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
@@ -232,6 +239,7 @@ KINDS = (
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
     Kind("policy", load_agent, use_agent, main="agent.json"),
+    Kind("sb3", read_zip, use_agent, slow=10),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),
     Kind("run", read_run, use_plan, main="run.json", slow=8),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import io
 import json
 import struct
+import warnings
+import zipfile
 from collections.abc import Callable
 from functools import lru_cache
 from random import Random
@@ -319,7 +321,33 @@ def parquet_changed(random: Random, content: bytes) -> Change:
     return sink.getvalue(), f"column {name}: {what}"
 
 
+def zip_changed(random: Random, content: bytes) -> Change:
+    """A change to one member, which is JSON, another zip or bytes, or to which members there are."""
+    with zipfile.ZipFile(io.BytesIO(content)) as file:
+        members = [[one.filename, file.read(one)] for one in file.infolist()]
+    k = random.randrange(len(members))
+    name, inner = members[k]
+    what = random.randrange(12)
+    said: str | Callable[[], str] = f"member {name} dropped"
+    if what == 0:
+        del members[k]
+    elif what == 1:
+        members[k][0], said = (
+            random.choice(members)[0] + random.choice(("", "x", "/")),
+            f"member {name} renamed",
+        )
+    else:
+        change = zip_changed if inner[:2] == b"PK" else json_changed if inner[:1] == b"{" else spoilt
+        members[k][1], said = change(random, inner)
+    sink = io.BytesIO()
+    kind = zipfile.ZIP_DEFLATED if what == 2 else zipfile.ZIP_STORED
+    with warnings.catch_warnings(action="ignore"), zipfile.ZipFile(sink, "w", kind) as file:  # of names twice
+        for name, inner in members:
+            file.writestr(name, inner)
+    return sink.getvalue(), said
+
+
 SOURCES = {
     "json": json_changed, "toml": toml_changed, "csv": csv_changed, "safetensors": safetensors_changed,
-    "parquet": parquet_changed,
+    "parquet": parquet_changed, "zip": zip_changed,
 }  # fmt: skip

@@ -87,7 +87,7 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
 
 def explanation(error: Exception, what: str) -> str:
     """Numba's reason in one sentence, with the function and the line of the innermost call."""
-    text = str(error)
+    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))  # in colour where colorama is installed
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
     if reason.endswith("signature:"):

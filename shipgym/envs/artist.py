@@ -47,12 +47,12 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
     state = {name: float(values[lane]) for name, values in engine.physical_state().items()}
     particulars = engine.model.particulars
     length = particulars["length"]
-    corridor = getattr(engine.task, "corridor", None)
     return Scene(
         x=state["x"], y=state["y"], heading=state["psi"], rudder=state["delta"], length=length,
         beam=particulars.get("beam") or USUAL_BEAM * length, rudder_limit=engine.model.steering.limit,
         wake=wake, course_order=state.get("set_point", state["psi"]), waypoints=engine.waypoints(lane),
-        corridor=None if corridor is None else corridor * length, wind=_wind(state), current=_current(state),
+        turn_radius=engine.path_metres("turn_radius"), corridor=engine.path_metres("corridor"),
+        wind=_wind(state), current=_current(state),
         readouts=_readouts(engine, lane, state),
     )  # fmt: skip
 

@@ -24,6 +24,8 @@ from shipgym.checks import (
 from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
+from shipgym.tasks.guidance import Path as PlannedPath
+from shipgym.tasks.guidance import track
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS
 
@@ -60,8 +62,8 @@ class Episode:
         What else `info` reported in numbers, at the beginning and after each step; true is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
-    corridor, beam : float, optional
-        Half the width of the corridor along the path, and the ship's beam, m.
+    corridor, turn_radius, beam : float, optional
+        Half the width of the corridor along the path, radius of its turns, and the ship's beam, m.
     arguments : mapping of str to Any, optional
         Of the environment, ready for JSON.
     seed : int, optional
@@ -92,6 +94,7 @@ class Episode:
     info: Mapping[str, Floats] = field(default_factory=dict)
     waypoints: Floats | None = None
     corridor: float | None = None
+    turn_radius: float | None = None
     beam: float | None = None
     arguments: Mapping[str, Any] = field(default_factory=dict)
     seed: int | None = None
@@ -104,9 +107,9 @@ class Episode:
         check_text(self.environment, "environment")
         check_text(self.model, "model")
         most = {"rudder_limit": np.pi / 2.0, "beam": self.length}
-        for name in ("dt", "length", "rudder_limit", "beam", "corridor"):
+        for name in ("dt", "length", "rudder_limit", "beam", "corridor", "turn_radius"):
             value = getattr(self, name)
-            if value is not None or name not in ("beam", "corridor"):
+            if value is not None or name not in ("beam", "corridor", "turn_radius"):
                 self._set(name, check_number(value, name, above=0.0, at_most=most.get(name)))
         check_table(self.arguments, "arguments")
         if self.seed is not None:
@@ -150,9 +153,16 @@ class Episode:
                 f"waypoints: shape {points.shape} found, expected (n, 2), north and east of two or more"
             )
         self._set("waypoints", points)
+        if self.turn_radius is not None:
+            PlannedPath(points).check_turns(self.turn_radius)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
+
+    @property
+    def path(self) -> Floats | None:
+        """Points of the path to follow with its turns, north and east, m, shape (n, 2)."""
+        return track(self.waypoints, self.turn_radius)
 
     @property
     def n_steps(self) -> int:

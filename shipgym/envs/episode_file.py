@@ -10,7 +10,8 @@ Format 1:
     number       whole number
     dt           control interval, s
     ship         {"length": m, "beam": m or null, "rudder_limit": rad}
-    path         null or {"waypoints": [[north, east], ...] in m, "corridor": half its width in m or null}
+    path         null or {"waypoints": [[north, east], ...] in m, "corridor": half its width in m or null},
+                 and "turn_radius" in m where its turns are arcs
     states       {name: n + 1 values}, SI units: at the beginning and after each of the n steps
     commands     {"delta": n values in rad, "n": n values in 1/s}, of each step; what is not known is absent
     actions      n rows, as the agent gave them
@@ -35,7 +36,7 @@ KIND = "episode"
 TABLES = {
     "environment": {"id": "environment", "arguments": "arguments"},
     "ship": {name: name for name in ("length", "beam", "rudder_limit")},
-    "path": {name: name for name in ("waypoints", "corridor")},
+    "path": {name: name for name in ("waypoints", "corridor", "turn_radius")},
     "outcome": {name: name for name in ("terminated", "truncated", "success")},
 }
 SERIES = ("states", "commands", "reward_parts", "info")
@@ -51,6 +52,8 @@ def to_file(episode: Mapping[str, Any]) -> dict[str, Any]:
     }
     if values["waypoints"] is None:
         tables["path"] = None
+    elif values["turn_radius"] is None:
+        del tables["path"]["turn_radius"]
     return {"format": FORMAT, "kind": KIND, **tables, **{name: values[name] for name in PLAIN}}
 
 
@@ -71,8 +74,8 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
         if table == "path" and content[table] is None:
             continue
         found = check_table(content[table], table)
-        check_keys(found, names, table, names)
-        values |= {name: found[key] for key, name in names.items()}
+        check_keys(found, names, table, [key for key in names if key != "turn_radius"])
+        values |= {name: found[key] for key, name in names.items() if key in found}
     values["rewards"] = check_array(content["rewards"], (None,), "rewards")
     values["actions"] = check_array(content["actions"], (None, None), "actions")
     if "waypoints" in values:

@@ -101,6 +101,11 @@ class Lanes(ABC):
         tile, lane = divmod(lane, LANES)
         return plan[tile, :, lane].reshape(-1, 2).copy()
 
+    def path_metres(self, name: str) -> float | None:
+        """A setting of the path that is in ship lengths, `corridor` or `turn_radius`, m; None without one."""
+        lengths = getattr(self.task, name, None)
+        return None if lengths is None else float(lengths * self.model.particulars["length"])
+
     def copy_lanes(self, source: Lanes, lanes: ArrayLike) -> None:
         """Make each lane the copy of one of another engine: same ship, same episode, same future.
 

@@ -143,6 +143,7 @@ class _Recorded:
             "beam": self._model.particulars["beam"],
             "rudder_limit": math.radians(self._model.steering.rudder_limit_deg),
             "waypoints": None if waypoints is None else np.array(waypoints, dtype=float),
+            "turn_radius": getattr(ship, "turn_radius", None),
             "corridor": getattr(ship, "corridor", None),
         }
 

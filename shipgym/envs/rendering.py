@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
+from shipgym.tasks.guidance import track
 
 Picture = NDArray[np.uint8]
 Point = tuple[float, float]
@@ -53,6 +54,7 @@ class Scene:
     wake: Floats  # where the ship has been, shape (n, 2)
     course_order: float | None = None  # heading to steer
     waypoints: Floats | None = None  # shape (n, 2)
+    turn_radius: float | None = None  # of the path at its waypoints
     corridor: float | None = None  # half its width
     wind: tuple[float, float] | None = None  # speed, and direction it comes from
     current: tuple[float, float] | None = None  # speed, and direction it sets towards
@@ -126,7 +128,7 @@ class Renderer:
     def _draw_path(self, chart: _Chart, scene: Scene) -> None:
         if scene.waypoints is None:
             return
-        brush, points = self._brush, chart.pixels(scene.waypoints)
+        brush, points = self._brush, chart.pixels(track(scene.waypoints, scene.turn_radius))
         if scene.corridor is not None:
             half = scene.corridor / chart.metres
             for start, end in pairwise(points):
@@ -135,7 +137,7 @@ class Renderer:
             for point in points:
                 brush.circle(CORRIDOR, point, half)
         brush.lines(PATH, points, 2)
-        for point in points:
+        for point in chart.pixels(scene.waypoints):
             brush.circle(WATER, point, 5)
             brush.circle(PATH, point, 5, 2)
 
@@ -268,7 +270,7 @@ class _Chart:
         self.spacing = _round_number(CHART_LENGTHS * scene.length / 6.0)
         self._centre = np.array([scene.x, scene.y])
 
-    def pixels(self, points: Floats) -> Floats:
+    def pixels(self, points: Any) -> Floats:
         """Pixels to the right and down, of the shape of the points."""
         north, east = np.moveaxis((np.asarray(points) - self._centre) / self.metres, -1, 0)
         return np.stack([SIZE / 2.0 + east, SIZE / 2.0 - north], axis=-1)

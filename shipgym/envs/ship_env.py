@@ -170,8 +170,12 @@ class ShipEnv(Remade, gymnasium.Env[Observation, Any]):
     @property
     def corridor(self) -> float | None:
         """Half the width of the corridor along the path, m; None in course keeping."""
-        width = getattr(self.task, "corridor", None)
-        return None if width is None else float(width * self.model.particulars["length"])
+        return self._engine.path_metres("corridor")
+
+    @property
+    def turn_radius(self) -> float | None:
+        """Radius of the turns of the path, m; None where it has none."""
+        return self._engine.path_metres("turn_radius")
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -19,6 +19,7 @@ from .style import label as label
 from .style import layout as layout
 from .style import line as line
 from .style import line_styles as line_styles
+from .style import panels as panels
 from .style import subplots as subplots
 from .style import translucent as translucent
 from .trials import AXES as AXES

@@ -43,6 +43,13 @@ def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: An
     return figure
 
 
+def panels(titles: Sequence[str]) -> tuple[Figure, list[dict[str, int]], int]:
+    """A figure of panels beneath their titles, two a row, the place of each, and the number of rows."""
+    rows = max(-(-len(titles) // 2), 1)
+    figure = subplots(rows, min(len(titles), 2) or 1, titles, vertical_spacing=0.36 / max(rows, 2))
+    return figure, [{"row": k // 2 + 1, "col": k % 2 + 1} for k in range(len(titles))], rows
+
+
 def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:
     """The layout that all figures share: white, a light grid, the legend above.
 

@@ -1,8 +1,9 @@
 """The equations of motion of one ship with her numbers: what every simulation is made from."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -84,6 +85,25 @@ class ManoeuvringModel:
     def dynamics(self) -> Structure | ShipEquations:
         """The table of terms, or the equations of a ship that has her own."""
         return get_dynamics(self.structure) if self.own_table is None else self.own_table
+
+    @property
+    def acceleration_matrix(self) -> Floats:
+        """From the coefficients to those of the accelerations, as `Structure.acceleration_matrix`."""
+        return self.table.acceleration_matrix(self.particulars, self.service_shaft_speed)
+
+    def with_coefficients(self, values: Floats) -> Self:
+        """A copy with other coefficients, in their order, shape (n_coefficients,)."""
+        return replace(self, coefficients=dict(zip(self.coefficients, values.tolist(), strict=True)))
+
+    def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
+        """A copy with the coefficients that follow from those of each regression on accelerations, SI."""
+        stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
+        return self.with_coefficients(np.linalg.solve(self.acceleration_matrix, stacked))
+
+    @property
+    def travel_time(self) -> float:
+        """Time to travel one ship length at service speed, s."""
+        return float(self.particulars["length"] / self.particulars["speed"])
 
     @property
     def vessel(self) -> Vessel:

@@ -111,16 +111,10 @@ class ShipModel(ManoeuvringModel):
         root = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
         rng = np.random.default_rng(seed)
         draws = mean + rng.standard_normal((n, len(mean))) @ root.T
-        tables = self._drawn_tables(n, rng)
+        tables, drawn = self._drawn_tables(n, rng), map(self.with_coefficients, draws)
         return [
-            replace(
-                self,
-                name=f"{self.name}-draw-{i}",
-                coefficients=dict(zip(self.coefficients, draw.tolist(), strict=True)),
-                covariance=None,
-                own_table=tables[i],
-            )
-            for i, draw in enumerate(draws)
+            replace(model, name=f"{self.name}-draw-{i}", covariance=None, own_table=table)
+            for i, (model, table) in enumerate(zip(drawn, tables, strict=True))
         ]
 
     def _drawn_tables(self, n: int, rng: np.random.Generator) -> list[Structure | ShipEquations | None]:

@@ -173,6 +173,12 @@ class Structure:
         memory = self.names("q") if equation == "r" and "q" in self.equations else ()
         return self.names(equation) + memory
 
+    @cached_property
+    def regression_rows(self) -> dict[str, slice]:
+        """Where the coefficients of each regression stand among all of them."""
+        ends = np.cumsum([0, *(len(self.regression_names(q)) for q in self.regressed)]).tolist()
+        return dict(zip(self.regressed, map(slice, ends[:-1], ends[1:]), strict=True))
+
     @property
     def astern(self) -> bool:
         """Whether the shaft may turn astern: a table is taken at its word."""

@@ -20,6 +20,7 @@ from shipgym.errors import InputError
 Floats = NDArray[np.float64]
 NO_TURN = 1e-6  # rad, below which a waypoint only divides a leg
 SHARPEST_TURN = np.radians(150.0)  # beyond it a path doubles back
+ARC_POINTS = np.radians(5.0)  # between points of a turn that is drawn
 FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the earth
 
 
@@ -230,6 +231,23 @@ def random_path(
     courses = np.cumsum(np.append(random.uniform(-np.pi, np.pi), turns))
     steps = lengths[:, None] * np.stack([np.cos(courses), np.sin(courses)], axis=-1)
     return Path(np.vstack([np.zeros(2), np.cumsum(steps, axis=0)]))
+
+
+def track(waypoints: Floats | None, turn_radius: float | None) -> Floats | None:
+    """Points of the path through waypoints, north and east, m, shape (n, 2), with turns of a radius, m.
+
+    Without a radius it is the waypoints, joined by straight legs.
+    """
+    if waypoints is None or turn_radius is None:
+        return waypoints
+    path = Path(waypoints)
+    pieces = [path.waypoints[:1]]
+    for corner, course, turn in zip(path.waypoints[1:-1], path.courses, path.turns, strict=False):
+        courses = course + np.linspace(0.0, turn, 2 + int(abs(turn) / ARC_POINTS))
+        ahead, aside = np.sin(courses) - np.sin(course), np.cos(course) - np.cos(courses)
+        tangent = abs(np.tan(0.5 * turn)) * np.array([np.cos(course), np.sin(course)])
+        pieces.append(corner + turn_radius * (np.sign(turn) * np.stack([ahead, aside], axis=-1) - tangent))
+    return np.concatenate([*pieces, path.waypoints[-1:]])
 
 
 def _waypoints(given: Any) -> Floats:

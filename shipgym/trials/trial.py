@@ -203,6 +203,11 @@ class Trial:
         settings = self._settings() | {"repaired": counts, "raw": self}
         return Trial(self.t if t is None else t, {**self.channels, **channels}, **settings)
 
+    def part(self, rows: slice, name: str | None = None) -> Trial:
+        """Some of the samples, which are no manoeuvre, as a trial to fit, by the same name or another."""
+        channels = {channel: values[rows] for channel, values in self.channels.items()}
+        return Trial(self.t[rows], channels, name=self.name if name is None else name)
+
     @classmethod
     def from_csv(
         cls,

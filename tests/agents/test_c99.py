@@ -124,6 +124,7 @@ CONTROLLERS = {
     "alos": AdaptiveLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
     "ppo": load_agent("mariner-calm-ppo"),
     "path_ppo": load_agent("container-roll-path-ppo"),
+    "limited": random_policy(base=LQ.from_model(MARINER), action_repeat=3, rate_limit=0.1),
     "orders": random_policy(action="rudder-discrete", frame_stack=3, action_repeat=2),
 }
 SIZES = {
@@ -143,7 +144,7 @@ def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
     random = np.random.default_rng(0)
     numbers = random.normal(0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs)))
     numbers[:, 0] = 0.4 * (np.arange(steps) % 600 > 300)  # the set-point stands first
-    within = 1e-12 if name not in ("ppo", "path_ppo", "orders") else 1e-6
+    within = 1e-12 if name not in ("ppo", "path_ppo", "limited", "orders") else 1e-6
     for row in numbers:
         expected = bridge.step(dict(zip(source.inputs, row.tolist(), strict=True)))
         assert abs(step(state, row.ctypes.data) - expected) <= within
@@ -191,6 +192,12 @@ def unwritable(x):
 def test_python_that_is_not_arithmetic_is_refused_with_its_line():
     with pytest.raises(InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"):
         Translator({}, "it").function(unwritable, float)
+
+
+def test_a_lambda_is_refused():
+    double = lambda x: 2 * x  # noqa: E731
+    with pytest.raises(InputError, match=r"line 1: 'double = lambda x: 2 \* x' found, which cannot be"):
+        Translator({}, "it").function(double, float)
 
 
 def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):

@@ -1,5 +1,6 @@
 """Jobs give the same results wherever they run, outlive their workers, and are not done twice."""
 
+import builtins
 import inspect
 import json
 import math
@@ -18,6 +19,7 @@ import numpy as np
 import pytest
 
 from agents.engines import ray_engine
+from agents.engines.job import with_modules
 from agents.engines.jobs import JobError, WorkerDiedError, run_jobs
 from agents.engines.ray_engine import check_answers
 from agents.engines.serialisation import pack, unpack
@@ -280,3 +282,14 @@ def test_packing_keeps_types_shapes_and_bits():
     for wrong in (object(), {3: 1}, np.array([None])):
         with pytest.raises(TypeError, match="found in a result"):
             pack(wrong)
+
+
+def test_a_job_finds_modules_of_the_working_folder_registered(tmp_path, monkeypatch):
+    (tmp_path / "named_by_a_user.py").write_text("import builtins\nbuiltins.registered_by_a_user = 7\n")
+    monkeypatch.chdir(tmp_path)
+    path = list(sys.path)
+    done = with_modules(lambda job: job["k"] * builtins.registered_by_a_user, ["named_by_a_user"], {"k": 6})
+    monkeypatch.delitem(sys.modules, "named_by_a_user")
+    monkeypatch.delattr(builtins, "registered_by_a_user")
+    assert done == 42
+    assert sys.path == path

@@ -99,6 +99,23 @@ def test_an_output_is_held_while_the_base_goes_on():
     np.testing.assert_array_equal(silent.predict(SEEN[2], state)[0], silent.predict(SEEN[2])[0])
 
 
+def test_what_is_added_changes_by_no_more_than_the_rate_limit_in_an_interval():
+    policy = random_policy(base=LQ_MARINER, action_repeat=4, rate_limit=0.1)
+    state, before, reached = None, np.zeros((4, 1)), []
+    for step in range(24):
+        seen = SEEN[step % 4 : step % 4 + 4] * 3.0
+        _, state = policy.predict(seen, state, np.full(4, step == 0))
+        outputs, now = np.split(state.repeated[:, 1:], 2, axis=1)
+        np.testing.assert_allclose(now - before, np.clip(outputs.clip(-1, 1) - before, -0.1, 0.1), atol=1e-6)
+        reached.append(np.isclose(now, outputs.clip(-1, 1)))
+        before = now
+    assert 0.1 < np.mean(reached) < 0.9
+    _, state = policy.predict(SEEN[:4], state, np.full(4, True))
+    assert np.abs(state.repeated[:, 2]).max() <= 0.1 + 1e-6  # an episode begins with the base alone
+    with pytest.raises(InputError, match=r"rate_limit: 0\.1 found with discrete orders"):
+        random_policy(action="rudder-discrete", rate_limit=0.1)
+
+
 def test_what_was_no_number_is_not_held():
     policy = random_policy(action_repeat=4)
     broken, state = policy.predict(np.where(np.arange(8) == 2, np.nan, SEEN[0]))

@@ -22,6 +22,7 @@ POLICIES = {
     "plain": random_policy(),
     "frame_stack": random_policy(frame_stack=3),
     "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, action_repeat=2),
+    "limited": random_policy(base=PID.from_model(MARINER), action_repeat=2, rate_limit=0.1),
     "discrete": random_policy(action="rudder-discrete"),
     "shielded": Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)),
     "shielded pid": Shielded.from_model(MARINER, PID.from_model(MARINER)),
@@ -257,6 +258,7 @@ def test_older_files_are_read_and_a_run_s_folder_names_its_agent(tmp_path):
         content = json.loads((tmp_path / "agent.json").read_text())
         content["history"] = content.pop("frame_stack")
         assert content.pop("action_repeat") == (repeats or 1)
+        assert content.pop("rate_limit") == 2.0
         content |= {} if repeats is None else {"hold": repeats}
         (tmp_path / "agent.json").write_text(json.dumps(content))
         np.testing.assert_array_equal(steered(load_agent(tmp_path)), steered(POLICIES[name]))

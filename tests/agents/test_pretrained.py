@@ -13,6 +13,8 @@ from agents.training.plan import Given, make_plan
 from agents.training.settings import present_names
 
 SUITE = load_suite()
+SECOND = [task for task in load_suite("shipgym-v2").tasks if task.on == "ship"]
+SEEDS = 3  # training seeds of the second suite's agents
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode
 
 
@@ -29,7 +31,8 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
     check_fits(agent, task.task, task.ship, task.name)
     assert agent.model_sha256 == model_hash(task.ship)
     assert path.stat().st_size + path.with_suffix(".safetensors").stat().st_size < 300_000
-    record = {**agent.training, "settings": present_names(agent.training["settings"])}
+    later = {"rate_limit": 2.0, "model_uncertainty": "none"}  # settings that there were none of then
+    record = {**agent.training, "settings": later | present_names(agent.training["settings"])}
     assert record["task"] == task.name
     assert f"--task {task.name} --seed {record['seed']}" in record["command"]
     commanded = make_plan(Given("ppo", task=task.name, seed=record["seed"])).configuration()
@@ -40,6 +43,26 @@ def test_each_task_has_an_agent_with_a_whole_record(task):
         assert run["held_out_cost"] == pytest.approx(min(cost for _, cost in run["curve"]), abs=1e-3)
     for first, last in (record["training_seeds"], record["evaluation_seeds"]):
         assert first <= last < task.seeds[0]
+
+
+@pytest.mark.parametrize("task", SECOND, ids=lambda task: task.name)
+def test_each_task_of_the_second_suite_has_an_agent_of_every_training_seed(task):
+    paths = pretrained(task.name, "ppo")
+    assert [path.stem for path in paths] == [f"{task.name}-ppo-s{seed}" for seed in range(SEEDS)]
+    for seed, agent in enumerate(map(load_agent, paths)):
+        check_fits(agent, task.task, task.ship, task.name)
+        assert agent.model_sha256 == model_hash(task.ship)  # the design model, which is handed out
+        assert agent.rate_limit == 0.1
+        record = agent.training
+        plan = make_plan(Given("ppo", task=task.name, seed=seed))
+        commanded = plan.configuration()
+        assert {name: record[name] for name in commanded} == commanded
+        assert record["held_out_cost"] == pytest.approx(min(cost for _, cost in record["curve"]), abs=1e-3)
+        assert record["curve"][-1][0] == record["steps"] >= plan.settings.total_steps
+        for first, last in (record["training_seeds"], record["evaluation_seeds"]):
+            assert first <= last < task.seeds[0]
+    sizes = [path.stat().st_size + path.with_suffix(".safetensors").stat().st_size for path in paths]
+    assert sum(sizes) < 300_000
 
 
 @pytest.mark.parametrize("name", ["mariner-calm", "container-path"])

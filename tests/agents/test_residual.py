@@ -121,16 +121,18 @@ def test_an_output_beyond_its_limits_counts_as_the_limit():
     np.testing.assert_array_equal(beyond[0], limit[0])
 
 
-def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(tmp_path):
+@pytest.mark.parametrize("rate_limit", [2.0, 0.01])
+def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(rate_limit, tmp_path):
     torch.set_num_threads(1)
-    env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, frame_stack=2)
+    asked = {"authority": 0.2, "frame_stack": 2, "rate_limit": rate_limit}
+    env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], **asked)
     scaled = VecNormalize(env, norm_obs=False, gamma=0.9)
     agent = PPO("MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu")
     before = agent.predict(scaled.reset(), deterministic=True)[0]
     agent.learn(128)
     LearnedPolicy.from_sb3(agent, scaled).save(tmp_path / "agent.json")
     policy, bare = load_agent(tmp_path / "agent.json", MARINER), ships(COURSE, 8)
-    twin = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], authority=0.2, frame_stack=2)
+    twin = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], **asked)
     seen, shown, state, starts = bare.reset(), twin.reset(), None, np.ones(8, bool)
     assert not np.array_equal(agent.predict(shown, deterministic=True)[0], before)
     for _ in range(STEPS):

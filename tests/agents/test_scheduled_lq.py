@@ -1,9 +1,12 @@
 """LQ over speed: each speed has the gains of its own design."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from agents import LQ, ScheduledLQ, check_controller, load_agent, sail
+from agents.controllers import scheduled_lq
 from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
@@ -86,3 +89,10 @@ def test_speeds_that_do_not_rise_are_refused():
         InputError, match=r"speeds: \[7\.0, 5\.0\] found, expected at least two in rising order"
     ):
         ScheduledLQ.from_model(MARINER, speeds=[7.0, 5.0])
+
+
+def test_an_unbounded_gain_margin_is_a_million(monkeypatch):
+    margins = SimpleNamespace(gain_margin=np.inf, phase_margin_deg=61.0)
+    monkeypatch.setattr(scheduled_lq, "compensator_margins", lambda *_: margins)
+    design = ScheduledLQ.from_model(MARINER, speeds=[6.0, 8.0]).design
+    assert (design["least_gain_margin"], design["least_phase_margin_deg"]) == (1e6, 61.0)

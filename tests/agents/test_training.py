@@ -17,6 +17,7 @@ from agents.cli import app
 from agents.rollouts.rollout import episode_costs
 from agents.training import training
 from agents.training.algorithms import make_agent, make_ships, set_deviation
+from agents.training.bases import design_base
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.training.training import train
 from shipgym.errors import InputError
@@ -76,7 +77,7 @@ def stopping_at(steps):
 @pytest.mark.parametrize(
     ("algorithm", "settings"),
     [
-        ("ppo", {"frame_stack": 2, "base": "lqg", "authority": 0.5, "action_repeat": 3}),
+        ("ppo", {"frame_stack": 2, "base": "lqg", "authority": 0.5, "action_repeat": 3, "rate_limit": 0.1}),
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
@@ -141,6 +142,21 @@ def test_randomised_ships_sail_all_seas_at_many_speeds():
     assert options["speed_range"] == (0.8, 1.1)
     assert "model_uncertainty" not in options  # a reference ship has no covariance
     assert plan.task.task.seas == make_plan(Given("ppo", task="mariner-current")).task.task.seas
+
+
+def test_agents_of_the_second_suite_learn_over_drawn_models_and_never_see_the_ship():
+    plan = make_plan(Given("ppo", task="roll-limit"))
+    assert (plan.task.behind, plan.task.far, plan.task.sailed) == ("", {}, plan.task.parts)
+    assert training_options(plan) == {**plan.task.options, "model_uncertainty": "covariance"}
+    assert design_base(plan.settings.base, plan.task).kind == "wheel-over"
+    before = make_plan(Given("ppo", task="mariner-current"))
+    assert training_options(before) == before.task.options
+    assert (before.settings.rate_limit, plan.settings.rate_limit) == (2.0, 0.1)
+
+
+def test_the_learning_rate_falls_to_nothing_and_no_lower():
+    agent = make_agent(tiny("ppo", schedule="linear"), None)
+    assert agent.lr_schedule(-0.1) == 0.0 < agent.lr_schedule(0.1)
 
 
 def test_agents_have_the_settings():

@@ -16,7 +16,6 @@ from identification.regression.preprocess import (
     smooth_kinematics,
     smoothed_channels,
 )
-from identification.regression.preprocess.kinematics import current_of
 from identification.regression.preprocess.noise import is_noisy, noise_ratio
 from identification.regression.preprocess.spline import Reinsch
 from shipgym import InputError, ShipModel, Trial
@@ -103,12 +102,6 @@ def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
     for channel in ("psi", "r", "u", "v"):
         before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
         assert after < 0.7 * before
-
-
-def test_unknown_current_is_found(mariner: ShipModel, record: Callable[..., Trial]) -> None:
-    run = record(zigzag(mariner, 20, 20, duration=200, dt=0.1), 10, 0.3, 5)
-    drifted = run.with_channels({"x": run["x"] + 0.4 * run.t, "y": run["y"] - 0.7 * run.t})
-    assert current_of(drifted) == pytest.approx((0.4, -0.7), abs=0.03)
 
 
 def test_preprocessing_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:

@@ -148,6 +148,11 @@ def test_one_heading_is_left_as_it_is_with_a_word(mariner: ShipModel, logs: list
     (found,), report = in_still_water([logs[1]], Options(), mariner.particulars)
     assert found is logs[1]
     assert "zigzag: no current is taken out: the trials keep" in report["sea_remarks"][0]
+    (row,) = report["currents"].values()
+    assert not {"standard_errors", "probability"} & row.keys()
+    assert (
+        "a guess without an interval, as the trials keep to one heading; left in" in sea_sentences(report)[0]
+    )
 
 
 def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:

@@ -13,6 +13,7 @@ import pytest
 
 import shipgym
 from shipgym.engine import mathematics
+from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
 from shipgym.engine.specialise import fingerprint
@@ -133,3 +134,11 @@ def test_the_form_of_a_ship_is_compiled_and_may_be_chosen():
 def test_no_text_of_a_file_becomes_part_of_a_program():
     source = accelerations_source({"r": Sum((Term("import os", (("r", 1),)),), (0,), 2)})
     assert "import" not in source
+
+
+def test_a_reason_that_numba_colours_is_the_same_reason():
+    plain = 'Failed in step\nUnknown attribute "_replace"\n\nFile "own.py", line 25:\ndef f(\nat own.py (25)'
+    coloured = plain.replace("Unknown", "\x1b[1m\x1b[31mUnknown").replace("Failed", "\x1b[1mFailed")
+    said = explanation(ValueError(plain), "own")
+    assert said == explanation(ValueError(coloured), "own")
+    assert said == 'own: cannot be compiled in f (own.py, line 25): Unknown attribute "_replace"'

@@ -16,6 +16,7 @@ def states(**more):
     return known | more
 
 
+NUMBERS = ("dt", "length", "beam", "rudder_limit", "corridor", "turn_radius")
 EPISODE = Episode(
     environment="shipgym/PathFollowing-v0",
     model="mariner",
@@ -31,6 +32,7 @@ EPISODE = Episode(
     info={"cross_track": np.linspace(0.0, 1.0, STEPS + 1)},
     waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
     corridor=60.0,
+    turn_radius=300.0,
     arguments={"model": "mariner", "sea": {"wind": None}},
     seed=2**100,
     number=3,
@@ -48,7 +50,7 @@ def test_what_is_read_is_what_was_written_to_the_last_digit(tmp_path):
         assert all(np.array_equal(written[key], found[key]) for key in written)
     for name in ("actions", "rewards", "waypoints", "t"):
         assert np.array_equal(getattr(EPISODE, name), getattr(read, name))
-    for name in ("environment", "model", "dt", "length", "beam", "rudder_limit", "corridor", "arguments"):
+    for name in (*NUMBERS, "environment", "model", "arguments"):
         assert getattr(EPISODE, name) == getattr(read, name)
     for name in ("seed", "number", "terminated", "truncated", "success"):
         assert getattr(EPISODE, name) == getattr(read, name)

@@ -68,6 +68,7 @@ def test_a_ship_that_capsizes_is_an_error_even_if_nothing_else_feels_her_roll():
     assert abs(error.value.state["phi"]) < np.pi / 2
 
 
+@pytest.mark.compiled
 def test_a_step_that_is_far_too_long_is_suspected():
     with pytest.raises(UnstableModelError, match="or the step is far too long"):
         manoeuvres.zigzag(load_model("mariner"), dt=100.0)

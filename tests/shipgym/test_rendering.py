@@ -23,11 +23,13 @@ from shipgym.envs.rendering import (
     Scene,
 )
 from shipgym.sea import Current, Weather, Wind
+from shipgym.tasks.guidance import track
 
 LENGTH, BEAM = 160.0, 40.0
 SHIP = Scene(5000.0, -300.0, 0.0, 0.0, LENGTH, BEAM, np.radians(35.0), np.zeros((0, 2)))
 CHART = slice(150, 520)  # rows without read-outs, compass and gauge
 METRES = 14.0 * LENGTH / SIZE
+PLACES = ((200.0, -300.0), (182.8, -182.8))  # m north and east of a ship, on a leg and on an arc
 
 
 @pytest.fixture(scope="module")
@@ -262,3 +264,19 @@ def test_a_corridor_is_drawn_around_its_path(sketch):
     assert width == pytest.approx(100.0)
     assert [radius for _, radius in found.of("circle", CORRIDOR)] == [pytest.approx(50.0 / METRES)] * 2
     assert len(found.of("circle", PATH)) == 2
+
+
+def test_the_turns_of_a_planned_path_are_arcs_that_touch_both_legs(renderer):
+    corner = np.array([[4000.0, 0.0], [5200.0, 0.0], [5200.0, 1200.0]])  # 90 deg to starboard
+    points = track(corner, 400.0)
+    inside = np.hypot(points[:, 0] - 4800.0, points[:, 1] - 400.0)  # from the centre of the turn
+    arc = inside < 401.0
+    np.testing.assert_allclose(inside[arc], 400.0)
+    np.testing.assert_allclose(points[arc][[0, -1]], [[4800.0, 0.0], [5200.0, 400.0]], atol=1e-9)
+    np.testing.assert_allclose(track(corner * [1, -1], 400.0), points * [1, -1])
+    assert track(corner, None) is corner
+    scene = replace(SHIP, x=4900.0, y=300.0, waypoints=corner)
+    for radius, seen in ((None, (200.0, -300.0)), (400.0, (182.8, -182.8))):  # of the leg, of the arc
+        north, east = where(renderer.draw(replace(scene, turn_radius=radius)), PATH)
+        near = {place: (np.hypot(north - place[0], east - place[1]) < 4 * METRES).any() for place in PLACES}
+        assert near == {place: place == seen for place in PLACES}

@@ -14,6 +14,7 @@ from shipgym.engine.envelope import Envelope as EngineEnvelope
 from shipgym.engine.envelope import Four, Triangle, envelope_distance, outside_range
 from shipgym.engine.motion import Motion
 from shipgym.ships import Envelope
+from shipgym.ships.envelope import smallest_ellipsoid
 from shipgym.ships.simulate import open_loop
 
 
@@ -208,6 +209,13 @@ def test_an_ellipsoid_holds_its_samples(angle, stretch, spread):
     assert distances.max() == pytest.approx(1.0)
     away = envelope.centre + 3.0 * (points[distances.argmax()] - envelope.centre)
     assert envelope.distance(*away) == pytest.approx(3.0)
+
+
+def test_the_smallest_ellipsoid_holds_its_points_within_the_tolerance():
+    points = np.random.default_rng(5).standard_normal((200, 4))
+    centre, form = smallest_ellipsoid(points, 0.01)
+    distances = np.einsum("ij,jk,ik->i", points - centre, form, points - centre)
+    assert 1.0 <= distances.max() <= 1.0 + 5 / 4 * 0.01  # of lifted points it is (n + 1) / n times
 
 
 def test_what_cannot_be_simulated_or_sampled_is_refused():

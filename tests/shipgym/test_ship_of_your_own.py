@@ -84,10 +84,11 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         ("fabs(u) * u", "fabs(w) * u", r"accelerations .*tug\.py, line 25.*name 'w' is not defined"),
         ("rdot, 0.0, 0.0\n", "rdot\n", "accelerations returns .*expected five numbers"),
         ("c.N_v * U", "c.N_w * U", r"accelerations .*tug\.py, line 27.*no attribute 'N_w'"),
-        (
+        pytest.param(
             "c.X_nn * fabs(n) * n",
             "c.X_nn * motion._replace(n=n).n",
             r"cannot be compiled in accelerations .*line 25.*_replace",
+            marks=pytest.mark.compiled,
         ),
         ("c.N_d * U * U", "-c.N_d * U * U", "a positive rudder turns to starboard"),
     ],

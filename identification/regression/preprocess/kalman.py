@@ -2,20 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from shipgym.arrays import Floats
-
-
-@dataclass(frozen=True, eq=False)
-class Smoothed:
-    """A smoothed course."""
-
-    states: Floats  # shape (n_samples, n_states)
-    variances: Floats  # shape (n_samples, n_states)
-    log_likelihood: float  # of the measurements, but for a constant
 
 
 def smooth_linear(
@@ -27,7 +16,7 @@ def smooth_linear(
     start: Floats,
     start_variances: Floats,
     only_likelihood: bool = False,
-) -> Smoothed:
+) -> tuple[Floats, float]:
     """Smooth x_k+1 = F_k x_k + w_k, y_k = H x_k + e_k (Rauch, Tung & Striebel 1965, AIAA Journal 3(8)).
 
     Measurements are taken in one at a time, in Joseph's form, so that nothing is inverted. `transitions`,
@@ -35,7 +24,8 @@ def smooth_linear(
     n_states); `observation`: H, shape (n_channels, n_states); `variances`: of e, above 0, shape
     (n_channels,); `measured`: y; a value that is not finite is a missing one, shape (n_samples, n_channels);
     `start`, `start_variances`: of the state at the first sample, shape (n_states,); `only_likelihood`:
-    whether to filter only; the states are then the filtered ones.
+    whether to filter only; the states are then the filtered ones. Returns the states, shape (n_samples,
+    n_states), and the logarithm of the measurements' likelihood but for a constant.
     """
     n, size = len(measured), len(start)
     ahead, filtered = np.empty((2, n, size)), np.empty((2, n, size, size))
@@ -57,10 +47,9 @@ def smooth_linear(
             p = left @ p @ left.T + variance * np.outer(gain, gain)
             likelihood -= 0.5 * (np.log(innovation_variance) + error * error / innovation_variance)
         ahead[1, k], filtered[1, k] = x, p
-    states, covariances = ahead[1], filtered[1]
+    states = ahead[1]
     if not only_likelihood:
         for k in range(n - 2, -1, -1):
-            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ covariances[k]).T
+            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ filtered[1, k]).T
             states[k] += gain @ (states[k + 1] - ahead[0, k + 1])
-            covariances[k] += gain @ (covariances[k + 1] - filtered[0, k + 1]) @ gain.T
-    return Smoothed(states, np.diagonal(covariances, axis1=1, axis2=2).copy(), likelihood)
+    return states, likelihood

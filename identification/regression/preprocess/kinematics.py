@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from identification.regression.preprocess.kalman import Smoothed, smooth_linear
+from identification.regression.preprocess.kalman import smooth_linear
 from identification.regression.preprocess.noise import NOISY, noise_level, noise_ratio
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
@@ -18,120 +19,83 @@ PLANE = ("x", "y", "u", "v")
 LONGEST_SEARCH = 500  # samples, from which the roughness of the motion is found
 DECADES = 4.0  # to either side of the first guess of the roughness
 LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels without noise
-CURRENT = 2.0  # m/s, standard deviation of an unknown current
 
 
-def smooth_kinematics(trial: Trial, current: bool = False) -> Trial:
+def smooth_kinematics(trial: Trial) -> Trial:
     """Smooth heading and yaw rate, then positions and velocities at that heading.
 
     Accelerations are random walks whose roughness is that of greatest likelihood; with the heading known,
     positions and velocities are linear in each other, so that two linear smoothers do. `trial`: with at least
-    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded; `current`: whether u and v
-    are through water that moves over the ground with an unknown steady current; then positions are needed.
-    Channels that are not recorded are not added. `raw` is the trial as it was. Raises InputError for a trial
-    with neither psi nor r, or a current without positions.
+    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded. Channels that are not
+    recorded are not added. `raw` is the trial as it was. Raises InputError for a trial with neither psi nor
+    r.
     """
     if not {"psi", "r"} & trial.channels.keys():
         raise InputError(
             f"trial {trial.name!r}: neither psi nor r found, expected the heading or the yaw rate to smooth "
             'the kinematics by; name its column, or choose preprocessing = "spline"'
         )
-    if current and not {"x", "y", "psi", "u", "v"} <= trial.channels.keys():
-        raise InputError(
-            f"trial {trial.name!r}: a current is to be found from {sorted(trial.channels)}, expected x, y, "
-            "psi, u and v; leave the current out"
-        )
     heading = _smooth_heading(trial)
     found: dict[str, Floats] = dict(heading)
     if {"u", "v"} & trial.channels.keys() or {"x", "y"} <= trial.channels.keys():
-        found |= _smooth_plane(trial, heading["psi"], current)
+        found |= _smooth_plane(trial, heading["psi"])
     return trial.with_channels({name: found[name] for name in found if name in trial})
-
-
-def current_of(trial: Trial) -> tuple[float, float]:
-    """Steady current that makes positions and velocities through water agree, north and east, m/s.
-
-    Raises InputError for a trial without positions, heading and velocities.
-    """
-    smooth_kinematics(trial, current=True)
-    found = _smooth_plane(trial, _smooth_heading(trial)["psi"], True)
-    return float(found["current_north"][0]), float(found["current_east"][0])
 
 
 def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     """Heading (from 0 where it is not recorded) and yaw rate."""
-    t = trial.t
     names = [name for name in HEADING if name in trial]
     if not _noisy(trial, names) and "psi" in names:
         return {name: trial[name] for name in names}
-    h = np.diff(t)
-    transitions = _integrators(h)
-    observation = np.eye(3)[[HEADING.index(name) for name in names]]
-    start = np.array([trial[name][0] if name in trial else 0.0 for name in HEADING] + [0.0])
-    start_variances = np.array([1.0, 1e-2, 1.0])
-    measured = np.column_stack([trial[name] for name in names])
-    variances = _variances(trial, names)
-
-    def run(roughness: float, rows: slice, quick: bool) -> Smoothed:
-        process = roughness * _random_walk(h)
-        steps = slice(rows.start, rows.stop - 1)
-        return smooth_linear(
-            transitions[steps],
-            process[steps],
-            observation,
-            variances,
-            measured[rows],
-            start,
-            start_variances,
-            quick,
-        )
-
-    smoothed = _at_best_roughness(run, len(t), _first_guess(trial, "r" if "r" in trial else "psi"))
-    return {"psi": smoothed.states[:, 0], "r": smoothed.states[:, 1]}
+    h = np.diff(trial.t)
+    motion = _Motion((*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0))
+    states = motion.smoothed(trial, names, "r" if "r" in trial else "psi")
+    return {name: states[name] for name in HEADING}
 
 
-def _smooth_plane(trial: Trial, psi: Floats, current: bool) -> dict[str, Floats]:
-    """Position, surge and sway, and a current, at a known heading."""
+def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
+    """Position, surge and sway at a known heading."""
     names = [name for name in PLANE if name in trial]
-    if not _noisy(trial, names) and not current:
+    if not _noisy(trial, names):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
-    size = 8 if current else 6
-    transitions = _plane_transitions(h, psi, current)[:, :size, :size]
-    observation = np.eye(size)[[PLANE.index(name) for name in names]]
-    start = np.zeros(size)
-    start[:4] = [trial[name][0] if name in trial else 0.0 for name in PLANE]
-    start_variances = np.array([1e4, 1e4, 1e2, 1e2, 1.0, 1.0] + [CURRENT**2] * 2)[:size]
-    measured = np.column_stack([trial[name] for name in names])
-    variances = _variances(trial, names)
-    walk = _random_walk(h)
-    shape = np.zeros((len(h), size, size))
+    walk, process = _random_walk(h), np.zeros((len(h), 6, 6))
     for first in (2, 3):
         axes = np.array([first, first + 2])
-        shape[:, axes[:, None], axes] = walk[:, 1:, 1:]
-
-    def run(roughness: float, rows: slice, quick: bool) -> Smoothed:
-        steps = slice(rows.start, rows.stop - 1)
-        process = roughness * shape[steps]
-        return smooth_linear(
-            transitions[steps], process, observation, variances, measured[rows], start, start_variances, quick
-        )
-
-    states = _at_best_roughness(run, len(psi), _first_guess(trial, "u" if "u" in trial else "x")).states
-    columns = (*PLANE, "udot", "vdot", "current_north", "current_east")
-    return dict(zip(columns, states.T, strict=False))
+        process[:, axes[:, None], axes] = walk[:, 1:, 1:]
+    transitions, start_variances = _plane_transitions(h, psi), (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
+    motion = _Motion((*PLANE, "udot", "vdot"), transitions, process, start_variances)
+    return motion.smoothed(trial, names, "u" if "u" in trial else "x")
 
 
-def _at_best_roughness(run: Callable[[float, slice, bool], Smoothed], n: int, guess: float) -> Smoothed:
-    """The smoother at the roughness of greatest likelihood on the first samples."""
-    some = slice(0, min(n, LONGEST_SEARCH))
-    best = minimize_scalar(
-        lambda decade: -run(guess * 10.0**decade, some, True).log_likelihood,
-        bounds=(-DECADES, DECADES),
-        method="bounded",
-        options={"xatol": 0.1},
-    )
-    return run(guess * 10.0 ** float(best.x), slice(0, n), False)
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """States that are integrals of a random walk of the acceleration, arguments of `smooth_linear`."""
+
+    columns: tuple[str, ...]
+    transitions: Floats
+    process: Floats  # by unit of roughness
+    start_variances: tuple[float, ...]
+
+    def smoothed(self, trial: Trial, names: Sequence[str], guessed_by: str) -> dict[str, Floats]:
+        """States by column, at the roughness of greatest likelihood on the first samples."""
+        observation = np.eye(len(self.columns))[[self.columns.index(name) for name in names]]
+        start = np.array([trial[name][0] if name in names else 0.0 for name in self.columns])
+        measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
+        guess = _first_guess(trial, guessed_by)
+
+        def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
+            process = guess * 10.0**decade * self.process[: rows - 1]
+            return smooth_linear(
+                self.transitions[: rows - 1], process, observation, variances, measured[:rows], start,
+                np.array(self.start_variances), quick,
+            )  # fmt: skip
+
+        best = minimize_scalar(
+            lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True)[1],
+            bounds=(-DECADES, DECADES), method="bounded", options={"xatol": 0.1},
+        )  # fmt: skip
+        return dict(zip(self.columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
 
 def _first_guess(trial: Trial, channel: str) -> float:
@@ -168,16 +132,14 @@ def _random_walk(h: Floats) -> Floats:
     return found
 
 
-def _plane_transitions(h: Floats, psi: Floats, current: bool) -> Floats:
-    """Transitions of x, y, u, v, their accelerations and the current; mean heading over each step."""
-    found = np.tile(np.eye(8), (len(h), 1, 1))
+def _plane_transitions(h: Floats, psi: Floats) -> Floats:
+    """Transitions of x, y, u, v and their accelerations; mean heading over each step."""
+    found = np.tile(np.eye(6), (len(h), 1, 1))
     cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
     sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
     for axis, parts in enumerate(((cosine, -sine), (sine, cosine))):
         for k, part in enumerate(parts):
             found[:, axis, 2 + k] = h * part
             found[:, axis, 4 + k] = 0.5 * h**2 * part
-        if current:
-            found[:, axis, 6 + axis] = h
     found[:, 2, 4] = found[:, 3, 5] = h
     return found

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
-from identification.regression.coefficients import with_accelerations
 from identification.regression.samples import Samples, build_samples
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.structures import ZHU, accelerations
@@ -198,4 +197,4 @@ def spline_fit(trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int
         accelerations[q][list(chosen)] = estimator.fit(
             samples.features[q][:, list(chosen)], samples.targets[q]
         ).coef_
-    return with_accelerations(blank, accelerations)
+    return blank.with_accelerations(accelerations)

@@ -1,0 +1,51 @@
+"""Where predictions start: measured velocities stay, derived ones are estimated."""
+
+import numpy as np
+import pytest
+
+from identification.validation.prediction import predict
+from identification.validation.start import with_start
+from shipgym import Trial, load_model
+from shipgym.manoeuvres import turning_circle, zigzag
+
+
+def as_derived(run, spoiled, drop=()):
+    """The run as a log with positions and heading only has it: the first velocities wrong."""
+    channels = {name: values for name, values in run.channels.items() if name not in drop}
+    for name, error in spoiled.items():
+        channels[name] = np.append(run[name][0] + error, run[name][1:])
+    return Trial(run.t, channels, derived=frozenset("uvr"), length=run.length)
+
+
+@pytest.mark.parametrize("drop", [(), ("x", "y")])
+def test_a_start_that_was_derived_wrong_is_found_again(drop):
+    ship = load_model("mariner")
+    run = turning_circle(ship, -25.0, 500.0, 1.0)
+    log = as_derived(run, {"u": -0.4, "v": 0.5, "r": 0.008}, drop)
+    found = with_start(ship, log)
+    for name, most in (("u", 0.01), ("v", 0.01), ("r", 1e-4)):
+        assert found[name][0] == pytest.approx(run[name][0], abs=most)
+    assert all(np.array_equal(found[name][1:], log[name][1:]) for name in "uvr")
+    again = predict(ship, log)
+    assert np.degrees(np.abs(again["psi"] - run["psi"]).max()) < 0.05
+
+
+def test_noise_of_a_log_leaves_a_start_within_its_own_size():
+    ship = load_model("mariner")
+    run = zigzag(ship, duration=300.0, dt=1.0)
+    rng = np.random.default_rng(3)
+    noisy = run.with_channels(
+        {"psi": run["psi"] + np.radians(0.1) * rng.standard_normal(len(run))}
+        | {name: run[name] + 0.3 * rng.standard_normal(len(run)) for name in "xy"}
+    )
+    found = with_start(ship, as_derived(noisy, {"v": 0.5, "r": 0.008}))
+    assert abs(found["v"][0]) < 0.1
+    assert abs(found["r"][0]) < 0.001
+
+
+def test_measured_velocities_and_short_records_stay():
+    ship = load_model("mariner")
+    run = zigzag(ship, duration=300.0, dt=1.0)
+    assert with_start(ship, run) is run
+    short = as_derived(turning_circle(ship, 20.0, 300.0, 20.0), {"v": 0.5})
+    assert with_start(ship, short) is short
