@@ -23,8 +23,8 @@ def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> 
     """Write episodes of one environment as a Minari dataset, such as "shipgym/mariner/lq-v0".
 
     Its infos hold all that `RecordEpisode` recorded. Observations are not recorded: each episode is run again
-    from its seed with its actions. `metadata` is for `minari.create_dataset_from_buffers`: author, description
-    and so on. Raises InputError if there is no episode, they are of several environments, one has no seed or
+    from its seed with its actions. `metadata` is for `minari.create_dataset_from_buffers`: author, and so on.
+    Raises InputError if there is no episode, they are of several environments, one has no seed or
     costs something else when it is run again, or Minari is not installed.
     """
     minari = library("minari")
