@@ -156,7 +156,9 @@ def build(folder: Path) -> Path:
 def main() -> None:
     """Check the extras that are named, or all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("names", nargs="*", choices=[*TRIED, []], help="core, or extras; default: all")
+    parser.add_argument(
+        "names", nargs="*", choices=[*TRIED, []], metavar="NAME", help="core, or extras; default: all"
+    )
     for resolution, word in RESOLUTIONS.items():
         parser.add_argument(f"--{word}", dest="only", action="append_const", const=resolution)
     given = parser.parse_args()
