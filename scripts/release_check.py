@@ -162,6 +162,8 @@ def main() -> None:
     for resolution, word in RESOLUTIONS.items():
         parser.add_argument(f"--{word}", dest="only", action="append_const", const=resolution)
     given = parser.parse_args()
+    if unknown := set(given.names) - set(TRIED):
+        parser.error(f"{', '.join(unknown)} found, expected some of {', '.join(TRIED)}")
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         wheel = build(Path(folder))
