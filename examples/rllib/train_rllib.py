@@ -59,7 +59,9 @@ def main() -> None:
     config = (
         PPOConfig()
         .environment("course-keeping", env_config={"model": options.model})
-        .env_runners(num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length=256)
+        .env_runners(
+            num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length="auto"
+        )
         .training(
             lr=1e-3,
             gamma=0.99,
