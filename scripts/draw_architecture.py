@@ -39,6 +39,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "identification.estimators": (1.33, 2, "LS-SVM, recursive, others"),
     "identification.search": (2.67, 2, "bee colony, swarm, grid"),
     "identification.regression": (4, 2, "samples, preprocessing"),
+    "shipgym.interchange": (1.75, 0, "pandas, xarray, MSS"),
     "shipgym.envs": (0.7, 0, "Gymnasium, single and vector"),
     "shipgym.plots": (2.8, 0, "figures"),
     "shipgym.pages": (4, 0, "HTML from templates"),

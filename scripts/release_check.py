@@ -156,10 +156,14 @@ def build(folder: Path) -> Path:
 def main() -> None:
     """Check the extras that are named, or all."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("names", nargs="*", choices=[*TRIED, []], help="core, or extras; default: all")
+    parser.add_argument(
+        "names", nargs="*", choices=[*TRIED, []], metavar="NAME", help="core, or extras; default: all"
+    )
     for resolution, word in RESOLUTIONS.items():
         parser.add_argument(f"--{word}", dest="only", action="append_const", const=resolution)
     given = parser.parse_args()
+    if unknown := set(given.names) - set(TRIED):
+        parser.error(f"{', '.join(unknown)} found, expected some of {', '.join(TRIED)}")
     failed = []
     with tempfile.TemporaryDirectory() as folder:
         wheel = build(Path(folder))

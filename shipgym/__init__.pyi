@@ -1,3 +1,4 @@
+from . import interchange as interchange
 from . import manoeuvres as manoeuvres
 from . import plots as plots
 from . import weather as weather

@@ -157,8 +157,7 @@ def trials_command(
 
 def _print_trials(found: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
-    from agents.cli.terminal import criteria_notes, criteria_table, manoeuvre_table, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import console, criteria_notes, criteria_table, manoeuvre_table, warn
 
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
@@ -216,6 +215,7 @@ def autopilot_command(
 def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
     """Print the result of the chain; fail for an unstable model, and where every design is refused."""
     from agents.cli.terminal import (
+        console,
         criteria_notes,
         criteria_table,
         prediction_table,
@@ -223,7 +223,6 @@ def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bo
         ranking_table,
         warn,
     )
-    from agents.cli.terminal import out as console
     from identification.validation.warnings import held_out_error, model_warnings
 
     if as_json:
@@ -260,8 +259,7 @@ def replay_command(
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
     """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
-    from agents.cli.terminal import answer
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console
     from agents.rollouts.replay_page import write_replay
 
     write_replay(episodes, out)
@@ -277,8 +275,7 @@ def doctor_command() -> None:
     Exits with 1 if something does not work.
     """
     from agents.cli.doctor import examine_installation
-    from agents.cli.terminal import answer
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console
 
     findings = examine_installation()
     answer({"findings": [finding.to_dict() for finding in findings]})

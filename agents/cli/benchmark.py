@@ -138,8 +138,7 @@ def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progres
 def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
     from agents.cli.benchmark_tables import costs_table, ranking_table
-    from agents.cli.terminal import answer, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, warn
 
     answer(result.summary)
     console.print(ranking_table(result))
@@ -163,8 +162,7 @@ def _verify(
     """Print what was compared; fail where it differs."""
     from agents.benchmarking.verification import verify
     from agents.cli.benchmark_tables import verification_table
-    from agents.cli.terminal import answer, err
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, err
 
     with err.status("running a sample again"):
         checks = verify(path, sample=sample, tolerance=tolerance, workers=workers, allow_code=allow_code)

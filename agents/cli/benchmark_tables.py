@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
-from agents.cli.terminal import plain_table
+from agents.cli.terminal import number, plain_table
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -90,11 +90,6 @@ def verification_table(checks: Sequence[Check]) -> Table:
             check.note,
         )
     return table
-
-
-def number(value: float | None, decimals: int) -> str:
-    """A number, a dash where there is none."""
-    return "-" if value is None else f"{value:.{decimals}f}"
 
 
 def between(interval: Mapping[str, Any], decimals: int) -> str:

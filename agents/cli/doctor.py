@@ -6,7 +6,9 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import re
 import tempfile
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -16,19 +18,7 @@ import shipgym
 from agents.output import locks_and_drafts
 from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder, loop_fault, open_folder
 
-NEEDED = (
-    "numpy", "scipy", "numba", "gymnasium", "scikit-learn", "control", "typer", "rich", "platformdirs",
-    "threadpoolctl", "safetensors", "jinja2", "joblib", "lazy-loader",
-    "filelock",
-)  # fmt: skip
-EXTRAS = {
-    "report": ("plotly",),
-    "rl": ("torch", "stable-baselines3", "sb3-contrib"),
-    "ray": ("ray",),
-    "render": ("pygame-ce",),
-    "fmu": ("fmpy",),
-    "nmea": ("pynmea2", "pyserial"),
-}
+OTHERS = ("dev", "docs")  # extras that are no part of what users do
 MARKS = {
     "fine": ("ok", "green"), "absent": ("absent", "dim"), "left": ("left", "yellow"),
     "wrong": ("wrong", "bold red"),
@@ -59,12 +49,14 @@ class Finding:
 def examine_installation() -> list[Finding]:
     """Everything that `shipgym doctor` reports, in order."""
     system = f"{shipgym.__version__}, Python {platform.python_version()}, {platform.platform()}"
+    needed = _declared()
     return [
         Finding("shipgym", "fine", system),
-        *(_installed(name, (name,), "wrong", "shipgym") for name in NEEDED),
+        *(_installed(name, [name], "wrong", "shipgym") for name in needed.pop("", [])),
         *(
             _installed(f"extra {extra}", names, "absent", f"'shipgym[{extra}]'")
-            for extra, names in EXTRAS.items()
+            for extra, names in needed.items()
+            if extra not in OTHERS
         ),
         cache_finding(),
         *left_findings(),
@@ -72,7 +64,18 @@ def examine_installation() -> list[Finding]:
     ]
 
 
-def _installed(what: str, names: tuple[str, ...], otherwise: str, remedy: str) -> Finding:
+def _declared() -> dict[str, list[str]]:
+    """The distributions that shipgym declares to need, by extra, those of no extra by an empty text."""
+    found: dict[str, list[str]] = {}
+    with suppress(importlib.metadata.PackageNotFoundError):  # run from a checkout without installing it
+        for line in importlib.metadata.requires("shipgym") or ():
+            name, _, extra = re.fullmatch(r'([\w.-]+)(.*?extra == "(\w+)")?.*', line).groups()  # type: ignore[union-attr]
+            if name != "shipgym":
+                found.setdefault(extra or "", []).append(name)
+    return found
+
+
+def _installed(what: str, names: list[str], otherwise: str, remedy: str) -> Finding:
     """Versions of distributions, or which of them are missing."""
     versions, missing = [], []
     for name in names:

@@ -38,8 +38,7 @@ def export_command(
 ) -> None:
     """Write an autopilot or a ship model as C99, as an FMU or, of a learned policy, as ONNX."""
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, warn
     from agents.deployment.fmu import write_fmu
     from agents.output import whole_folder
     from agents.policies.onnx_export import export_onnx

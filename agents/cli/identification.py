@@ -58,8 +58,7 @@ def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFil
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
-    from agents.cli.terminal import answer, err, prediction_table, selection_table
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, err, prediction_table, selection_table
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
@@ -98,8 +97,7 @@ def _check_stable(result: IdentificationResult) -> None:
 def _compare(
     read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None]
 ) -> None:
-    from agents.cli.terminal import answer, err, selection_table, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, err, selection_table, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
@@ -139,8 +137,7 @@ def advise_command(
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
     is least certain.
     """
-    from agents.cli.terminal import answer, err
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, err
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
@@ -172,8 +169,7 @@ def reduce_command(
     Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
     model is unstable.
     """
-    from agents.cli.terminal import answer, err, prediction_table
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, err, prediction_table
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.result import FILES

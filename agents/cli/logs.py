@@ -28,8 +28,7 @@ def new_ship_command(
     """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
     import numpy as np
 
-    from agents.cli.terminal import answer, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, warn
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -67,8 +66,7 @@ def look_command(
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
     """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
-    from agents.cli.terminal import answer, warn
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, warn
     from agents.cli.trials_page import check_page
     from shipgym.files import write_text
     from shipgym.pages import render

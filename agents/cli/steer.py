@@ -41,8 +41,7 @@ def steer_command(
     more. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
     """
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console
     from agents.deployment.steering import Limits, steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values

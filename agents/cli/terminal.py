@@ -56,7 +56,7 @@ def _console(**settings: Any) -> Console:
 
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
 out = _console(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
-err = _console(stderr=True)
+console, err = out, _console(stderr=True)
 
 
 def plain_table(title: str, *headings: str) -> Table:
@@ -172,7 +172,7 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
     for name, metrics in result.metrics["trials"].items():
         rmse = metrics["rmse"]
         angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
-        errors = [_number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
+        errors = [number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
         found = Text("ran away", "bold red") if metrics["diverged"] else _indices(metrics)
         table.add_row(PurePath(name).name, metrics["use"], *errors, found)
     return table
@@ -188,7 +188,7 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
     for one in ranking["ranking"]:
         state = "stable" if one["stable"] else Text("unstable", "bold red")
         figures = (("error", 4), ("heading_deg", 2), ("yaw_rate_deg_s", 4), ("ran_away", 0))
-        numbers = (_number(one[name], digits) for name, digits in figures)
+        numbers = (number(one[name], digits) for name, digits in figures)
         table.add_row(one["method"], one["structure"], str(one["coefficients"]), state, *numbers)
     return table
 
@@ -201,8 +201,8 @@ def _indices(metrics: Mapping[str, Any]) -> str:
         "tactical_diameter_lengths": "diameter",
     }
     return "\n".join(
-        f"{text} {_number(found['measured'], 2)} -> {_number(found['predicted'], 2)}"
-        + (f" ({_number(found['closed_loop'], 2)})" if "closed_loop" in found else "")
+        f"{text} {number(found['measured'], 2)} -> {number(found['predicted'], 2)}"
+        + (f" ({number(found['closed_loop'], 2)})" if "closed_loop" in found else "")
         for name, text in names.items()
         if (found := metrics.get(name)) is not None
     )
@@ -215,7 +215,7 @@ def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str 
     table = plain_table(f"Manoeuvres from service speed in {water}", "manoeuvre", "index", ">value", *more)
     for manoeuvre, indices in rows.items():
         for k, (name, index) in enumerate(indices.items()):
-            cells = [manoeuvre if k == 0 else "", name, _number(index.value, 2)]
+            cells = [manoeuvre if k == 0 else "", name, number(index.value, 2)]
             if drawn:
                 cells += [_interval(index.interval), str(index.n_ran_away + index.n_never_reached)]
             table.add_row(*cells)
@@ -236,8 +236,8 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     for name, criterion in criteria.items():
         probability = criterion.probability
         cells = [
-            name, _number(criterion.measured, 2), _number(criterion.value, 2), _interval(criterion.interval),
-            _number(criterion.limit, 2), criterion.unit, _verdict(criterion),
+            name, number(criterion.measured, 2), number(criterion.value, 2), _interval(criterion.interval),
+            number(criterion.limit, 2), criterion.unit, _verdict(criterion),
             "-" if probability is None else f"{100.0 * probability:.1f} %",
             criterion.manoeuvre, criterion.source.rpartition(" ")[2],
         ]  # fmt: skip
@@ -279,7 +279,7 @@ def ranking_table(result: AutopilotResult) -> Table:
             "cost_mean": 2, "cost_quantile_95": 2, "heading_rmse_deg_mean": 2,
             "rudder_travel_deg_min_mean": 1,
         }  # fmt: skip
-        figures = [_number(found[one], decimals) for one, decimals in columns.items()]
+        figures = [number(found[one], decimals) for one, decimals in columns.items()]
         both = [_margin(margins, "gain_margin", 2), _margin(margins, "phase_margin_deg", 1)]
         table.add_row(name.upper(), *figures, *both, str(found["lost_control"]))
     return table
@@ -289,8 +289,9 @@ def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
     """A margin of an autopilot: without bound where null, and none where it is learned."""
     if name not in margins:
         return "-"
-    return "inf" if margins[name] is None else _number(margins[name], decimals)
+    return "inf" if margins[name] is None else number(margins[name], decimals)
 
 
-def _number(value: float | None, decimals: int) -> str:
+def number(value: float | None, decimals: int) -> str:
+    """A number, a dash where there is none."""
     return "-" if value is None else f"{value:.{decimals}f}"

@@ -109,8 +109,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
     """Print costs, and where the agent was written."""
-    from agents.cli.terminal import answer
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console
 
     answer({**result.to_dict(), "agent": str(out / "agent.json")})
     if result.resumed_from is not None:

@@ -86,8 +86,7 @@ def _print_result(found: Tuning, out: Path) -> None:
     """Print trials and where the best settings are."""
     from dataclasses import asdict
 
-    from agents.cli.terminal import answer, plain_table
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console, plain_table
     from agents.training.tuning import BEST
 
     trials = [asdict(trial) for trial in found.trials]

@@ -38,8 +38,7 @@ def warm_command(wanted: Wanted = None, everything: All = False) -> None:
     An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
     simulations in calm water. Writes nothing but the cache (SHIPGYM_CACHE, else the user's cache folder).
     """
-    from agents.cli.terminal import answer
-    from agents.cli.terminal import out as console
+    from agents.cli.terminal import answer, console
     from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
 

@@ -53,13 +53,14 @@ def main() -> None:
         for _ in range(options.nodes - 1):
             cluster.add_node(num_cpus=1)
         options.address = cluster.address
-    if options.address:
-        ray.init(address=options.address, log_to_driver=False)
+    ray.init(address=options.address or "local", log_to_driver=False)
     register_env("course-keeping", lambda config: gym.make("shipgym/CourseKeeping-v0", **config))
     config = (
         PPOConfig()
         .environment("course-keeping", env_config={"model": options.model})
-        .env_runners(num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length=256)
+        .env_runners(
+            num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length="auto"
+        )
         .training(
             lr=1e-3,
             gamma=0.99,
@@ -94,6 +95,9 @@ def main() -> None:
         rmse = episodes.heading_rmse_deg.mean()
         print(f"{name}: mean cost {episodes.cost.mean():.3f}, heading rmse {rmse:.2f} deg")
     algorithm.stop()
+    ray.shutdown()
+    if options.nodes:
+        cluster.shutdown()
 
 
 if __name__ == "__main__":

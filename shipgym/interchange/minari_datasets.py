@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import gymnasium
@@ -20,24 +20,12 @@ DEVIATION = 1e-6  # of rewards that are run again, relative: another processor r
 
 
 def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> MinariDataset:
-    """Write episodes of one environment as a Minari dataset, with all that was recorded in its infos.
+    """Write episodes of one environment as a Minari dataset, such as "shipgym/mariner/lq-v0".
 
-    Their observations are not recorded: each episode is run again from its seed with its actions.
-
-    Parameters
-    ----------
-    episodes : sequence of Episode
-        As `RecordEpisode` writes them, of one environment with the same arguments.
-    dataset_id : str
-        Name of the dataset, such as "shipgym/mariner/lq-v0".
-    **metadata
-        Of `minari.create_dataset_from_buffers`: author, algorithm_name, description and so on.
-
-    Raises
-    ------
-    InputError
-        If there is no episode, they are of several environments, one has no seed or costs something else when
-        it is run again, or Minari is not installed.
+    Its infos hold all that `RecordEpisode` recorded. Observations are not recorded: each episode is run again
+    from its seed with its actions. `metadata` is for `minari.create_dataset_from_buffers`: author, and so on.
+    Raises InputError if there is no episode, they are of several environments, one has no seed or
+    costs something else when it is run again, or Minari is not installed.
     """
     minari = library("minari")
     kinds = {(one.environment, repr(one.arguments)) for one in episodes}
@@ -47,16 +35,15 @@ def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> 
     buffers, facts = [], []
     for k, episode in enumerate(episodes):
         t, series, fact = taken_apart(episode)
+        infos = {name: values.tolist() for name, values in padded(series, len(t)).items()}
         facts.append({KEY: fact})
         last = np.arange(episode.n_steps) == episode.n_steps - 1
-        buffers.append(
-            minari.data_collector.EpisodeBuffer(
-                id=k, seed=episode.seed, observations=_observations(env, episode, f"episodes[{k}]"),
-                actions=episode.actions.astype(np.float32), rewards=episode.rewards,
-                terminations=last & episode.terminated, truncations=last & (not episode.terminated),
-                infos=padded(series, len(t)),
-            )
+        buffer = minari.data_collector.EpisodeBuffer(
+            k, episode.seed, None, _observations(env, episode, f"episodes[{k}]"),
+            episode.actions.astype(np.float32), episode.rewards, last & episode.terminated,
+            last & (not episode.terminated), infos,
         )  # fmt: skip
+        buffers.append(buffer)
     options = {"data_format": "arrow", "eval_env": env, **metadata}
     dataset = minari.create_dataset_from_buffers(dataset_id, buffers, env=env, **options)
     dataset.storage.update_episode_metadata(facts, range(len(facts)))
@@ -66,16 +53,13 @@ def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> 
 
 def from_minari(dataset: MinariDataset) -> list[Episode]:
     """The episodes that `to_minari` wrote. Raises InputError for those of another dataset."""
-    found = []
-    for one, facts in zip(dataset, _facts(dataset), strict=True):
+    found: list[Any] = []
+    facts = dataset.storage.get_episode_metadata(dataset.episode_indices)
+    for one, about in zip(dataset, facts, strict=True):
         series = {name: np.asarray(values) for name, values in one.infos.items()}
-        t = np.arange(len(one.rewards) + 1)  # an episode knows its times
-        found.append(put_together(t, series, facts, "expected a dataset of to_minari"))
+        t = np.arange(len(one.rewards) + 1.0)  # an episode knows its times
+        found.append(put_together(t, series, about, "expected a dataset of to_minari"))
     return found
-
-
-def _facts(dataset: MinariDataset) -> Iterable[dict[str, Any]]:
-    return dataset.storage.get_episode_metadata(dataset.episode_indices)
 
 
 def _observations(env: gymnasium.Env[Any, Any], episode: Episode, where: str) -> Floats:
@@ -89,7 +73,7 @@ def _observations(env: gymnasium.Env[Any, Any], episode: Episode, where: str) ->
     for action in episode.actions:
         observation, reward, *_ = env.step(action.astype(np.float32))
         shown.append(observation)
-        rewards.append(reward)
+        rewards.append(float(reward))
     if not np.allclose(rewards, episode.rewards, rtol=DEVIATION, atol=DEVIATION):
         raise InputError(
             f"{where}: cost {-sum(rewards):.6g} when run again and {-episode.rewards.sum():.6g} as recorded; "

@@ -55,7 +55,7 @@ def from_mss(parameters: Mapping[str, Any], name: str = "mss", water_density: fl
     length than hers, which is in her equations.
     """
     where = "MSS parameters"
-    given = {key: check_number(value, f"{where}: {key}") for key, value in parameters.items()}
+    given: dict[str, Any] = {key: check_number(value, f"{where}: {key}") for key, value in parameters.items()}
     gear = {own: given[key] for key, own in GEAR.items() if key in given}
     if "Xphiphi" in given:
         ship = load_model("container")

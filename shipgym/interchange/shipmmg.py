@@ -17,6 +17,7 @@ from shipgym.ships.conversions import nomoto, nomoto1_ship
 from shipgym.ships.kvlcc2 import Coefficients, particulars
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
 
 #: Fields that are coefficients here, with their names.
 BASIC = {
@@ -64,20 +65,20 @@ def to_shipmmg(model: ShipModel, density: float = 1025.0) -> Parameters:
 
 def from_shipmmg(
     parameters: Mapping[str, Mapping[str, Any]], speed: float, *, shaft_speed: float = 0.0,
-    density: float = 1025.0, length: float | None = None, name: str = "shipmmg",
+    density: float = 1025.0, length: float | None = None, steering: SteeringGear | None = None,
+    name: str = "shipmmg",
 ) -> ShipModel:  # fmt: skip
     """The model of parameters of shipmmg, each table as `dataclasses.asdict` gives it.
 
-    Service speed, m/s, and shaft speed there, 1/s, shipmmg takes for each simulation; a KT model needs the
-    length between perpendiculars, m. Ship and water enter with the sum of their moments of inertia: the
-    ship's becomes that of a radius of gyration of L/4, the water's the rest. Raises InputError for a table or
-    field that is missing, unknown or no number.
+    Service speed, m/s, and shaft speed there, 1/s, shipmmg takes for each simulation, and knows no limits of
+    the steering gear; a KT model needs the length between perpendiculars, m. Ship and water enter with the
+    sum of their moments of inertia: the ship's becomes that of a radius of gyration of L/4, the water's the
+    rest. Raises InputError for a table or field that is missing, unknown or no number.
     """
     if "kt_params" in parameters:
         kt = _numbers(parameters, "kt_params", ("K", "T"))
-        return nomoto1_ship(
-            kt["K"], kt["T"], Particulars(check_number(length, "length"), name, speed=speed), name=name
-        )
+        ship = Particulars(check_number(length, "length"), name, speed=speed)
+        return nomoto1_ship(kt["K"], kt["T"], ship, steering, name)
     basic = _numbers(parameters, "basic_params", (*BASIC, *DERIVED))
     maneuvering = _numbers(parameters, "maneuvering_params", tuple(MANEUVERING))
     L, per_mass = basic["L_pp"], density * 0.5 * basic["L_pp"] ** 2 * basic["d"]
@@ -91,7 +92,8 @@ def from_shipmmg(
     )  # fmt: skip
     return replace(
         kvlcc2_l7("shipmmg"), name=name, particulars=particulars(name, c, basic["B"], speed),
-        coefficients=c._asdict(), service_shaft_speed=shaft_speed,
+        coefficients=c._asdict(), service_shaft_speed=shaft_speed, steering=steering or SteeringGear(),
+        provenance={"source": "shipmmg"},
     )  # fmt: skip
 
 
