@@ -40,9 +40,7 @@ def main() -> None:
     parser.add_argument("--suite", default="shipgym-v2")
     parser.add_argument("--tasks", default="", help="of the search, separated by commas; by default all")
     parser.add_argument("--search", default="", help="contestants to search from, separated by commas")
-    parser.add_argument(
-        "--episodes", type=int, default=N_EPISODES, help="of search and rule, the first so many"
-    )
+    parser.add_argument("--episodes", type=int, default=N_EPISODES, help="of search and rule, the first ones")
     parser.add_argument("--passes", type=int, default=OracleSettings.passes, help="of the search")
     parser.add_argument("--rule", action="store_true", help="only print whether the rule of choice holds")
     asked = parser.parse_args()
