@@ -3,7 +3,7 @@
     shipgym benchmark --suite shipgym-v2 --controllers wheel-over,tuned-wheel-over --out results
     python scripts/best_known.py --suite shipgym-v2 results            # of these results, and what is kept
     python scripts/best_known.py --suite shipgym-v2 results --search lq,tuned-wheel-over --tasks roll-limit
-    python scripts/best_known.py --suite shipgym-v2 results --rule     # markdown for docs/benchmark.md
+    python scripts/best_known.py --suite shipgym-v2 results --rule --episodes 6    # for docs/benchmark.md
 
 `zero` is the mean cost of the contestant `wheel-over`, designed on the model without search. The search
 (`scripts/oracle.py`) goes on, in each episode, from what the best of the contestants named does, on the ship
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -39,13 +40,13 @@ def main() -> None:
     parser.add_argument("--suite", default="shipgym-v2")
     parser.add_argument("--tasks", default="", help="of the search, separated by commas; by default all")
     parser.add_argument("--search", default="", help="contestants to search from, separated by commas")
-    parser.add_argument("--episodes", type=int, default=N_EPISODES, help="of the search, the first so many")
+    parser.add_argument("--episodes", type=int, default=N_EPISODES, help="of search and rule, the first ones")
     parser.add_argument("--passes", type=int, default=OracleSettings.passes, help="of the search")
     parser.add_argument("--rule", action="store_true", help="only print whether the rule of choice holds")
     asked = parser.parse_args()
     known: dict[str, Any] = best_known(asked.suite)
     if asked.rule:
-        print(rule(known, asked.suite, load_results(asked.results[0])))
+        print(rule(known, asked.suite, [load_results(one) for one in asked.results], asked.episodes))
         return
     for folder in asked.results:
         add_results(known, folder, asked.suite)
@@ -98,23 +99,23 @@ def keep(known: dict[str, Any], task: str, costs: NDArray[np.float64], by: str) 
     one["by"] = [by if less else name for less, name in zip(costs < before, names, strict=True)]
 
 
-def rule(known: dict[str, Any], suite: str, result: BenchmarkResult) -> str:
-    """Which tasks leave as much room as the rule of choice asks, in the episodes that were searched."""
-    lines = ["| task | episodes searched | best baseline | its cost | best known | room | rule |"]
-    lines.append("| --- | --- | --- | --- | --- | --- | --- |")
-    baselines = [name for name in result.summary["contestants"] if name not in (*LEARNED, "best-known")]
+def rule(known: dict[str, Any], suite: str, results: Sequence[BenchmarkResult], episodes: int) -> str:
+    """Which tasks leave as much room as the rule of choice asks, in the first so many episodes."""
+    lines = ["| task | best baseline | its cost | best known | room | rule |"]
+    lines.append("| --- | --- | --- | --- | --- | --- |")
     for task in (task for task in load_suite(suite).tasks if task.on == "ship"):
-        one = known[task.name]
-        last = max((i + 1 for i, by in enumerate(one["by"]) if by == SEARCH), default=N_EPISODES)
-        found = {name: result.figures(name, task.name)[:, :last] for name in baselines}
-        costs = {name: float(values.mean()) for name, values in found.items() if values.size}
+        costs = {
+            name: float(one.figures(name, task.name)[:, :episodes].mean())
+            for one in results
+            for name in one.summary["contestants"]
+            if name not in (*LEARNED, "best-known")
+        }
         best = min(costs, key=costs.__getitem__)
-        least = float(np.mean(one["costs"][:last]))
+        least = float(np.mean(known[task.name]["costs"][:episodes]))
         room = 1.0 - least / costs[best]
         robust = "robustness" if task.why.startswith("robustness") else "fails"
         held = "holds" if room >= ROOM else robust
-        numbers = f"{costs[best]:.1f} | {least:.1f} | {room:.1%}"
-        lines.append(f"| {task.name} | {last} | {best} | {numbers} | {held} |")
+        lines.append(f"| {task.name} | {best} | {costs[best]:.1f} | {least:.1f} | {room:.1%} | {held} |")
     return "\n".join(lines)
 
 
