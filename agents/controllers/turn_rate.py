@@ -33,7 +33,7 @@ from shipgym.ships import ShipModel
 from shipgym.ships.linear import linearise, nomoto_of, steady_turn_rudder
 from shipgym.tasks.task import control_interval
 
-GRID = np.arange(0.05, 0.81, 0.05)  # rates of the feed-forward, prime: times speed over length
+GRID = np.arange(0.02, 0.81, 0.02)  # rates of the feed-forward, prime: times speed over length
 LARGEST_RUDDER = 0.6  # share of the rudder limit beyond which no steady turn is tabulated
 COURSE_RUDDER = 0.3  # the same of the rate at which courses are changed, as `wheel_over.TURN_RUDDER`
 DAMPING, PER_LAG, PER_LENGTH = 0.9, 0.3, 2.0  # of the pair of poles; its frequency times lag, length time
@@ -163,13 +163,14 @@ def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:
 
     Raises InputError if the model has none to one of the sides.
     """
-    found = {0.0: neutral}
-    for side in (-1.0, 1.0):
-        for rate in side * GRID / length_time(model):
-            rudder = steady_turn_rudder(model, float(rate))
-            if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
-                break
-            found[float(rate)] = rudder
-    if min(found) == 0.0 or max(found) == 0.0:
-        raise InputError(f"model {model.name!r}: no steady turn found, expected one to either side")
-    return np.array(sorted(found)), np.array([found[rate] for rate in sorted(found)])
+    for slowed in (True, False):  # some models know no loss of speed
+        found = {0.0: neutral}
+        for side in (-1.0, 1.0):
+            for rate in side * GRID / length_time(model):
+                rudder = steady_turn_rudder(model, float(rate), slowed)
+                if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
+                    break
+                found[float(rate)] = rudder
+        if min(found) < 0.0 < max(found):
+            return np.array(sorted(found)), np.array([found[rate] for rate in sorted(found)])
+    raise InputError(f"model {model.name!r}: no steady turn found, expected one to either side")

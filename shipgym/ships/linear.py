@@ -96,17 +96,14 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
     return StraightRunning(found["u"], found["v"], found["delta"], *rest)
 
 
-def steady_turn_rudder(model: ShipModel, rate: float) -> float | None:
+def steady_turn_rudder(model: ShipModel, rate: float, slowed: bool = True) -> float | None:
     """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if none is found.
 
-    The ship loses speed as her surge equation has it.
+    `slowed`: whether the ship loses speed as her surge equation has it, or keeps that of service.
     """
-    names = [name for name in BALANCED_BY if name in model.state_names]
-    for unknowns in (names, [name for name in names if name != "u"]):
-        found = _balance(model, unknowns, rate=rate, drift=1.0)
-        if found is not None and found.get("u", 1.0) > 0.0:
-            return found["delta"]
-    return None
+    unknowns = [name for name in BALANCED_BY if name in model.state_names and (slowed or name != "u")]
+    found = _balance(model, unknowns, rate=rate, drift=1.0)
+    return found["delta"] if found is not None and found.get("u", 1.0) > 0.0 else None
 
 
 def _balance(
