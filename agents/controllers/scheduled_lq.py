@@ -93,7 +93,9 @@ class ScheduledLQ(Controller):
         """
         interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         service = model.particulars["speed"]
-        listed = rising([service * part for part in SPEEDS] if speeds is None else speeds, "speeds", above=0.0)
+        listed = rising(
+            [service * part for part in SPEEDS] if speeds is None else speeds, "speeds", above=0.0
+        )
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
             ship = sample_ship(model, interval, speed=speed)

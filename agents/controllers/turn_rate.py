@@ -16,14 +16,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import NUMBERS, Controller, Range
-from agents.controllers.linear_loop import (
-    ERROR,
-    SIGNALS,
-    YAW_RATE,
-    Compensator,
-    length_time,
-    sample_ship,
-)
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error
 from agents.controllers.scheduled_lq import rising
 from agents.controllers.stateful import Stateful

@@ -50,7 +50,7 @@ class WheelOver(Guided):
             "second_turn_angle",
         ),
     )  # fmt: skip
-    reads: ClassVar[tuple[str, ...]] = ("cross_track", "course_over_ground", "sway", "surge")
+    reads: ClassVar[tuple[str, ...]] = ("cross_track", "course", "sway", "surge")
     gain_names: ClassVar[tuple[str, ...]] = (
         "lookahead", "task_lookahead", "turn_lookahead", "turn_radius", "turn_reach", "crab_share",
         "path_radius",

@@ -35,7 +35,7 @@ def _reads(agent: Any) -> set[str]:
     if not isinstance(agent, Controller):
         base = getattr(agent, "base", None)
         seen = {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
-        return {"course_over_ground" if one in COURSE_ERROR else one for one in seen}
+        return {"course" if one in COURSE_ERROR else one for one in seen}
     if type(agent).steer is not Controller.steer:
         return {*agent.reads}
     used = [signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]]
@@ -79,6 +79,7 @@ class Autopilot:
         self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
         self.limit, given = float(self.scales["rudder"]), getattr(agent, "env_options", {}).get("dt")
+        self.largest = self.limit  # of its orders, rad; may be set lower
         self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
         if isinstance(agent, Controller):
             self.dt = float(agent.design["dt"])
@@ -89,7 +90,7 @@ class Autopilot:
         )
 
     def step(self, given: Mapping[str, float]) -> float:
-        """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""
+        """Ordered rudder, rad, at most `largest`, for the numbers named in `inputs`."""
         error = wrapped(given["set_point"] - given["heading"])
         if isinstance(self.agent, Guided):
             error = self._led(given, error)
@@ -97,10 +98,10 @@ class Autopilot:
         gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
         self.integral = min(max(self.integral + gathered, -reach), reach)
         own = (float(np.sin(error)), float(np.cos(error)), self.last_command, self.integral)
-        off = given["set_point"] - given.get("course_over_ground", 0.0)
+        off = given["set_point"] - given.get("course", 0.0)
         courses = dict(zip(COURSE_ERROR, (np.sin(off), np.cos(off)), strict=True))
         order = self._order({**given, **dict(zip(OWN, own, strict=True)), **courses})
-        self.begins, self.last_command = False, min(max(order, -self.limit), self.limit)
+        self.begins, self.last_command = False, min(max(order, -self.largest), self.largest)
         return self.last_command
 
     def _led(self, given: Mapping[str, float], error: Any) -> Any:
@@ -109,7 +110,7 @@ class Autopilot:
         shift = self.agent.shift([arrays[name] for name in self.agent.turns_ahead])
         shown = shift - np.arctan2(arrays["cross_track"], self.agent.gains["task_lookahead"])
         arrays["heading_error"] = wrapped(error + shown)
-        off = given["set_point"] + shown - given.get("course_over_ground", 0.0)
+        off = given["set_point"] + shown - given.get("course", 0.0)
         arrays |= dict(zip(COURSE_ERROR, (np.sin(off), np.cos(off)), strict=True))
         course, self.guided = self.agent.course(arrays, self.guided)
         return wrapped(error + shift + course)[0]

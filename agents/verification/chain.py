@@ -11,8 +11,7 @@ import numpy as np
 
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
-from agents.controllers.lq import LQ
-from agents.controllers.pid import PID
+from agents.controllers.registry import controller_class, controller_kinds
 from agents.engines.jobs import HERE, JobEngine
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import whole_folder
@@ -21,6 +20,7 @@ from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.refusal import helpful_trial, lost_control, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from agents.verification.tracks import Track, keep_track, track_task
 from identification import IdentificationResult
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
@@ -37,7 +37,8 @@ if TYPE_CHECKING:
     from agents.agent_file import Agent
 
 
-FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
+FILES = ("report.html", "metrics.json", "model.json")  # beside those of the autopilots
+DESIGNS = ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
 LARGEST_SEED = 2**32
 
 #: Told the stage of the work, the units of it done and their total.
@@ -52,18 +53,21 @@ def build_autopilot(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
+    designs: Sequence[str] = DESIGNS,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
-    """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
+    """Identify a ship from its trials, design autopilots, verify them, write the report.
 
-    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the model is
+    The folder holds `report.html`, `metrics.json`, `model.json` and a file of each autopilot, such as
+    `lq.json`; where the model is
     unstable or refused only the first two, and no file of an autopilot that is refused. It is written whole
     or not at all. `ship_file`: the ship file (TOML) with its trials; `out`: folder of the results; an
     earlier report there is replaced, anything else is refused; `draws`: number of models drawn from the
     coefficient covariance, at least 2; `seed`: of the draws and of
     the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
-    `agents`: files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`);
+    `agents`: files of autopilots to verify beside those designed, or names of pretrained ones (`load_agent`);
+    `designs`: kinds of controller to design, of which those that lead another one keep to a track;
     `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the
     same. Raises InputError for anything wrong with the files or arguments; nothing is written then.
     """
@@ -72,10 +76,10 @@ def build_autopilot(
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     graph_objects()  # a missing extra is reported now, not after the work
-    with whole_folder(folder, FILES) as draft:
+    with whole_folder(folder, (*FILES, *(f"{kind}.json" for kind in controller_kinds()))) as draft:
         result = examine(
-            ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
-            where=where,
+            ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, designs=designs,
+            progress=progress, where=where,
         )  # fmt: skip
         _tell(progress, "writing the report", 0, 1)
         _write(result, draft)
@@ -89,9 +93,10 @@ def _write(result: AutopilotResult, folder: Path) -> None:
     write_json(result.metrics, folder / "metrics.json")
     if result.verification is not None:
         result.model.save(folder / "model.json")
-        for pilot in result.verification.pilots:
-            if pilot.design is not None and pilot.key not in result.verification.refused:
-                pilot.design.save(folder / f"{pilot.key}.json")
+        found = result.verification
+        for pilot in (*found.pilots, *found.tracks):
+            if isinstance(pilot.controller, Controller) and pilot.key not in found.refused:
+                pilot.controller.save(folder / f"{pilot.key}.json")
     write_report(result, folder / "report.html")
 
 
@@ -102,10 +107,13 @@ def examine(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
+    designs: Sequence[str] = DESIGNS,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
     """The chain without its files: see `build_autopilot`."""
+    for kind in designs:
+        controller_class(kind, "autopilots")
     _tell(progress, "reading trials", 0, 1)
     ship = ShipFile.load(ship_file)
     guests = [load_agent(agent) for agent in agents]
@@ -121,7 +129,7 @@ def examine(
         for guest, agent in zip(guests, agents, strict=True):
             _check_fits(guest, identification.model, f"agent '{agent}'")
         try:
-            verification = verify(identification.model, draws, seed, progress, where, guests)
+            verification = verify(identification.model, draws, seed, progress, where, guests, designs)
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     if verification is not None:
@@ -152,16 +160,17 @@ def verify(
     progress: Progress | None = None,
     where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
+    designs: Sequence[str] = DESIGNS,
 ) -> Verification:
-    """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.
+    """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
 
-    `model`: with a covariance; `draws`, `seed`, `progress`, `where`: see `build_autopilot`; `guests`: further
-    autopilots. Raises UnstableModelError if the model itself runs away; InputError if no autopilot can be
-    designed on it.
+    `model`: with a covariance; `draws`, `seed`, `progress`, `where`, `designs`: see `build_autopilot`;
+    `guests`: further autopilots. Raises UnstableModelError if the model itself runs away; InputError if no
+    autopilot can be designed on it.
     """
     stage = "models drawn"
     _tell(progress, stage, 0, draws)
-    controllers, refused = _designed(model)
+    controllers, guides, refused = _designed(model, designs)
     found = monte_carlo(
         controllers, model, draws, seed,
         where=where, progress=lambda done: _tell(progress, stage, done, draws),
@@ -184,7 +193,17 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.episodes.cost)))),
         refused=refused,
+        tracks=_tracks(guides, [model, *stable], refused),
     )
+
+
+def _tracks(guides: list[Controller], models: list[ShipModel], refused: dict[str, str]) -> tuple[Track, ...]:
+    """The track of each path autopilot; one that does not arrive on the identified model is refused."""
+    tracks = tuple(keep_track(guide, models) for guide in guides)
+    for track in tracks:
+        if not track.arrived[0]:
+            refused[track.key] = "it does not reach the end of the track on the identified model"
+    return tracks
 
 
 def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
@@ -207,22 +226,31 @@ def _unique_keys(names: Sequence[str]) -> list[str]:
     ]
 
 
-def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
-    """The autopilots, and why others could not be designed.
+def _designed(
+    model: ShipModel, designs: Sequence[str]
+) -> tuple[list[Controller], list[Controller], dict[str, str]]:
+    """Autopilots that keep a heading, those that keep a track, and why others could not be designed.
 
-    Raises InputError if none could.
+    Raises InputError if none that keeps a heading could.
     """
     controllers: list[Controller] = []
+    guides: list[Controller] = []
     refused: dict[str, str] = {}
-    designs: tuple[Any, ...] = (PID, LQ)
-    for design in designs:
+    for kind in dict.fromkeys(designs):
+        made: Any = controller_class(kind)
         try:
-            controllers.append(design.from_model(model))
+            if made.has_autopilot:
+                guides.append(made.from_model(model, task=track_task(model)))
+            else:
+                controllers.append(made.from_model(model))
         except InputError as error:  # this design does not suit the ship; another may
-            refused[design.kind] = str(error)
+            refused[kind] = str(error)
     if not controllers:
-        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
-    return controllers, refused
+        raise InputError(
+            "no autopilot that keeps a heading could be designed on it: "
+            + ("; ".join(refused.values()) or f"{quoted(designs)} found, expected one such as 'lq'")
+        )
+    return controllers, guides, refused
 
 
 def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:

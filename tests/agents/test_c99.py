@@ -10,7 +10,16 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import (
-    LQ, LQG, PID, FilteredPID, IntegralLineOfSight, PreviewMPC, ScheduledLQ, Shielded, TurnRate, WheelOver,
+    LQ,
+    LQG,
+    PID,
+    FilteredPID,
+    IntegralLineOfSight,
+    PreviewMPC,
+    ScheduledLQ,
+    Shielded,
+    TurnRate,
+    WheelOver,
     load_agent,
 )  # fmt: skip
 from agents.cli import app
@@ -166,7 +175,9 @@ def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
     random = np.random.default_rng(0)
     numbers = random.normal(0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs)))
     numbers[:, 0] = 0.4 * (np.arange(steps) % 600 > 300)  # the set-point stands first
-    for column in np.flatnonzero(np.isin([*source.inputs], ["rate_of_turn", "turn_angle", "next_turn_angle"])):
+    for column in np.flatnonzero(
+        np.isin([*source.inputs], ["rate_of_turn", "turn_angle", "next_turn_angle"])
+    ):
         numbers[::3, column] = 0.0  # no rate ordered, no turn ahead
     within = 1e-12 if name not in ("ppo", "path_ppo", "residual", "orders") else 1e-6
     for row in numbers:
@@ -211,7 +222,7 @@ def test_guidance_orders_what_it_commands_along_a_path(version, kind):
         ground = course - np.arctan2(told["course_error_sin"], told["course_error_cos"])
         direction = course + np.arctan2(told["cross_track"], agent.gains["task_lookahead"])
         direction -= float(np.squeeze(agent.shift(turns)))
-        order = bridge.step({**told, "set_point": direction, "heading": 0.0, "course_over_ground": ground})
+        order = bridge.step({**told, "set_point": direction, "heading": 0.0, "course": ground})
         action, state = agent.predict(seen, state, step == 0)
         assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)
         seen, *_ = env.step(action)

@@ -47,7 +47,7 @@ def test_a_ship_turns_as_in_the_library(version, tmp_path):
 
 BY_A_BRIDGE = {
     "set_point": 0.1, "heading": 0.02, "yaw_rate": 0.001, "sway": 0.1, "surge": 7.5, "rudder": 0.05,
-    "rate_of_turn": 0.003, "cross_track": 30.0, "course_over_ground": 0.05, "next_turn_distance": 200.0,
+    "rate_of_turn": 0.003, "cross_track": 30.0, "course": 0.05, "next_turn_distance": 200.0,
     "next_turn_angle": 0.6, "second_turn_distance": 2000.0, "second_turn_angle": -0.4,
 }  # fmt: skip
 ALONG_ARCS = Task.of("PathFollowing-v1", dt=2 * DT)
