@@ -173,6 +173,9 @@ def autopilot_command(
             help="To design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. Others: preview-mpc, lqg.",
         ),
     ] = None,
+    standards: Annotated[
+        bool, typer.Option("--standards", help="Simulate what ISO 11674 and IEC 62065 ask for.")
+    ] = False,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
@@ -191,7 +194,7 @@ def autopilot_command(
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), designs=designs,
-            progress=progress, where=JobEngine(engine, workers, address),
+            standards=standards, progress=progress, where=JobEngine(engine, workers, address),
         )  # fmt: skip
     _print_result(result, out / "report.html", draws, as_json)
 
@@ -222,6 +225,9 @@ def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bo
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
         console.print(ranking_table(result))
         console.print()
+        for row in result.verification.standards:
+            if not row.passed:
+                warn(f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit}, limit {row.limit:g}")
         for name, track in result.metrics["tracks"].items():
             console.print(
                 f"{name.upper()} on the track: largest cross-track error "

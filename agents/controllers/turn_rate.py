@@ -48,7 +48,8 @@ class TurnRate(Stateful):
     kind: ClassVar[str] = "turn-rate"
     gain_names: ClassVar[tuple[str, ...]] = ("proportional", "integral", "heading_time", "rate")
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges, **dict.fromkeys(("heading_time", "rate", "frequency"), Range(1e-9, NUMBERS.largest)),
+        **Controller.ranges,
+        **dict.fromkeys(("heading_time", "rate", "frequency"), Range(1e-9, NUMBERS.largest)),
     }  # fmt: skip
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rate_of_turn")
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {"rates": ("rates",), "rudders": ("rates",)}

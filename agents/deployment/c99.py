@@ -116,9 +116,9 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:
     """A controller or a learned policy as C99, with the integral of the heading error.
 
-    Its law is a list of gains ("pid", "lq", one of your own with `feedback`), "lq-scheduled", "lqg" or
-    "turn-rate" or "pid-filtered", guidance of `GUIDES` over one of these, or a policy that commands the rudder, with or without one of
-    these as its base. Raises InputError for any other controller, and for a name that C does not take.
+    Its law is a list of gains ("pid", "lq", one of your own with `feedback`) or one of `LAWS`, guidance of
+    `GUIDES` over one of these, or a policy that commands the rudder, with or without one of these as its
+    base. Raises InputError for any other controller, and for a name that C does not take.
     """
     policy = agent if isinstance(agent, LearnedPolicy) else None
     base = agent if policy is None else policy.base

@@ -38,8 +38,8 @@ class Route:
         path = Path(np.column_stack(local_metres(*waypoints.T, self.origin)))
         if (far := float(np.abs(path.waypoints).max())) > FURTHEST_M:
             raise InputError(
-                f"waypoints: {far / 1e3:.0f} km from the first found, expected at most {FURTHEST_M / 1e3:.0f} "
-                "km; divide the route"
+                f"waypoints: {far / 1e3:.0f} km from the first found, expected at most "
+                f"{FURTHEST_M / 1e3:.0f} km; divide the route"
             )
         path.check_turns(radius)
         self.plan, self.ended = path.waypoints.ravel(), False

@@ -62,7 +62,7 @@ class SimulatedShip:
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 
     def measured(self) -> dict[str, float]:
-        """What her instruments and her plotter know, SI units and radians, by quantity of `sentences.toml`."""
+        """What her instruments and plotter know, SI units and radians, by quantity of `sentences.toml`."""
         s, (north, east) = self.now, self.states[0, -4:-2] if self.passage.windy else (0.0, 0.0)
         ahead, aside, sine, cosine = s["u"], s["v"] * cos(s.get("phi", 0.0)), sin(s["psi"]), cos(s["psi"])
         north, east = north + ahead * cosine - aside * sine, east + ahead * sine + aside * cosine

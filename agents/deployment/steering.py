@@ -163,7 +163,7 @@ class Helm:
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over for good when one is wrong, or at another fault."""
-        given = self._given(now)
+        given = self.given(now)
         self.silent = silent = [name.replace("_", " ") for name, value in given.items() if value is None]
         if self.state == STANDBY and not silent:
             self.state = STEERING
@@ -179,9 +179,10 @@ class Helm:
     def steer(self, now: float) -> None:
         """One control interval."""
         if self.state == STEERING:
-            self.order = self.pilot.step({name: value or 0.0 for name, value in self._given(now).items()})
+            self.order = self.pilot.step({name: value or 0.0 for name, value in self.given(now).items()})
 
-    def _given(self, now: float) -> dict[str, float | None]:
+    def given(self, now: float) -> dict[str, float | None]:
+        """What the autopilot is given; None for what is not known."""
         found = self.sensors.numbers(self.needed, now)
         found["rate_of_turn"] = 0.0 if self.rate is None or self.heading is not None else self.rate
         if self.route is None:
@@ -245,9 +246,9 @@ async def steer(
 ) -> Helm:  # fmt: skip
     """Steer a ship over NMEA 0183 for a duration in s; the helm as it was at the end.
 
-    `agent`, `heading`, `limits`, `route` and `rate` are those of `Helm`, `address` is that of a `Link`. Of simulated ships
-    `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises InputError for an
-    address that cannot be opened, and for an autopilot that reads what no sentence tells.
+    `agent`, `heading`, `limits`, `route` and `rate` are those of `Helm`, `address` is that of a `Link`. Of
+    simulated ships `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises
+    InputError for an address that cannot be opened, and for an autopilot that reads what no sentence tells.
     """
     for name, number in (("speed_up", speed_up), ("heading", heading or 0.0), ("rate", rate or 0.0)):
         check_number(number, name)

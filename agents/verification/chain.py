@@ -54,6 +54,7 @@ def build_autopilot(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     designs: Sequence[str] = DESIGNS,
+    standards: bool = False,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
@@ -68,6 +69,7 @@ def build_autopilot(
     the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
     `agents`: files of autopilots to verify beside those designed, or names of pretrained ones (`load_agent`);
     `designs`: kinds of controller to design, of which those that lead another one keep to a track;
+    `standards`: whether to simulate what the standards of heading and track control ask for;
     `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the
     same. Raises InputError for anything wrong with the files or arguments; nothing is written then.
     """
@@ -79,7 +81,7 @@ def build_autopilot(
     with whole_folder(folder, (*FILES, *(f"{kind}.json" for kind in controller_kinds()))) as draft:
         result = examine(
             ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, designs=designs,
-            progress=progress, where=where,
+            standards=standards, progress=progress, where=where,
         )  # fmt: skip
         _tell(progress, "writing the report", 0, 1)
         _write(result, draft)
@@ -108,6 +110,7 @@ def examine(
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
     designs: Sequence[str] = DESIGNS,
+    standards: bool = False,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
@@ -134,6 +137,8 @@ def examine(
             instability = str(error)
     if verification is not None:
         verification, refusal = _decided(verification, identification)
+        if standards and refusal is None:
+            verification = _to_standards(verification, identification.model, progress)
     return AutopilotResult(ship, identification.trials, identification, instability, verification, refusal)
 
 
@@ -151,6 +156,18 @@ def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verificati
     if len(lost) == len(designed):
         refusal = f"{', '.join(key.upper() for key in lost)}: {lost[designed[0].key]}; run {remedy}"
     return replace(found, refused=refused), refusal
+
+
+def _to_standards(found: Verification, model: ShipModel, progress: Progress | None) -> Verification:
+    """A verification with what the standards ask of its best heading autopilot and its first path autopilot."""
+    from agents.verification.standards import standards
+
+    _tell(progress, "standards", 0, 1)
+    best = next(one.design for one in found.pilots if one.design is not None and one.key not in found.refused)
+    tracks = [track for track in found.tracks if track.key not in found.refused]
+    rows = standards(model, best, tracks)
+    _tell(progress, "standards", 1, 1)
+    return replace(found, standards=tuple(rows))
 
 
 def verify(

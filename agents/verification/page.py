@@ -80,6 +80,7 @@ def verification_view(found: Verification) -> dict[str, Any]:
         "nomoto": found.nomoto,
         "pilots": pilots,
         "designs": designed,
+        "standards": found.standards,
         "linear": {name: one for name, one in designed.items() if one.feedback},
         "gains": _gains([one for one in designed.values() if one.feedback]),
         "tracks": {track.key.upper(): track_metrics(track) for track in found.tracks},

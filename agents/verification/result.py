@@ -20,6 +20,7 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
+    from agents.verification.standards import Row
 
 
 STEP_DEG = 20.0
@@ -58,6 +59,7 @@ class Verification:
     pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
     refused: dict[str, str]  # autopilots that could not be designed on the model, and why
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
+    standards: tuple[Row, ...] = ()  # what the standards of heading and track control ask for
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +114,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
+        "standards": {row.name: {**asdict(row), "passed": row.passed} for row in found.standards},
     }
 
 

@@ -70,7 +70,7 @@ def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refuse
     found = verify(model, 4, 1, designs=("lqg", "lqg"))
     assert [pilot.key for pilot in found.pilots] == ["lqg"]
     assert found.tracks == ()
-    with pytest.raises(InputError, match="no autopilot that keeps a heading .*'wheel-over' found"):
+    with pytest.raises(InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"):
         verify(model, 4, 1, designs=("wheel-over",))
     with pytest.raises(InputError, match="autopilots: 'wheelover' found, expected one of"):
         build_autopilot("examples/mariner/ship.toml", "out", designs=["wheelover"])

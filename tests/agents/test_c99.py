@@ -229,7 +229,7 @@ def test_guidance_orders_what_it_commands_along_a_path(version, kind):
 
 
 def test_what_is_no_closed_law_is_refused():
-    with pytest.raises(InputError, match="'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
+    with pytest.raises(InputError, match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
         autopilot_source(PreviewMPC.from_model(MARINER))
     with pytest.raises(
         InputError, match=r"'lq-adaptive' found, which is no closed law that could be C. Export 'pid', 'lq'"
