@@ -27,9 +27,9 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import read_toml
 from shipgym.sea.conditions import sea_states
+from shipgym.sea.waves import encounter_frequency
 from shipgym.ships import ShipModel
 
-GRAVITY = 9.80665  # m/s^2
 REQUIREMENTS = read_toml(Path(__file__).with_name("standards.toml"), "table of standards")
 LENGTHS = 60.0  # of a run, times to travel a ship length; the first quarter does not count for keeping
 PER_INTERVAL = 2  # steps of the simulation in a control interval
@@ -127,11 +127,11 @@ def _heading(model: ShipModel, pilot: Controller) -> dict[str, float]:
 def _sea(model: ShipModel, pilot: Controller) -> dict[str, float]:
     """Values of heading control in a seaway; none where the particulars do not tell what waves do."""
     seas, wave = ("moderate", "rough"), 2.0 * np.pi / sea_states()["moderate"].peak_period
-    ahead = model.particulars["speed"] * np.cos(np.radians(45.0))  # to where its waves come from
-    encounter = 2.0 * np.pi / (wave + wave**2 * ahead / GRAVITY)  # s, deep water
+    met = encounter_frequency(wave, model.particulars["speed"], radians(45.0))  # from north-east
+    period = 2.0 * np.pi / float(met)
     try:
         found = {f"heading_{sea}": _rms(_settled(kept(model, pilot, sea).error)) for sea in seas}
-        pilots = [FilteredPID.from_model(model, wave_period=period) for period in (encounter, None)]
+        pilots = [FilteredPID.from_model(model, wave_period=one) for one in (period, None)]
     except InputError:
         return {}
     travel = [np.abs(np.diff(_settled(kept(model, one, "moderate").rudder))).sum() for one in pilots]
