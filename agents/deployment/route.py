@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import copysign, degrees, fabs
 from pathlib import Path as File
-from types import SimpleNamespace
-from typing import Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,6 +18,14 @@ from shipgym.trials.navigation import local_metres
 
 COLUMNS = ("latitude", "longitude")
 FURTHEST_M = 100e3  # of a waypoint from the first one: the route is laid on a plane
+
+
+class _Scale(NamedTuple):
+    """What the environment's functions read of ship and settings, m."""
+
+    length: float
+    turn_radius: float
+    lookahead: float
 
 
 class Route:
@@ -35,7 +42,7 @@ class Route:
 
     def __init__(self, waypoints: Floats, radius: float) -> None:
         self.origin = float(waypoints[0, 0]), float(waypoints[0, 1])
-        path = Path(np.column_stack(local_metres(*waypoints.T, self.origin)))
+        path = Path(np.column_stack(local_metres(waypoints[:, 0], waypoints[:, 1], self.origin)))
         if (far := float(np.abs(path.waypoints).max())) > FURTHEST_M:
             raise InputError(
                 f"waypoints: {far / 1e3:.0f} km from the first found, expected at most "
@@ -43,9 +50,7 @@ class Route:
             )
         path.check_turns(radius)
         self.plan, self.ended = path.waypoints.ravel(), False
-        self.ship, self.settings = (
-            SimpleNamespace(length=1.0), SimpleNamespace(turn_radius=radius, lookahead=1.0),
-        )  # fmt: skip
+        self.ship: Any = _Scale(1.0, radius, 1.0)  # stands for the records of the environment
         self.leg = leg_from(0, 0.0, radius, self.plan)
 
     @classmethod
@@ -64,13 +69,13 @@ class Route:
 
     def given(self, latitude: float, longitude: float) -> dict[str, float]:
         """Direction of the path beside the ship, distance from it and turns ahead; position in rad."""
-        ship, asked, radius = self.ship, self.settings, self.settings.turn_radius
+        ship, radius = self.ship, self.ship.turn_radius
         x, y = local_metres(np.array(degrees(latitude)), np.array(degrees(longitude)), self.origin)
-        at = fix(float(x), float(y), self.leg, ship, asked)
-        while turned_off(self.leg, at.way, ship, asked):
+        at = fix(float(x), float(y), self.leg, ship, ship)
+        while turned_off(self.leg, at.way, ship, ship):
             end = self.leg.turn_at + radius * fabs(self.leg.turn)
             self.leg = leg_from(next_turn(int(self.leg.number), self.plan), end, radius, self.plan)
-            at = fix(float(x), float(y), self.leg, ship, asked)
+            at = fix(float(x), float(y), self.leg, ship, ship)
         leg = self.leg
         self.ended = leg.turn == 0.0 and at.way >= leg.turn_at
         values = (

@@ -13,6 +13,7 @@ import numpy as np
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
 from shipgym.checks import check_number
+from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
@@ -63,14 +64,18 @@ class SimulatedShip:
 
     def measured(self) -> dict[str, float]:
         """What her instruments and plotter know, SI units and radians, by quantity of `sentences.toml`."""
-        s, (north, east) = self.now, self.states[0, -4:-2] if self.passage.windy else (0.0, 0.0)
+        s, sea = self.now, np.zeros(len(SEA_CHANNELS))
+        if self.passage.windy:  # its current, and the first-order motion that a compass and a gyro feel
+            sea = self.states[0, -len(SEA_CHANNELS) :]
+        psi_wave, r_wave, _, _, north, east = sea[:6].tolist()
         ahead, aside, sine, cosine = s["u"], s["v"] * cos(s.get("phi", 0.0)), sin(s["psi"]), cos(s["psi"])
         north, east = north + ahead * cosine - aside * sine, east + ahead * sine + aside * cosine
         latitude = START[0] + s["x"] / MINUTE / 60.0
         longitude = START[1] + s["y"] / MINUTE / 60.0 / cos(radians(latitude))
         left = WAYPOINT * cos(self.leg) - s["x"], WAYPOINT * sin(self.leg) - s["y"]
         return {
-            "heading": s["psi"], "yaw_rate": s["r"], "rudder": s["delta"], "surge": s["u"], "sway": s["v"],
+            "heading": s["psi"] + psi_wave, "yaw_rate": s["r"] + r_wave, "rudder": s["delta"],
+            "surge": s["u"], "sway": s["v"],
             "course": atan2(east, north), "speed": hypot(north, east), "latitude": radians(latitude),
             "longitude": radians(longitude), "cross_track": s["y"] * cos(self.leg) - s["x"] * sin(self.leg),
             "leg": self.leg, "waypoint_bearing": atan2(left[1], left[0]), "waypoint_distance": hypot(*left),
@@ -78,20 +83,14 @@ class SimulatedShip:
 
     def sentences(self) -> str:
         """What her instruments send now."""
-        s, known = self.now, self.measured()
-        latitude, longitude, cross = (
-            degrees(known["latitude"]),
-            degrees(known["longitude"]),
-            known["cross_track"],
-        )
+        known = self.measured()
+        north, east = (degrees(known[name]) for name in ("latitude", "longitude"))
         minutes, seconds = divmod(self.steps * self.step, 60.0)
         text = render(
-            "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg,
-            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=known["course"],
-            speed=known["speed"], bearing=known["waypoint_bearing"],
-            distance=f"{known['waypoint_distance'] / MINUTE:.4f}",
-            latitude=f"{int(latitude):02d}{latitude % 1 * 60:07.4f}",
-            longitude=f"{int(longitude):03d}{longitude % 1 * 60:07.4f}",
+            "instruments.nmea.j2", **known, slow=self.steps % SLOW == 0,
+            off=f"{abs(known['cross_track']) / MINUTE:.5f}", side="L" if known["cross_track"] >= 0.0 else "R",
+            miles=f"{known['waypoint_distance'] / MINUTE:.4f}",
+            north=f"{int(north):02d}{north % 1 * 60:07.4f}", east=f"{int(east):03d}{east % 1 * 60:07.4f}",
             time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",
         )  # fmt: skip
         return sentences(text)

@@ -147,12 +147,12 @@ class Helm:
                 f"route: autopilot '{name}' {'with' if self.route else 'without'} a route found, expected "
                 "'wheel-over' or 'preview-mpc' of shipgym autopilot with a route, or another without"
             )
-        if "cross_track" in self.pilot.inputs and not isinstance(agent, Guided):
-            raise InputError(f"autopilot: '{name}' learned to follow paths, expected one for course keeping")
         if unknown := set(self.needed) - TABLES["believed"].keys():
             raise InputError(
                 f"autopilot: it reads {', '.join(sorted(unknown))}, which no sentence of NMEA 0183 tells it"
             )
+        if "cross_track" in self.pilot.inputs and not isinstance(agent, Guided):
+            raise InputError(f"autopilot: '{name}' learned to follow paths, expected one for course keeping")
 
     def hear(self, line: str, now: float) -> None:
         """Take in a line that was received."""

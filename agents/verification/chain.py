@@ -115,9 +115,10 @@ def _write(result: AutopilotResult, folder: Path) -> None:
     write_json(result.metrics, folder / "metrics.json")
     if (found := result.verification) is not None:
         result.model.save(folder / "model.json")
-        for pilot in (*found.pilots, *found.tracks):
-            if isinstance(pilot.controller, Controller) and pilot.key not in found.refused:
-                pilot.controller.save(folder / f"{pilot.key}.json")
+        designed = {one.key: one.controller for one in found.pilots if one.design is not None}
+        for key, controller in (designed | {one.key: one.controller for one in found.tracks}).items():
+            if isinstance(controller, Controller) and key not in found.refused:
+                controller.save(folder / f"{key}.json")
     write_report(result, folder / "report.html")
 
 

@@ -165,7 +165,7 @@ def _figures(result: AutopilotResult, found: Verification) -> dict[str, Any]:
         "manoeuvres": manoeuvres_figure(found.manoeuvres, _length(result)),
         "steps": steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
         "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in pilots}),
-        "tracks": tracks_figure({track.key.upper(): track for track in found.tracks}, _length(result)),
+        "track_keeping": tracks_figure({track.key.upper(): track for track in found.tracks}, _length(result)),
     }
 
 

@@ -31,7 +31,7 @@ from shipgym.sea.waves import encounter_frequency
 from shipgym.ships import ShipModel
 
 REQUIREMENTS = read_toml(Path(__file__).with_name("standards.toml"), "table of standards")
-LENGTHS = 60.0  # of a run, times to travel a ship length; the first quarter does not count for keeping
+LENGTHS = 40.0  # of a run, times to travel a ship length; the first quarter does not count for keeping
 PER_INTERVAL = 2  # steps of the simulation in a control interval
 TURN_DEG, RUDDER_DEG, OFF_TRACK_M, LOST_S = 30.0, 10.0, 50.0, 60.0  # settings; when a sensor falls silent
 
@@ -72,7 +72,8 @@ class Run(NamedTuple):
 
 def run(helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = ()) -> Run:
     """Steer a ship until the autopilot hands over; the quantities in `lost` fall silent after `LOST_S`."""
-    dt, rows, given, warnings = helm.pilot.dt, [], [], []
+    dt, given, warnings = helm.pilot.dt, list[dict[str, Any]](), list[list[str]]()
+    rows: list[tuple[float, ...]] = []
     while (now := len(rows) * dt) < seconds:
         known = ship.measured()
         for name, value in known.items():
@@ -89,7 +90,9 @@ def run(helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = (
         ship.order = helm.order
         for _ in range(PER_INTERVAL):
             ship.advance()
-    return Run(*np.array(rows).T, given, warnings, helm.alarm, len(rows) * dt if helm.alarm else np.inf)
+    t, error, rate, rudder, order = np.array(rows).T
+    alarm_at = len(rows) * dt if helm.alarm else np.inf
+    return Run(t, error, rate, rudder, order, given, warnings, helm.alarm, alarm_at)
 
 
 def standards(model: ShipModel, pilot: Controller, tracks: Sequence[Track]) -> list[Row]:
@@ -97,8 +100,8 @@ def standards(model: ShipModel, pilot: Controller, tracks: Sequence[Track]) -> l
 
     What the ship's particulars do not allow, such as waves, has no value.
     """
-    found = _heading(model, pilot) | _sea(model, pilot) | _rate_of_turn(model)
-    found |= _track(model, tracks[0]) if tracks else {}
+    found = heading_control(model, pilot) | _sea(model, pilot) | _rate_of_turn(model)
+    found |= track_control(model, tracks[0]) if tracks else {}
     rows = {name: {"least": False, **about} for name, about in REQUIREMENTS.items()}
     return [Row(name=name, **about, value=found.get(name)) for name, about in rows.items()]
 
@@ -111,7 +114,7 @@ def kept(model: ShipModel, pilot: Controller, sea: str = "calm", heading: float 
     return run(helm, ship, LENGTHS * length_time(model), lost)
 
 
-def _heading(model: ShipModel, pilot: Controller) -> dict[str, float]:
+def heading_control(model: ShipModel, pilot: Controller) -> dict[str, float]:
     """Values of heading control in calm water."""
     narrow, turn = Limits(order_deg=RUDDER_DEG), kept(model, pilot, heading=TURN_DEG)
     small = kept(model, pilot, heading=TURN_DEG, limits=narrow)
@@ -149,7 +152,7 @@ def _rate_of_turn(model: ShipModel) -> dict[str, float]:
     return {"rate_of_turn": 100.0 * float(off.max())}
 
 
-def _track(model: ShipModel, track: Track) -> dict[str, float]:
+def track_control(model: ShipModel, track: Track) -> dict[str, float]:
     """Values of track control in the current of the track."""
     guide, length = track.controller, model.particulars["length"]
     limits, reach = Limits(off_track_m=OFF_TRACK_M), guide.gains["turn_reach"]
@@ -183,7 +186,7 @@ def _on_track(model: ShipModel, track: Track, limits: Limits, aside: float = 0.0
     step = track.controller.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
     ship.states[0, model.state_names.index("y")] = aside
-    seconds = 2.0 * LENGTHS * length_time(model)
+    seconds = 3.0 * LENGTHS * length_time(model)
     return run(Helm(track.controller, None, limits, route), ship, seconds, **more)
 
 

@@ -72,7 +72,16 @@ def test_plotly_stands_in_the_page_once(source):
 
 
 def test_all_sections_are_there_and_in_the_contents(page):
-    expected = ["data", "coefficients", "prediction", "manoeuvres", "autopilots", "ranking", "origin"]
+    expected = [
+        "data",
+        "coefficients",
+        "prediction",
+        "manoeuvres",
+        "autopilots",
+        "ranking",
+        "tracks",
+        "origin",
+    ]
     assert page.sections == expected
     assert page.links == ["#verdict", *(f"#{name}" for name in expected)]
 
@@ -91,7 +100,7 @@ def test_the_report_tells_what_the_metrics_hold(chain, page):
 
 def test_every_figure_has_a_caption_and_a_place(source):
     names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', source)
-    assert len(names) == len(set(names)) == source.count("<figcaption>") == 7
+    assert len(names) == len(set(names)) == source.count("<figcaption>") == 8
     for name in names:
         assert f'id="plot-{name}"' in source
 
@@ -102,7 +111,7 @@ def test_a_browser_without_network_draws_every_figure(chain):
     browser = Browser()
     try:
         browser.open(address)
-        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
+        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 8")
         assert (browser.complaints, browser.requests) == ([], [address])
     finally:
         browser.close()
@@ -152,7 +161,7 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     )  # fmt: skip
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
-    assert Page(source).scripts == 8  # plotly.js and seven figures
+    assert Page(source).scripts == 9  # plotly.js and eight figures
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)

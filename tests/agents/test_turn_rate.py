@@ -22,9 +22,9 @@ def turned(agent, model, rate, seconds):
         seen |= {"yaw_rate": state[None, model.state_names.index("r")], "rate_of_turn": np.array([rate])}
         order, memory = agent.steer(seen, memory, np.array([step == 0]))
         limited = np.clip(order, -model.steering.limit, model.steering.limit)
-        commands = np.tile(model.service_command, (1, 1))
-        commands[0, 0] = limited[0]
-        trial = model.simulate(commands, dt, state=state)
+        commands = np.tile(model.service_command, (2, 1))
+        commands[:, 0] = limited[0]
+        trial = model.simulate(commands, 0.5 * dt, state=state)
         state = np.array([trial[name][-1] for name in model.state_names])
         rates.append(state[model.state_names.index("r")])
         orders.append(float(order[0]))
