@@ -20,6 +20,7 @@ from .controllers.registry import register_controller as register_controller
 from .controllers.robustness import MarginUncertainty as MarginUncertainty
 from .controllers.robustness import margin_uncertainty as margin_uncertainty
 from .controllers.scheduled_lq import ScheduledLQ as ScheduledLQ
+from .controllers.turn_rate import TurnRate as TurnRate
 from .controllers.wheel_over import WheelOver as WheelOver
 from .policies.policy import LearnedPolicy as LearnedPolicy
 from .policies.shield import Shielded as Shielded

@@ -190,24 +190,35 @@ def autopilot_command(
             help="Run this autopilot too: a file, or the name of a pretrained one. May be repeated.",
         ),
     ] = None,
+    autopilots: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help="To design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. Others: preview-mpc, lqg.",
+        ),
+    ] = None,
+    standards: Annotated[
+        bool, typer.Option("--standards", help="Simulate what ISO 11674 and IEC 62065 ask for.")
+    ] = False,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
     as_json: Json = False,
 ) -> None:
-    """The whole chain: identify, predict, design PID and LQ, run them on drawn models, write a report.
+    """The whole chain: identify, predict, design autopilots, run them on drawn models, write a report.
 
     Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
     model is unstable, or no autopilot designed on it can be trusted; the report then says why.
     """
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine
-    from agents.verification.chain import build_autopilot
+    from agents.verification.chain import DESIGNS, build_autopilot
 
+    designs = DESIGNS if autopilots is None else [name.strip() for name in autopilots.split(",")]
     with progress_bars(not as_json) as progress:
         result = build_autopilot(
-            ship, out, draws=draws, seed=seed, options=options, agents=agents or (), progress=progress,
-            where=JobEngine(engine, workers, address),
+            ship, out, draws=draws, seed=seed, options=options, agents=agents or (), designs=designs,
+            standards=standards, progress=progress, where=JobEngine(engine, workers, address),
         )  # fmt: skip
     _print_result(result, out / "report.html", draws, as_json)
 
@@ -238,6 +249,14 @@ def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bo
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
         console.print(ranking_table(result))
         console.print()
+        for row in result.verification.standards:
+            if not row.passed:
+                warn(f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit}, limit {row.limit:g}")
+        for name, track in result.metrics["tracks"].items():
+            console.print(
+                f"{name.upper()} on the track: largest cross-track error "
+                f"{track['cross_track_largest_m']:.1f} m, rms {track['cross_track_rmse_m']:.1f} m\n"
+            )
     if not result.stable:
         fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
     if result.refusal is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from math import inf, radians
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -27,6 +28,16 @@ def steer_command(
     heading: Annotated[
         float | None, typer.Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
     ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate-of-turn", metavar="DEG", help="Degrees per minute, of turn-rate; with --heading: at most."
+        ),
+    ] = None,
+    route: Annotated[
+        Path | None,
+        typer.Option(metavar="CSV", help="Track of wheel-over: columns latitude and longitude, degrees."),
+    ] = None,
     limit: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME=VALUE", help="When it hands over: silence_s=3, rudder_deg=5; repeatable."),
@@ -34,7 +45,7 @@ def steer_command(
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB and XTE in, ROR and HTD out.
+    """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB, XTE, BWC and BWR in, ROR and HTD out.
 
     It begins when all that the autopilot reads is there. When a sensor falls silent, two disagree, the rudder
     does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and steers no
@@ -42,6 +53,7 @@ def steer_command(
     """
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, console
+    from agents.deployment.route import Route
     from agents.deployment.steering import Limits, steer
     from shipgym.checks import check_keys
     from shipgym.files import named_values
@@ -49,10 +61,14 @@ def steer_command(
     limits = named_values(limit or (), "--limit", "silence_s=3")
     check_keys(limits, Limits.__dataclass_fields__, "--limit")
     course = None if heading is None else radians(heading)
+    pilot = load_agent(agent)
+    radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
+    track = None if route is None else Route.from_csv(route, radius)
     found = asyncio.run(
         steer(
-            load_agent(agent), nmea, heading=course, limits=Limits(**limits), duration=duration,
-            speed_up=speed_up, told=lambda line: console.print(line, soft_wrap=True),
+            pilot, nmea, heading=course, limits=Limits(**limits), duration=duration, speed_up=speed_up,
+            told=lambda line: console.print(line, soft_wrap=True), route=track,
+            rate=None if rate is None else radians(rate) / 60.0,
         )
     )  # fmt: skip
     answer({"state": found.state, "alarm": found.alarm, **found.counts})

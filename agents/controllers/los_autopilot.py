@@ -12,7 +12,7 @@ on Control Systems Technology 31 (adaptive).
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -44,6 +44,7 @@ class Guided(Controller):
 
     observes: ClassVar[tuple[str, ...]] = (*OBSERVATION_NAMES, "cross_track")
     gain_names: ClassVar[tuple[str, ...]] = ("lookahead", "task_lookahead")
+    reads: ClassVar[tuple[str, ...]] = ("cross_track",)
     has_autopilot: ClassVar[bool] = True
     remembers: ClassVar[int] = 1  # numbers of each ship, beside the integral of the heading error
     ranges: ClassVar[Mapping[str, Range]] = {
@@ -81,6 +82,15 @@ class Guided(Controller):
             autopilot=pilot,
             **({"ship": model} if cls.has_ship else {}),
         )
+
+    @property
+    def turns_ahead(self) -> tuple[str, ...]:
+        """Names of distance and angle of each turn to come that it observes."""
+        return ()
+
+    def shift(self, turns: Sequence[Floats]) -> Floats | float:
+        """Course that the environment's heading error refers to, against that of the path here, rad."""
+        return 0.0
 
     @abstractmethod
     def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:

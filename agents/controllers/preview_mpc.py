@@ -52,6 +52,8 @@ class PreviewMPC(WheelOver):
         **dict.fromkeys(("rudder", "rudder_rate", "rudder_travel", "roll"), Range(0.0, FAR)),
     }  # fmt: skip
 
+    reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
+
     ship: ShipModel
 
     def __post_init__(self) -> None:

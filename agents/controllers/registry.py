@@ -15,6 +15,7 @@ _HOMES = {
     "lq": "agents.controllers.lq:LQ",
     "lq-scheduled": "agents.controllers.scheduled_lq:ScheduledLQ",
     "lqg": "agents.controllers.lqg:LQG",
+    "turn-rate": "agents.controllers.turn_rate:TurnRate",
     "mpc": "agents.controllers.mpc:MPC",
     "lq-adaptive": "agents.controllers.adaptive_lq:AdaptiveLQ",
     "los": "agents.controllers.los_autopilot:LineOfSight",

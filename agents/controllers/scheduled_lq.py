@@ -54,7 +54,7 @@ class ScheduledLQ(Controller):
     neutral: Floats
 
     def __post_init__(self) -> None:
-        _rising(self.speeds.tolist())
+        rising(self.speeds.tolist(), "speeds", above=0.0)
 
     @classmethod
     def from_model(
@@ -93,7 +93,9 @@ class ScheduledLQ(Controller):
         """
         interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         service = model.particulars["speed"]
-        listed = _rising([service * part for part in SPEEDS] if speeds is None else speeds)
+        listed = rising(
+            [service * part for part in SPEEDS] if speeds is None else speeds, "speeds", above=0.0
+        )
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
             ship = sample_ship(model, interval, speed=speed)
@@ -134,9 +136,9 @@ class ScheduledLQ(Controller):
         return order, memory
 
 
-def _rising(speeds: Sequence[float]) -> Floats:
-    """Speeds as an array, checked."""
-    listed = [check_number(speed, f"speeds[{i}]", above=0.0) for i, speed in enumerate(speeds)]
+def rising(values: Sequence[float], name: str, above: float | None = None) -> Floats:
+    """Numbers in rising order as an array; InputError names them if they are not, or one is too small."""
+    listed = [check_number(one, f"{name}[{i}]", above=above) for i, one in enumerate(values)]
     if len(listed) < 2 or np.any(np.diff(listed) <= 0.0):
-        raise InputError(f"speeds: {list(speeds)} found, expected at least two in rising order, m/s")
+        raise InputError(f"{name}: {list(values)} found, expected at least two in rising order, SI units")
     return np.array(listed)

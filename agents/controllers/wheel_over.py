@@ -50,6 +50,7 @@ class WheelOver(Guided):
             "second_turn_angle",
         ),
     )  # fmt: skip
+    reads: ClassVar[tuple[str, ...]] = ("cross_track", "course", "sway", "surge")
     gain_names: ClassVar[tuple[str, ...]] = (
         "lookahead", "task_lookahead", "turn_lookahead", "turn_radius", "turn_reach", "crab_share",
         "path_radius",
@@ -118,7 +119,7 @@ class WheelOver(Guided):
 
     @property
     def turns_ahead(self) -> tuple[str, ...]:
-        """Names of distance and angle of each turn to come."""
+        """See `Guided.turns_ahead`."""
         return self.observation_names[len(WheelOver.observes) - 2 :]
 
     def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
@@ -134,7 +135,7 @@ class WheelOver(Guided):
         return way
 
     def shift(self, turns: Sequence[Floats]) -> Floats | float:
-        """Course of a path with arcs that the environment's heading error refers to, against its own here."""
+        """See `Guided.shift`: on a path with arcs half a lookahead ahead."""
         radius, half = self.gains["path_radius"], 0.5 * self.gains["task_lookahead"]
         return bend(half, turns, radius) if radius > 0.0 else 0.0
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.los_autopilot import Guided, LineOfSight
+from agents.controllers.los_autopilot import Guided
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
 from shipgym.files import read_toml
@@ -25,15 +25,17 @@ VARIABLES = read_toml(Path(__file__).with_name("variables.toml"), "table of vari
 INPUTS = VARIABLES["autopilot_input"]
 #: Observations that an autopilot makes itself.
 OWN = ("heading_error_sin", "heading_error_cos", "last_command", "heading_error_integral")
+COURSE_ERROR = ("course_error_sin", "course_error_cos")  # made of the course over ground
 
 
 def _reads(agent: Any) -> set[str]:
     """What a controller reads of the ship beside her heading."""
     if isinstance(agent, Guided):
-        return {"cross_track"} | _reads(agent.autopilot)
+        return {*agent.reads, *agent.turns_ahead} | _reads(agent.autopilot)
     if not isinstance(agent, Controller):
         base = getattr(agent, "base", None)
-        return {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
+        seen = {*agent.observation_names, *(() if base is None else _reads(base))} - {*OWN}
+        return {"course" if one in COURSE_ERROR else one for one in seen}
     if type(agent).steer is not Controller.steer:
         return {*agent.reads}
     used = [signal for gain, (signal, _) in agent.feedback.items() if agent.gains[gain]]
@@ -56,8 +58,9 @@ class Autopilot:
     """Any controller or policy, stepped once in each control interval `dt` in double precision.
 
     It adds what an environment would: the integral of the heading error, and the last command. `inputs` names
-    what it reads. Guidance is given the direction of the leg as its set-point, a policy that learned to
-    follow paths the course that its environment shows: the leg's less atan(cross-track error / lookahead).
+    what it reads. Guidance is given the direction of the path beside the ship as its set-point, a policy that
+    learned to follow paths the course that its environment shows: of legs without arcs the leg's less
+    atan(cross-track error / lookahead).
 
     Raises
     ------
@@ -66,11 +69,6 @@ class Autopilot:
     """
 
     def __init__(self, agent: Any) -> None:
-        if isinstance(agent, Guided) and not isinstance(agent, LineOfSight):
-            raise InputError(
-                f"autopilot: '{agent.kind}' found, which needs the waypoints of its path; expected 'los', "
-                "'ilos' or 'alos', or an autopilot that keeps a heading"
-            )
         names = {"set_point", "heading", *_reads(agent)}
         if getattr(agent, "action", "rudder") == "rudder-shaft" or not names <= INPUTS.keys():
             raise InputError(
@@ -81,34 +79,47 @@ class Autopilot:
         self.pilot: Any = agent.autopilot if isinstance(agent, Guided) else agent
         self.scales = dict(zip(agent.observation_names, agent.observation_scales, strict=True))
         self.limit, given = float(self.scales["rudder"]), getattr(agent, "env_options", {}).get("dt")
+        self.largest = self.limit  # of its orders, rad; may be set lower
         self.dt = float(given or rounded_interval(1.0 / self.scales["yaw_rate"]))  # of the environment
         if isinstance(agent, Controller):
             self.dt = float(agent.design["dt"])
-        self.begins, self.drift, self.integral, self.last_command = True, np.zeros((1, 1)), 0.0, 0.0
+        self.begins, self.integral, self.last_command = True, 0.0, 0.0
+        self.guided = np.zeros((1, getattr(agent, "remembers", 0)))  # what guidance remembers
         self.memory: Any = (
             np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Controller) else None
         )
 
     def step(self, given: Mapping[str, float]) -> float:
-        """Ordered rudder, rad, within its limit, for the numbers named in `inputs`."""
+        """Ordered rudder, rad, at most `largest`, for the numbers named in `inputs`."""
         error = wrapped(given["set_point"] - given["heading"])
         if isinstance(self.agent, Guided):
-            course, self.drift = self.agent.course(
-                {"cross_track": np.array([given["cross_track"]])}, self.drift
-            )
-            error = wrapped(error + course[0])
+            error = self._led(given, error)
         reach = self.scales["heading_error_integral"]
         gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
         self.integral = min(max(self.integral + gathered, -reach), reach)
         own = (float(np.sin(error)), float(np.cos(error)), self.last_command, self.integral)
-        order = self._order({**given, **dict(zip(OWN, own, strict=True))})
-        self.begins, self.last_command = False, min(max(order, -self.limit), self.limit)
+        off = given["set_point"] - given.get("course", 0.0)
+        courses = dict(zip(COURSE_ERROR, (np.sin(off), np.cos(off)), strict=True))
+        order = self._order({**given, **dict(zip(OWN, own, strict=True)), **courses})
+        self.begins, self.last_command = False, min(max(order, -self.largest), self.largest)
         return self.last_command
+
+    def _led(self, given: Mapping[str, float], error: Any) -> Any:
+        """Heading error against the course of guidance, for that against the path's beside the ship, rad."""
+        arrays = {name: np.array([given[name]]) for name in self.inputs}
+        shift = self.agent.shift([arrays[name] for name in self.agent.turns_ahead])
+        shown = shift - np.arctan2(arrays["cross_track"], self.agent.gains["task_lookahead"])
+        arrays["heading_error"] = wrapped(error + shown)
+        off = given["set_point"] + shown - given.get("course", 0.0)
+        arrays |= dict(zip(COURSE_ERROR, (np.sin(off), np.cos(off)), strict=True))
+        course, self.guided = self.agent.course(arrays, self.guided)
+        return wrapped(error + shift + course)[0]
 
     def _order(self, seen: Mapping[str, float]) -> float:
         pilot = self.pilot
         if isinstance(pilot, Controller):
-            arrays = {name: np.array([seen.get(name, 0.0)]) for name in pilot.observation_names}
+            names = {*pilot.observation_names, *pilot.reads}
+            arrays = {name: np.array([seen.get(name, 0.0)]) for name in names}
             order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
             return float(order[0])
         pairs = zip(pilot.observation_names, pilot.observation_scales, strict=True)

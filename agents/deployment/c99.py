@@ -15,6 +15,7 @@ import shipgym
 from agents.controllers.controller import Controller
 from agents.controllers.filtered_pid import notch_band
 from agents.controllers.los_autopilot import Guided
+from agents.controllers.wheel_over import STEEPEST
 from agents.deployment.autopilot import VARIABLES, Autopilot, bounds
 from agents.deployment.translator import KEYWORDS, Translator, literal
 from agents.policies.policy import ORDERS, LearnedPolicy
@@ -31,7 +32,8 @@ from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
-LAWS = ("lq-scheduled", "lqg", "pid-filtered")  # with a law of their own in the template
+LAWS = ("lq-scheduled", "lqg", "turn-rate", "pid-filtered")  # with a law of their own in the template
+GUIDES = ("los", "ilos", "alos", "wheel-over")
 SINGLE = "{:.9e}f".format  # a number in single precision as C writes it
 Variables = dict[str, tuple[str, str, float]]  #: unit, meaning and first value
 
@@ -114,9 +116,9 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
 def autopilot_source(agent: Any, name: str | None = None) -> Source:
     """A controller or a learned policy as C99, with the integral of the heading error.
 
-    Its law is a list of gains ("pid", "lq", one of your own with `feedback`), "lq-scheduled", "lqg" or
-    "pid-filtered", guidance over one of these, or a policy that commands the rudder, with or without one of
-    these as its base. Raises InputError for any other controller, and for a name that C does not take.
+    Its law is a list of gains ("pid", "lq", one of your own with `feedback`) or one of `LAWS`, guidance of
+    `GUIDES` over one of these, or a policy that commands the rudder, with or without one of these as its
+    base. Raises InputError for any other controller, and for a name that C does not take.
     """
     policy = agent if isinstance(agent, LearnedPolicy) else None
     base = agent if policy is None else policy.base
@@ -124,10 +126,11 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     pilot = base if guide is None else guide.autopilot
     linear = isinstance(pilot, Controller) and type(pilot).steer is Controller.steer
     law = "linear" if linear else getattr(pilot, "kind", "")
-    if pilot is not None and not linear and law not in LAWS:
+    fault = pilot if pilot is not None and not linear and law not in LAWS else None
+    if fault := guide if guide is not None and guide.kind not in GUIDES else fault:
         raise InputError(
-            f"controller '{getattr(pilot, 'name', type(pilot).__name__)}' found, which is no closed law that "
-            f"could be C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, 'los', 'ilos' or 'alos' "
+            f"controller '{getattr(fault, 'name', type(fault).__name__)}' found, which is no closed law that "
+            f"could be C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, {', '.join(map(repr, GUIDES))} "
             "over one of these, or a learned policy"
         )
     bridge = Autopilot(agent)
@@ -138,7 +141,7 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         "autopilot", f"Autopilot '{agent.name}' for model '{agent.model_name}'",
         checked_name(name or agent.name), inputs, outputs, bridge.dt, limit=bridge.limit, zone=INTEGRAL_ZONE,
         reach=bridge.scales["heading_error_integral"], law=law, policy=policy, guide=guide, pilot=pilot,
-        bounds=bounds(), orders=ORDERS,
+        bounds=bounds(), orders=ORDERS, steepest=STEEPEST,
         memory=getattr(pilot, "memory_size", 0), band=notch_band(wave * bridge.dt),
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
 from importlib import import_module
-from math import copysign
+from math import copysign, radians
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -20,7 +20,8 @@ LONGEST_LINE = 512  # bytes; 82 are the standard's
 BAUD = 4800  # of the standard
 TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
 TO_SI = {**UNITS["length"], **UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
-STEER_TO = {"L": 1.0, "R": -1.0}  # sign of the cross-track error
+#: Signs of the cross-track error by the side to steer to, and of a latitude or longitude.
+SIDES = {"L": 1.0, "R": -1.0, "N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
 EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
 
@@ -65,8 +66,12 @@ def readings(line: str) -> list[Reading] | None:
 def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Reading]:
     for quantity, one in kinds.items():
         if all(fields[int(k)] == text for k, text in one["needs"].items()) and fields[one["at"]]:
-            value = float(fields[one["at"]]) * TO_SI[one["unit"]]
-            value = copysign(value, STEER_TO[fields[one["side"]]]) if "side" in one else value
+            value = float(fields[one["at"]])
+            if one["unit"] == "deg min":  # as 5430.5, 54 degrees and 30.5 minutes
+                value = radians(value // 100.0 + value % 100.0 / 60.0)
+            else:
+                value *= TO_SI[one["unit"]]
+            value = copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
             if abs(value) <= TABLES["believed"][quantity]:
                 yield Reading(quantity, value, talker)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Mapping
 from contextlib import closing, suppress
-from math import atan2, cos, hypot, inf, radians, sin
+from math import atan2, cos, degrees, hypot, inf, radians, sin
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
 from shipgym.checks import check_number
+from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
@@ -20,6 +21,7 @@ from shipgym.ships.conditions import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass
 SLOW = 10  # steps between two of the log and the GNSS receiver
+WAYPOINT = 10.0 * 1852.0  # m, of her plotter along the leg
 START = 54.0, 7.5  # degrees north and east, where the ship is at the beginning
 MINUTE = 1852.0  # m, of latitude
 
@@ -32,10 +34,12 @@ class SimulatedShip:
     """
 
     def __init__(
-        self, model: ShipModel, leg: float = 0.0, weather: Weather | str | None = None, seed: int = 0
-    ) -> None:
+        self, model: ShipModel, leg: float = 0.0, weather: Weather | str | None = None, seed: int = 0,
+        step: float = STEP,
+    ) -> None:  # fmt: skip
         self.model, self.leg, self.order, self.steps = model, check_number(leg, "leg"), 0.0, 0
-        self.passage = Passage(model, Conditions(weather=weather, seed=seed), STEP)
+        self.step = step  # s
+        self.passage = Passage(model, Conditions(weather=weather, seed=seed), step)
         self.states = self.passage.states(model.service_state, 1)
 
     def hear(self, line: str) -> None:
@@ -48,9 +52,9 @@ class SimulatedShip:
         """One step; InputError where the ship has run away."""
         order = np.array([[self.order, self.model.service_shaft_speed]])
         if not self.passage.loop("simulate")(
-            self.states, order, STEP, *self.passage.sea, self.passage.numbers
+            self.states, order, self.step, *self.passage.sea, self.passage.numbers
         ):
-            raise InputError(f"model '{self.model.name}' ran away after {self.steps * STEP:.1f} s")
+            raise InputError(f"model '{self.model.name}' ran away after {self.steps * self.step:.1f} s")
         self.states[0], self.steps = self.states[1], self.steps + 1
 
     @property
@@ -58,21 +62,35 @@ class SimulatedShip:
         """Her state by name."""
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 
-    def sentences(self) -> str:
-        """What her instruments send now."""
-        s, (north, east) = self.now, self.states[0, -4:-2] if self.passage.windy else (0.0, 0.0)
+    def measured(self) -> dict[str, float]:
+        """What her instruments and plotter know, SI units and radians, by quantity of `sentences.toml`."""
+        s, sea = self.now, np.zeros(len(SEA_CHANNELS))
+        if self.passage.windy:  # its current, and the first-order motion that a compass and a gyro feel
+            sea = self.states[0, -len(SEA_CHANNELS) :]
+        psi_wave, r_wave, _, _, north, east = sea[:6].tolist()
         ahead, aside, sine, cosine = s["u"], s["v"] * cos(s.get("phi", 0.0)), sin(s["psi"]), cos(s["psi"])
         north, east = north + ahead * cosine - aside * sine, east + ahead * sine + aside * cosine
         latitude = START[0] + s["x"] / MINUTE / 60.0
         longitude = START[1] + s["y"] / MINUTE / 60.0 / cos(radians(latitude))
-        minutes, seconds = divmod(self.steps * STEP, 60.0)
-        cross = s["y"] * cos(self.leg) - s["x"] * sin(self.leg)
+        left = WAYPOINT * cos(self.leg) - s["x"], WAYPOINT * sin(self.leg) - s["y"]
+        return {
+            "heading": s["psi"] + psi_wave, "yaw_rate": s["r"] + r_wave, "rudder": s["delta"],
+            "surge": s["u"], "sway": s["v"],
+            "course": atan2(east, north), "speed": hypot(north, east), "latitude": radians(latitude),
+            "longitude": radians(longitude), "cross_track": s["y"] * cos(self.leg) - s["x"] * sin(self.leg),
+            "leg": self.leg, "waypoint_bearing": atan2(left[1], left[0]), "waypoint_distance": hypot(*left),
+        }  # fmt: skip
+
+    def sentences(self) -> str:
+        """What her instruments send now."""
+        known = self.measured()
+        north, east = (degrees(known[name]) for name in ("latitude", "longitude"))
+        minutes, seconds = divmod(self.steps * self.step, 60.0)
         text = render(
-            "instruments.nmea.j2", **s, slow=self.steps % SLOW == 0, leg=self.leg,
-            off=f"{abs(cross) / MINUTE:.5f}", side="L" if cross >= 0.0 else "R", course=atan2(east, north),
-            speed=hypot(north, east),
-            latitude=f"{int(latitude):02d}{latitude % 1 * 60:07.4f}",
-            longitude=f"{int(longitude):03d}{longitude % 1 * 60:07.4f}",
+            "instruments.nmea.j2", **known, slow=self.steps % SLOW == 0,
+            off=f"{abs(known['cross_track']) / MINUTE:.5f}", side="L" if known["cross_track"] >= 0.0 else "R",
+            miles=f"{known['waypoint_distance'] / MINUTE:.4f}",
+            north=f"{int(north):02d}{north % 1 * 60:07.4f}", east=f"{int(east):03d}{east % 1 * 60:07.4f}",
             time=f"{int(minutes) // 60 % 24:02d}{int(minutes) % 60:02d}{seconds:05.2f}",
         )  # fmt: skip
         return sentences(text)
@@ -92,7 +110,7 @@ async def simulate_ship(
     await link.open(address, serve=True)
     begin, dropped = loop.time(), dict(drop or {})
     with closing(link), suppress(asyncio.CancelledError):
-        while (now := ship.steps * STEP) < duration:
+        while (now := ship.steps * ship.step) < duration:
             await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))
             lines = ship.sentences().splitlines(keepends=True)
             link.send("".join(line for line in lines if now < dropped.get(line[3:6], inf)))

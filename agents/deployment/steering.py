@@ -6,26 +6,30 @@ import asyncio
 import gc
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, cos, inf, radians, sin
 from typing import Any
 
 from agents.controllers.los_autopilot import Guided
+from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
+from agents.deployment.route import Route
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
-ANGLES = ("heading", "course", "leg", "to_steer", "rudder")
+ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
+PLACES = ("latitude", "longitude")
+EARTH_M = 6.371e6  # radius
 
 
 @dataclass(frozen=True)
 class Limits:
-    """When an autopilot hands over to the helmsman."""
+    """When an autopilot hands over to the helmsman, or warns him, and its largest rudder."""
 
     silence_s: float = 3.0  # without a valid reading of anything that it steers by
     disagreement_deg: float = 5.0  # between angles of two instruments; of yaw rates a tenth of it a second
@@ -34,6 +38,11 @@ class Limits:
     rudder_rate_deg_s: float = 2.3  # slowest of the steering gear; this is that of SOLAS II-1/29
     persistence_s: float = 2.0  # how long a disagreement may last
     late_s: float = 1.0  # how late a step may be; then the computer cannot keep up
+    position_m: float = 100.0  # between positions of two receivers
+    order_deg: float = 90.0  # largest rudder that is ordered, if it is less than the ship's limit
+    off_heading_deg: float = 10.0  # of the heading from its set-point: a warning
+    off_track_m: float = 200.0  # of the ship from her track: a warning
+    early_s: float = 60.0  # before a course change, in which it is announced
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -43,7 +52,13 @@ class Limits:
         """How much two instruments may differ, SI units."""
         if quantity in ANGLES or quantity == "yaw_rate":
             return radians(self.disagreement_deg) * (0.1 if quantity == "yaw_rate" else 1.0)
-        return inf if quantity == "cross_track" else self.disagreement_kn * 1852.0 / 3600.0
+        if quantity in PLACES:
+            return self.position_m / EARTH_M
+        return (
+            inf
+            if quantity in ("cross_track", "waypoint_distance")
+            else self.disagreement_kn * 1852.0 / 3600.0
+        )
 
 
 @dataclass
@@ -98,20 +113,46 @@ class Sensors:
 class Helm:
     """The autopilot between sensors and rudder: `standby`, `steering`, and, after a fault, `manual` for good.
 
-    `heading`, rad, is its set-point, of guidance the direction of the leg; None: the plotter's (APB). Raises
-    InputError for an autopilot that reads what no sentence tells.
+    `heading`, rad, is its set-point, of guidance the direction of the leg; None: the plotter's (APB, BWC).
+    `route`: the track to keep to, for an autopilot that sees the turn ahead; `rate`, rad/s: rate of turn of
+    one that steers it, with a heading at most. Raises InputError for an autopilot that reads what no sentence
+    tells, and for one that steers no route or no rate of turn.
     """
 
-    def __init__(self, agent: Any, heading: float | None, limits: Limits) -> None:
+    def __init__(
+        self, agent: Any, heading: float | None, limits: Limits, route: Route | None = None,
+        rate: float | None = None,
+    ) -> None:  # fmt: skip
+        if rate is not None and heading is not None and isinstance(agent, TurnRate):
+            most = float(agent.rates[-1])
+            check_number(rate, "rate of turn", above=0.0, at_most=most, hint="rad/s, to a heading")
+            agent = replace(agent, gains={**agent.gains, "rate": rate})
         self.pilot, self.limits, self.sensors = Autopilot(agent), limits, Sensors(limits)
+        self.pilot.largest = min(self.pilot.largest, radians(limits.order_deg))
         self.heading, self.state, self.alarm, self.order = heading, STANDBY, "", 0.0
-        self.plotted = "leg" if isinstance(agent, Guided) else "to_steer"
-        self.needed = [one for one in (*self.pilot.inputs, "rudder") if one != "set_point"]
+        self.route, self.rate, self.warnings = route, rate, list[str]()
+        self.plotted = ("leg",) if isinstance(agent, Guided) else ("to_steer", "waypoint_bearing")
+        without = {"set_point", "rate_of_turn", *(Route.GIVES if route else ())}
+        self.needed = [one for one in (*self.pilot.inputs, "rudder") if one not in without]
+        self.needed += PLACES if route else ()
+        self._check(agent)
+        self.silent, self.counts = ["sensors"], {"sentences": 0, "damaged": 0}
+
+    def _check(self, agent: Any) -> None:
+        name, turns = getattr(agent, "name", type(agent).__name__), getattr(agent, "turns_ahead", ())
+        if self.rate is not None and not isinstance(agent, TurnRate):
+            raise InputError(f"rate of turn: autopilot '{name}' found, expected 'turn-rate'")
+        if (self.route is not None) != bool(turns) or {*turns} - {*Route.GIVES}:
+            raise InputError(
+                f"route: autopilot '{name}' {'with' if self.route else 'without'} a route found, expected "
+                "'wheel-over' or 'preview-mpc' of shipgym autopilot with a route, or another without"
+            )
         if unknown := set(self.needed) - TABLES["believed"].keys():
             raise InputError(
                 f"autopilot: it reads {', '.join(sorted(unknown))}, which no sentence of NMEA 0183 tells it"
             )
-        self.silent, self.counts = ["sensors"], {"sentences": 0, "damaged": 0}
+        if "cross_track" in self.pilot.inputs and not isinstance(agent, Guided):
+            raise InputError(f"autopilot: '{name}' learned to follow paths, expected one for course keeping")
 
     def hear(self, line: str, now: float) -> None:
         """Take in a line that was received."""
@@ -122,38 +163,78 @@ class Helm:
 
     def watch(self, step: float, now: float, fault: str | None = None) -> None:
         """Begin when all sensors are there; hand over for good when one is wrong, or at another fault."""
-        given = self._given(now)
+        given = self.given(now)
         self.silent = silent = [name.replace("_", " ") for name, value in given.items() if value is None]
         if self.state == STANDBY and not silent:
             self.state = STEERING
         elif self.state == STEERING and not fault:
             fault = f"no {' and no '.join(silent)} for {self.limits.silence_s:g} s" if silent else None
             fault = fault or self.sensors.fault(self.order, step, now)
+            ended = self.route is not None and self.route.ended
+            fault = fault or ("the end of the route is reached" if ended else None)
         if fault and self.state != MANUAL:
             self.state, self.alarm = MANUAL, fault
+        self.warnings = self._warned(given, now) if self.state == STEERING else []
 
     def steer(self, now: float) -> None:
         """One control interval."""
         if self.state == STEERING:
-            self.order = self.pilot.step({name: value or 0.0 for name, value in self._given(now).items()})
+            self.order = self.pilot.step({name: value or 0.0 for name, value in self.given(now).items()})
 
-    def _given(self, now: float) -> dict[str, float | None]:
-        set_point = self.sensors.value(self.plotted, now) if self.heading is None else self.heading
-        return {**self.sensors.numbers(self.needed, now), "set_point": set_point}
+    def given(self, now: float) -> dict[str, float | None]:
+        """What the autopilot is given; None for what is not known."""
+        found = self.sensors.numbers(self.needed, now)
+        found["rate_of_turn"] = 0.0 if self.rate is None or self.heading is not None else self.rate
+        if self.route is None:
+            heard = next((one for one in self.sensors.newest if one in self.plotted), self.plotted[0])
+            plotted = 0.0 if self.rate is not None else self.sensors.value(heard, now)
+            return {**found, "set_point": plotted if self.heading is None else self.heading}
+        latitude, longitude = (found[one] for one in PLACES)
+        if latitude is None or longitude is None:
+            return found
+        return {**found, **self.route.given(latitude, longitude)}
+
+    def _warned(self, given: dict[str, float | None], now: float) -> list[str]:
+        """What the helmsman is to know although the autopilot steers."""
+        number = {name: value or 0.0 for name, value in given.items()}
+        off = abs(float(wrapped(number.get("set_point", 0.0) - number["heading"])))
+        keeps_heading = "leg" not in self.plotted and not number["rate_of_turn"]
+        off_track = abs(number.get("cross_track", 0.0)) > self.limits.off_track_m
+        ahead = self._seconds_to_turn(number, now) <= self.limits.early_s
+        found = {
+            "off heading": keeps_heading and off > radians(self.limits.off_heading_deg),
+            "off track": off_track, "course change ahead": ahead,
+        }  # fmt: skip
+        return [text for text, holds in found.items() if holds]
+
+    def _seconds_to_turn(self, given: dict[str, float], now: float) -> float:
+        """Time to where the next turn is begun, or to the plotter's waypoint, s."""
+        speed, to_waypoint = self.sensors.value("speed", now), self.sensors.value("waypoint_distance", now)
+        if not speed:
+            return inf
+        if self.route is None:
+            return inf if to_waypoint is None else to_waypoint / speed
+        reach = self.pilot.agent.gains["turn_reach"]
+        turns = [
+            (given[f"{which}_turn_distance"], given[f"{which}_turn_angle"]) for which in ("next", "second")
+        ]
+        return min(((to_go - reach) / speed for to_go, turn in turns if turn and to_go > reach), default=inf)
 
     @property
     def status(self) -> str:
         """What it does, what it waits for, or why it has handed over."""
         if self.state == STANDBY:
             return f"{STANDBY}, waits for {', '.join(self.silent)}"
-        return f"{MANUAL}: ALARM, {self.alarm}: take the wheel" if self.alarm else self.state
+        steering = ", ".join([self.state, *self.warnings])
+        return f"{MANUAL}: ALARM, {self.alarm}: take the wheel" if self.alarm else steering
 
     def sentences(self) -> str:
         """Rudder order and status, and the alarm if there is one."""
         return sentences(
             render(
-                "helm.nmea.j2", order=self.order, valid=self.state == STEERING, limit=self.pilot.limit,
-                set_point=self.heading, alarm=self.alarm,
+                "helm.nmea.j2", order=self.order, valid=self.state == STEERING, limit=self.pilot.largest,
+                set_point=self.heading, alarm=self.alarm, track=self.route is not None, rate=self.rate,
+                warnings=self.warnings,
             )
         )  # fmt: skip
 
@@ -161,16 +242,17 @@ class Helm:
 async def steer(
     agent: Any, address: str, *, heading: float | None = None, limits: Limits | None = None,
     duration: float = inf, speed_up: float = 1.0, told: Callable[[str], None] = print,
+    route: Route | None = None, rate: float | None = None,
 ) -> Helm:  # fmt: skip
     """Steer a ship over NMEA 0183 for a duration in s; the helm as it was at the end.
 
-    `agent`, `heading` and `limits` are those of `Helm`, `address` is that of a `Link`. Of simulated ships
-    `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises InputError for an
-    address that cannot be opened, and for an autopilot that reads what no sentence tells.
+    `agent`, `heading`, `limits`, `route` and `rate` are those of `Helm`, `address` is that of a `Link`. Of
+    simulated ships `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises
+    InputError for an address that cannot be opened, and for an autopilot that reads what no sentence tells.
     """
-    for name, number in (("speed_up", speed_up), ("heading", heading or 0.0)):
+    for name, number in (("speed_up", speed_up), ("heading", heading or 0.0), ("rate", rate or 0.0)):
         check_number(number, name)
-    helm, loop = Helm(agent, heading, limits or Limits()), asyncio.get_running_loop()
+    helm, loop = Helm(agent, heading, limits or Limits(), route, rate), asyncio.get_running_loop()
     link = Link(lambda line: helm.hear(line, loop.time() * speed_up))
     await link.open(address)
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)

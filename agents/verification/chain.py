@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,8 +12,7 @@ import numpy as np
 
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
-from agents.controllers.lq import LQ
-from agents.controllers.pid import PID
+from agents.controllers.registry import controller_class, controller_kinds
 from agents.engines.jobs import HERE, JobEngine
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import whole_folder
@@ -21,6 +21,7 @@ from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import monte_carlo
 from agents.verification.refusal import helpful_trial, lost_control, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from agents.verification.tracks import Track, keep_track, track_task
 from identification import IdentificationResult
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
@@ -37,7 +38,8 @@ if TYPE_CHECKING:
     from agents.agent_file import Agent
 
 
-FILES = ("report.html", "metrics.json", "model.json", "pid.json", "lq.json")
+FILES = ("report.html", "metrics.json", "model.json")  # beside those of the autopilots
+DESIGNS = ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
 LARGEST_SEED = 2**32
 
 #: Told the stage of the work, the units of it done and their total.
@@ -52,81 +54,94 @@ def build_autopilot(
     seed: int = 0,
     options: Mapping[str, Any] | None = None,
     agents: Sequence[str | Path] = (),
+    designs: Sequence[str] = DESIGNS,
+    standards: bool = False,
     progress: Progress | None = None,
     where: JobEngine = HERE,
 ) -> AutopilotResult:
-    """Identify a ship from its trials, design a PID and an LQ autopilot, verify both, write the report.
+    """Identify a ship from its trials, design autopilots, verify them, write the report.
 
-    The folder holds `report.html`, `metrics.json`, `model.json`, `pid.json` and `lq.json`; where the model is
-    unstable or refused only the first two, and no file of an autopilot that is refused. It is written whole
-    or not at all. `ship_file`: the ship file (TOML) with its trials; `out`: folder of the results; an
-    earlier report there is replaced, anything else is refused; `draws`: number of models drawn from the
-    coefficient covariance, at least 2; `seed`: of the draws and of
-    the episodes; `options`: of `identify`, by name, trials by file; those not given are the ship file's;
-    `agents`: files of autopilots to verify beside PID and LQ, or names of pretrained ones (`load_agent`);
-    `progress`: called as the work goes on; `where`: where the models drawn are worked on; the results are the
-    same. Raises InputError for anything wrong with the files or arguments; nothing is written then.
+    The folder holds `report.html`, `metrics.json`, `model.json` and a file of each autopilot, such as
+    `lq.json`; where the model is unstable or refused only the first two, and no file of an autopilot that is
+    refused. It is written whole or not at all. `ship_file`: the ship file (TOML) with its trials; `out`:
+    folder of the results; an earlier report there is replaced, anything else is refused; `draws`: number of
+    models drawn from the coefficient covariance, at least 2; `seed`: of the draws and of the episodes;
+    `options`: of `identify`, by name, trials by file; those not given are the ship file's; `agents`: files of
+    autopilots to verify beside those designed, or names of pretrained ones (`load_agent`); `designs`: kinds
+    of controller to design, of which those that lead another one keep to a track; `standards`: whether to
+    simulate what the standards of heading and track control ask for; `progress`: called as the work goes on;
+    `where`: where the models drawn are worked on; the results are the same. Raises InputError for anything
+    wrong with the files or arguments; nothing is written then.
     """
-    folder = Path(out)
     where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
+    for kind in designs:
+        controller_class(kind, "autopilots")
     graph_objects()  # a missing extra is reported now, not after the work
-    with whole_folder(folder, FILES) as draft:
-        result = examine(
-            ship_file, draws=int(draws), seed=int(seed), options=options, agents=agents, progress=progress,
-            where=where,
-        )  # fmt: skip
-        _tell(progress, "writing the report", 0, 1)
-        _write(result, draft)
-    _tell(progress, "writing the report", 1, 1)
+    tell = progress or (lambda *_: None)
+    with whole_folder(Path(out), (*FILES, *(f"{kind}.json" for kind in controller_kinds()))) as draft:
+        with _stage(tell, "reading trials"):
+            ship = ShipFile.load(ship_file)
+            guests = [(f"agent '{agent}'", load_agent(agent)) for agent in agents]
+            trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
+        with _stage(tell, "identifying"):
+            fit = identify_trials(ship, trials, arguments)
+
+        def verified() -> Verification:
+            return verify(fit.model, int(draws), int(seed), tell, where, [one for _, one in guests], designs)
+
+        result = _examined(ship, fit, guests, verified)
+        found = result.verification
+        if standards and found is not None and result.refusal is None:
+            with _stage(tell, "standards"):
+                result = replace(result, verification=_to_standards(found, fit.model))
+        with _stage(tell, "writing the report"):
+            _write(result, draft)
     return result
+
+
+@contextmanager
+def _stage(tell: Progress, name: str) -> Iterator[None]:
+    """Work of one unit, told when it begins and when it is done."""
+    tell(name, 0, 1)
+    yield
+    tell(name, 1, 1)
 
 
 def _write(result: AutopilotResult, folder: Path) -> None:
     from agents.verification.page import write_report
 
     write_json(result.metrics, folder / "metrics.json")
-    if result.verification is not None:
+    if (found := result.verification) is not None:
         result.model.save(folder / "model.json")
-        for pilot in result.verification.pilots:
-            if pilot.design is not None and pilot.key not in result.verification.refused:
-                pilot.design.save(folder / f"{pilot.key}.json")
+        designed = {one.key: one.controller for one in found.pilots if one.design is not None}
+        for key, controller in (designed | {one.key: one.controller for one in found.tracks}).items():
+            if isinstance(controller, Controller) and key not in found.refused:
+                controller.save(folder / f"{key}.json")
     write_report(result, folder / "report.html")
 
 
-def examine(
-    ship_file: str | Path,
-    *,
-    draws: int = 200,
-    seed: int = 0,
-    options: Mapping[str, Any] | None = None,
-    agents: Sequence[str | Path] = (),
-    progress: Progress | None = None,
-    where: JobEngine = HERE,
+def _examined(
+    ship: ShipFile,
+    fit: IdentificationResult,
+    guests: list[tuple[str, Agent]],
+    verified: Callable[[], Verification],
 ) -> AutopilotResult:
-    """The chain without its files: see `build_autopilot`."""
-    _tell(progress, "reading trials", 0, 1)
-    ship = ShipFile.load(ship_file)
-    guests = [load_agent(agent) for agent in agents]
-    trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
-    _tell(progress, "reading trials", 1, 1)
-    _tell(progress, "identifying", 0, 1)
-    identification = identify_trials(ship, trials, arguments)
-    _tell(progress, "identifying", 1, 1)
-    instability = why_unstable(identification)
-    refusal = why_refused(identification) if instability is None else None
+    """What is found on an identified model: its verification, or why there is none."""
+    instability = why_unstable(fit)
+    refusal = why_refused(fit) if instability is None else None
     verification = None
     if instability is None and refusal is None:
-        for guest, agent in zip(guests, agents, strict=True):
-            _check_fits(guest, identification.model, f"agent '{agent}'")
+        for where, guest in guests:
+            _check_fits(guest, fit.model, where)
         try:
-            verification = verify(identification.model, draws, seed, progress, where, guests)
+            verification = verified()
         except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
             instability = str(error)
     if verification is not None:
-        verification, refusal = _decided(verification, identification)
-    return AutopilotResult(ship, identification.trials, identification, instability, verification, refusal)
+        verification, refusal = _decided(verification, fit)
+    return AutopilotResult(ship, fit.trials, fit, instability, verification, refusal)
 
 
 def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verification, str | None]:
@@ -145,26 +160,36 @@ def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verificati
     return replace(found, refused=refused), refusal
 
 
+def _to_standards(found: Verification, model: ShipModel) -> Verification:
+    """A verification with what the standards ask of its best heading and its first path autopilot."""
+    from agents.verification.standards import standards
+
+    best = next(one.design for one in found.pilots if one.design is not None and one.key not in found.refused)
+    tracks = [track for track in found.tracks if track.key not in found.refused]
+    return replace(found, standards=tuple(standards(model, best, tracks)))
+
+
 def verify(
     model: ShipModel,
     draws: int,
     seed: int,
-    progress: Progress | None = None,
+    tell: Progress = lambda *_: None,
     where: JobEngine = HERE,
     guests: Sequence[Agent] = (),
+    designs: Sequence[str] = DESIGNS,
 ) -> Verification:
-    """Design PID and LQ on a model and run them, and guests, over models drawn from its covariance.
+    """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
 
-    `model`: with a covariance; `draws`, `seed`, `progress`, `where`: see `build_autopilot`; `guests`: further
-    autopilots. Raises UnstableModelError if the model itself runs away; InputError if no autopilot can be
-    designed on it.
+    `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: told the
+    progress; `guests`: further autopilots. Raises UnstableModelError if the model itself runs away;
+    InputError if no autopilot can be designed on it.
     """
     stage = "models drawn"
-    _tell(progress, stage, 0, draws)
-    controllers, refused = _designed(model)
+    tell(stage, 0, draws)
+    controllers, guides, refused = _designed(model, designs)
     found = monte_carlo(
         controllers, model, draws, seed,
-        where=where, progress=lambda done: _tell(progress, stage, done, draws),
+        where=where, progress=lambda done: tell(stage, done, draws),
     )  # fmt: skip
     seeds = seed + np.arange(draws)
     episodes = [*found.episodes, *(sail(guest, found.draws, seeds=seeds) for guest in guests)]
@@ -172,10 +197,10 @@ def verify(
     pilots, autopilots = [], [*controllers, *guests]
     keys = _unique_keys([str(one.name) for one in autopilots])
     for k, controller in enumerate(autopilots):
-        _tell(progress, "step responses", k, len(autopilots))
+        tell("step responses", k, len(autopilots))
         step = step_response(controller, [model, *stable], STEP_DEG)
         pilots.append(Pilot(keys[k], controller, episodes[k], step))
-    _tell(progress, "step responses", len(autopilots), len(autopilots))
+    tell("step responses", len(autopilots), len(autopilots))
     return Verification(
         draws=draws,
         seed=seed,
@@ -184,7 +209,17 @@ def verify(
         nomoto=nomoto(model),
         pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.episodes.cost)))),
         refused=refused,
+        tracks=_tracks(guides, [model, *stable], refused),
     )
+
+
+def _tracks(guides: list[Controller], models: list[ShipModel], refused: dict[str, str]) -> tuple[Track, ...]:
+    """The track of each path autopilot; one that does not arrive on the identified model is refused."""
+    tracks = tuple(keep_track(guide, models) for guide in guides)
+    for track in tracks:
+        if not track.arrived[0]:
+            refused[track.key] = "it does not reach the end of the track on the identified model"
+    return tracks
 
 
 def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
@@ -207,24 +242,28 @@ def _unique_keys(names: Sequence[str]) -> list[str]:
     ]
 
 
-def _designed(model: ShipModel) -> tuple[list[Controller], dict[str, str]]:
-    """The autopilots, and why others could not be designed.
+def _designed(
+    model: ShipModel, designs: Sequence[str]
+) -> tuple[list[Controller], list[Controller], dict[str, str]]:
+    """Autopilots that keep a heading, those that keep a track, and why others could not be designed.
 
-    Raises InputError if none could.
+    Raises InputError if none that keeps a heading could.
     """
     controllers: list[Controller] = []
+    guides: list[Controller] = []
     refused: dict[str, str] = {}
-    designs: tuple[Any, ...] = (PID, LQ)
-    for design in designs:
+    for kind in dict.fromkeys(designs):
+        made: Any = controller_class(kind)
         try:
-            controllers.append(design.from_model(model))
+            if made.has_autopilot:
+                guides.append(made.from_model(model, task=track_task(model)))
+            else:
+                controllers.append(made.from_model(model))
         except InputError as error:  # this design does not suit the ship; another may
-            refused[design.kind] = str(error)
+            refused[kind] = str(error)
     if not controllers:
-        raise InputError("no autopilot could be designed on it: " + "; ".join(refused.values()))
-    return controllers, refused
-
-
-def _tell(progress: Progress | None, stage: str, done: int, total: int) -> None:
-    if progress is not None:
-        progress(stage, done, total)
+        raise InputError(
+            "no autopilot that keeps a heading could be designed on it: "
+            + ("; ".join(refused.values()) or f"{quoted(designs)} found, expected one such as 'lq'")
+        )
+    return controllers, guides, refused

@@ -30,8 +30,10 @@ from shipgym.plots import (
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
+    from agents.verification.tracks import Track
 
-PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e")
+
+PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e", "#3b5b92", "#8c564b")
 
 CRITERIA = {
     "advance": "Advance",
@@ -144,6 +146,27 @@ def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step
     label(figure, "", "heading change, deg", row=1, col=1)
     label(figure, "time, s", axis("rudder, deg", zero=True), row=2, col=1)
     figure.update_layout(layout(500))
+    return figure
+
+
+def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
+    """Tracks sailed by the identified model under each path autopilot, and the distance from them."""
+    figure = subplots(1, 2, titles=["Track", "Cross-track error"], horizontal_spacing=0.1)
+    for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
+        if name == next(iter(tracks)):
+            planned = track.waypoints / length
+            figure.add_trace(
+                line(planned[:, 1], planned[:, 0], "waypoints", MUTED, 1.2, line_dash="dot"), row=1, col=1
+            )
+        x, y = track.positions.T / length
+        figure.add_trace(line(compact(y), compact(x), name, colour, 2.0), row=1, col=1)
+        way = np.append(0.0, np.cumsum(np.hypot(np.diff(x), np.diff(y))))
+        off = line(compact(way), compact(track.cross_track), name, colour, 1.6, showlegend=False)
+        figure.add_trace(off, row=1, col=2)
+    north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
+    label(figure, "east, ship lengths", north_axis, row=1, col=1)
+    label(figure, "way, ship lengths", axis("m, positive to starboard", zero=True), row=1, col=2)
+    figure.update_layout(layout(430, titled=True, hovermode="closest"))
     return figure
 
 

@@ -16,8 +16,9 @@ from agents.verification.figures import (
     criterion_name,
     manoeuvres_figure,
     steps_figure,
+    tracks_figure,
 )
-from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
+from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification, track_metrics
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
@@ -79,7 +80,10 @@ def verification_view(found: Verification) -> dict[str, Any]:
         "nomoto": found.nomoto,
         "pilots": pilots,
         "designs": designed,
-        "gains": _gains(list(designed.values())),
+        "standards": found.standards,
+        "linear": {name: one for name, one in designed.items() if one.feedback},
+        "gains": _gains([one for one in designed.values() if one.feedback]),
+        "tracks": {track.key.upper(): track_metrics(track) for track in found.tracks},
         "learned": [pilot.name for pilot in _by_name(found) if pilot.design is None],
         "refused": found.refused,
         "cheaper": [
@@ -161,6 +165,7 @@ def _figures(result: AutopilotResult, found: Verification) -> dict[str, Any]:
         "manoeuvres": manoeuvres_figure(found.manoeuvres, _length(result)),
         "steps": steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
         "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in pilots}),
+        "track_keeping": tracks_figure({track.key.upper(): track for track in found.tracks}, _length(result)),
     }
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from agents.controllers.controller import Controller
 from agents.rollouts.course_keeping import Episodes, StepResponses
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from agents.verification.tracks import Track
 from identification import IdentificationResult
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto
@@ -19,6 +20,7 @@ from shipgym.trials.trial import Trial
 
 if TYPE_CHECKING:
     from agents.agent_file import Agent
+    from agents.verification.standards import Row
 
 
 STEP_DEG = 20.0
@@ -56,6 +58,8 @@ class Verification:
     nomoto: Nomoto  # of the identified model
     pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
     refused: dict[str, str]  # autopilots that could not be designed on the model, and why
+    tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
+    standards: tuple[Row, ...] = ()  # what the standards of heading and track control ask for
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +113,21 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
+        "tracks": {track.key: track_metrics(track) for track in found.tracks},
+        "standards": {row.name: {**asdict(row), "passed": row.passed} for row in found.standards},
+    }
+
+
+def track_metrics(track: Track) -> dict[str, Any]:
+    """Cross-track errors of one path autopilot: on the identified model, and on the models drawn."""
+    drawn = track.largest[1:] if len(track.largest) > 1 else track.largest
+    return {
+        "gains": {name: float(value) for name, value in track.controller.gains.items()},
+        "cross_track_largest_m": float(track.largest[0]),
+        "cross_track_rmse_m": float(track.rms[0]),
+        "cross_track_largest_m_quantile_95": float(np.quantile(drawn, 0.95)),
+        "arrived": bool(track.arrived[0]),
+        "not_arrived": int(np.sum(~track.arrived[1:])),
     }
 
 

@@ -96,8 +96,24 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
     return StraightRunning(found["u"], found["v"], found["delta"], *rest)
 
 
-def _balance(model: ShipModel, unknowns: list[str], speed: float | None = None) -> dict[str, float] | None:
-    """State without accelerations, found from a speed by changing the unknowns; SI units by name."""
+def steady_turn_rudder(model: ShipModel, rate: float, slowed: bool = True) -> float | None:
+    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if none is found.
+
+    `slowed`: whether the ship loses speed as her surge equation has it, or keeps that of service.
+    """
+    unknowns = [name for name in BALANCED_BY if name in model.state_names and (slowed or name != "u")]
+    found = _balance(model, unknowns, rate=rate, drift=1.0)
+    return found["delta"] if found is not None and found.get("u", 1.0) > 0.0 else None
+
+
+def _balance(
+    model: ShipModel, unknowns: list[str], speed: float | None = None, rate: float = 0.0,
+    drift: float = LARGEST_SWAY,
+) -> dict[str, float] | None:  # fmt: skip
+    """State without accelerations at a yaw rate, found from a speed by changing the unknowns; SI units.
+
+    `drift`: largest sway over service speed; a state in a turn may have more rudder than straight running.
+    """
     from scipy.optimize import root
 
     columns = [model.state_names.index(name) for name in unknowns]
@@ -108,6 +124,7 @@ def _balance(model: ShipModel, unknowns: list[str], speed: float | None = None) 
         state = model.service_state.copy()
         if speed is not None and "u" in model.state_names:
             state[model.state_names.index("u")] = speed
+        state[model.state_names.index("r")] = rate
         state[columns] += deviations * scales[columns]
         return state
 
@@ -117,8 +134,8 @@ def _balance(model: ShipModel, unknowns: list[str], speed: float | None = None) 
     found = root(imbalance, np.zeros(len(unknowns)), tol=1e-12)
     state = dict(zip(model.state_names, state_with(found.x).tolist(), strict=True))
     at_rest = bool(np.all(np.abs(imbalance(found.x)) < AT_REST))
-    small = abs(state["v"]) < LARGEST_SWAY * model.particulars["speed"]
-    return state if at_rest and small and abs(state["delta"]) < LARGEST_RUDDER else None
+    small = abs(state["v"]) < drift * model.particulars["speed"]
+    return state if at_rest and small and (rate or abs(state["delta"]) < LARGEST_RUDDER) else None
 
 
 def _scales(model: ShipModel) -> Floats:

@@ -10,6 +10,7 @@ from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
 from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
+from agents.verification.tracks import keep_track
 from identification import identify
 from identification.validation.warnings import model_warnings
 from shipgym import InputError, ShipFile, load_model
@@ -17,10 +18,13 @@ from shipgym.manoeuvres import Criterion, IndexInterval
 from tests.agents.policies import random_policy
 
 
-def test_the_folder_holds_report_model_metrics_and_both_autopilots(chain):
+def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
     folder, _, _ = chain
     found = sorted(path.name for path in folder.iterdir())
-    assert found == ["lq.json", "metrics.json", "model.json", "pid.json", "report.html"]
+    assert found == [
+        "lq-scheduled.json", "lq.json", "metrics.json", "model.json", "pid.json", "report.html",
+        "turn-rate.json", "wheel-over.json",
+    ]  # fmt: skip
     assert list(folder.parent.iterdir()) == [folder]
 
 
@@ -40,12 +44,36 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
     assert metrics["draws"]["unstable"] == int(result.verification.manoeuvres.unstable.sum())
     assert metrics["imo"]["advance"]["probability"] == 1.0
     assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
-    assert sorted(metrics["ranking"]) == ["lq", "pid"]
-    best, worst = (metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"])
-    assert 0.0 < best <= worst
-    for name in ("pid", "lq"):
+    assert sorted(metrics["ranking"]) == ["lq", "lq-scheduled", "pid", "turn-rate"]
+    costs = [metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"]]
+    assert costs == sorted(costs)
+    for name in metrics["ranking"]:
         assert metrics["controllers"][name]["lost_control"] == 0
         assert metrics["controllers"][name]["margins"]["phase_margin_deg"] > 30.0
+
+
+def test_wheel_over_keeps_to_the_track_in_a_current_on_every_model_drawn(chain):
+    """Within half a ship length; with a quarter of the turn's reach it leaves it by more."""
+    _, result, _ = chain
+    (track,), length = result.verification.tracks, result.model.particulars["length"]
+    assert track.arrived.all()
+    assert len(track.largest) == 25
+    assert track.largest.max() < 0.5 * length
+    told = result.metrics["tracks"]["wheel-over"]
+    assert told["cross_track_largest_m"] == track.largest[0]
+    late = replace(track.controller, gains={**track.controller.gains, "turn_reach": 1.0})
+    assert keep_track(late, [result.model]).largest[0] > 1.5 * track.largest[0]
+
+
+def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refused(chain):
+    model = chain[1].model
+    found = verify(model, 4, 1, designs=("lqg", "lqg"))
+    assert [pilot.key for pilot in found.pilots] == ["lqg"]
+    assert found.tracks == ()
+    with pytest.raises(InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"):
+        verify(model, 4, 1, designs=("wheel-over",))
+    with pytest.raises(InputError, match="autopilots: 'wheelover' found, expected one of"):
+        build_autopilot("examples/mariner/ship.toml", "out", designs=["wheelover"])
 
 
 def test_the_saved_model_is_the_identified_one(chain):
@@ -73,7 +101,7 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
 def test_guests_of_one_name_are_told_apart(chain):
     model = chain[1].model
     guests = [LQ.from_model(model, integral_lengths=20.0), LQ.from_model(model, integral_lengths=80.0)]
-    told = verification_metrics(verify(model, 4, 1, guests=guests))
+    told = verification_metrics(verify(model, 4, 1, guests=guests, designs=("pid", "lq")))
     assert set(told["controllers"]) == set(told["ranking"]) == {"pid", "lq", "lq-2", "lq-3"}
     assert told["controllers"]["lq-2"]["gains"] == guests[0].gains
 
@@ -175,7 +203,9 @@ def verified(**changes: float) -> dict:
     mariner = load_model("mariner")
     coefficients = {**mariner.coefficients, **changes}
     spread = np.diag([(1e-4 * value) ** 2 for value in coefficients.values()])
-    found = verify(replace(mariner, coefficients=coefficients, covariance=spread), draws=4, seed=0)
+    found = verify(
+        replace(mariner, coefficients=coefficients, covariance=spread), 4, 0, designs=("pid", "lq")
+    )
     metrics = verification_metrics(found)
     json.dumps(metrics, allow_nan=False)
     return metrics

@@ -9,7 +9,19 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, LQG, PID, FilteredPID, IntegralLineOfSight, ScheduledLQ, Shielded, load_agent
+from agents import (
+    LQ,
+    LQG,
+    PID,
+    FilteredPID,
+    IntegralLineOfSight,
+    PreviewMPC,
+    ScheduledLQ,
+    Shielded,
+    TurnRate,
+    WheelOver,
+    load_agent,
+)  # fmt: skip
 from agents.cli import app
 from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
@@ -25,7 +37,8 @@ from shipgym.sea.open_sea import sea_functions
 from shipgym.sea.weather_column import CALM
 from shipgym.ships import load_model
 from shipgym.ships.kernel_boxes import Kernel, kernel_box
-from tests.agents.policies import MARINER, random_policy
+from shipgym.tasks.task import Task, path_following_task
+from tests.agents.policies import MARINER, random_network, random_policy
 
 FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
 
@@ -114,6 +127,17 @@ def test_functions_of_the_engine_are_the_same_in_c_bit_by_bit(tmp_path):
             assert in_c(x) == function(x)
 
 
+def over_wheel_over():
+    """A policy with weights at random that adds to what wheel-over commands."""
+    task = Task.of("PathFollowing-v1")
+    shown, base = task.observed(MARINER), WheelOver.from_model(MARINER, task=task)
+    names, scales = zip(*((one.name, one.scale) for one in shown), strict=True)
+    network = random_network(len(names) + 1, 16, 1)
+    return random_policy(
+        network=network, observation_names=names, observation_scales=scales, base=base, authority=0.3
+    )
+
+
 CONTROLLERS = {
     "pid": PID.from_model(MARINER),
     "filtered": FilteredPID.from_model(MARINER, wave_period=9.0, largest_turn_rate_deg_s=0.5),
@@ -122,20 +146,28 @@ CONTROLLERS = {
     "lqg": LQG.from_model(MARINER, wave_period=9.0),
     "ilos": IntegralLineOfSight.from_model(MARINER),
     "alos": AdaptiveLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
+    "turn_rate": TurnRate.from_model(MARINER),
+    "wheel_over": WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")),
+    "wheel_over_legs": WheelOver.from_model(
+        MARINER, autopilot=TurnRate.from_model(MARINER), task=path_following_task()
+    ),
     "ppo": load_agent("mariner-calm-ppo"),
     "path_ppo": load_agent("container-roll-path-ppo"),
     "limited": random_policy(base=LQ.from_model(MARINER), action_repeat=3, rate_limit=0.1),
+    "residual": over_wheel_over(),
     "orders": random_policy(action="rudder-discrete", frame_stack=3, action_repeat=2),
 }
+LONG = ("lq", "turn_rate", "wheel_over", "wheel_over_legs")
 SIZES = {
     "heading": 0.1, "set_point": 0.3, "yaw_rate": 0.01, "sway": 1.0, "surge": 8.0, "rudder": 0.3,
-    "cross_track": 200.0, "turn_distance": 300.0,
+    "cross_track": 200.0, "turn_distance": 300.0, "next_turn_distance": 500.0, "second_turn_distance": 900.0,
+    "rate_of_turn": 0.004,
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
 def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
-    agent, steps = CONTROLLERS[name], 10_000 if name == "lq" else 1000
+    agent, steps = CONTROLLERS[name], 10_000 if name in LONG else 1000
     source, bridge = autopilot_source(agent, name), Autopilot(agent)
     library = built(tmp_path, name, source.header, source.source)
     state, step = ctypes.create_string_buffer(10_000), getattr(library, f"{name}_step")
@@ -144,7 +176,11 @@ def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
     random = np.random.default_rng(0)
     numbers = random.normal(0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs)))
     numbers[:, 0] = 0.4 * (np.arange(steps) % 600 > 300)  # the set-point stands first
-    within = 1e-12 if name not in ("ppo", "path_ppo", "limited", "orders") else 1e-6
+    for column in np.flatnonzero(
+        np.isin([*source.inputs], ["rate_of_turn", "turn_angle", "next_turn_angle"])
+    ):
+        numbers[::3, column] = 0.0  # no rate ordered, no turn ahead
+    within = 1e-12 if name not in ("ppo", "path_ppo", "limited", "residual", "orders") else 1e-6
     for row in numbers:
         expected = bridge.step(dict(zip(source.inputs, row.tolist(), strict=True)))
         assert abs(step(state, row.ctypes.data) - expected) <= within
@@ -169,7 +205,33 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
         seen, *_ = env.step(action)
 
 
+@pytest.mark.parametrize(
+    ("version", "kind"), [(1, WheelOver), (0, WheelOver), (1, PreviewMPC), (1, IntegralLineOfSight)]
+)
+def test_guidance_orders_what_it_commands_along_a_path(version, kind):
+    """Its inputs are those of a bridge: the direction of the path, and the course over ground."""
+    env = gym.make(f"shipgym/PathFollowing-v{version}", model="mariner", max_turn_deg=60.0)
+    task = env.unwrapped.task
+    agent = kind.from_model(MARINER, task=task)
+    seen, _ = env.reset(seed=3)
+    names, scales = env.unwrapped.observation_names, env.unwrapped.observation_scales
+    bridge, state = Autopilot(agent), None
+    for step in range(60 if kind is PreviewMPC else 250):
+        told = dict(zip(names, seen.astype(float) * scales, strict=True))
+        turns = [np.array([told[name]]) for name in agent.turns_ahead]
+        course = np.arctan2(seen[0], seen[1])  # the environment's, the ship heading to the north
+        ground = course - np.arctan2(told["course_error_sin"], told["course_error_cos"])
+        direction = course + np.arctan2(told["cross_track"], agent.gains["task_lookahead"])
+        direction -= float(np.squeeze(agent.shift(turns)))
+        order = bridge.step({**told, "set_point": direction, "heading": 0.0, "course": ground})
+        action, state = agent.predict(seen, state, step == 0)
+        assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)
+        seen, *_ = env.step(action)
+
+
 def test_what_is_no_closed_law_is_refused():
+    with pytest.raises(InputError, match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
+        autopilot_source(PreviewMPC.from_model(MARINER))
     with pytest.raises(
         InputError, match=r"'lq-adaptive' found, which is no closed law that could be C. Export 'pid', 'lq'"
     ):

@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from fmpy import validation
 
-from agents import LQ
+from agents import LQ, TurnRate, WheelOver
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import autopilot_source, ship_source
 from agents.deployment.fmu import write_fmu
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 
 DT, STEPS = 0.5, 200
@@ -44,11 +45,27 @@ def test_a_ship_turns_as_in_the_library(version, tmp_path):
         np.testing.assert_allclose(found[name], trial[name], rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("version", ["2.0", "3.0"])
-def test_an_autopilot_decides_once_in_each_of_its_intervals(version, tmp_path):
-    agent, path = LQ.from_model(MARINER, dt=2 * DT), tmp_path / "lq.fmu"
-    write_fmu(autopilot_source(agent, "lq"), path, version)
-    given = {"set_point": 0.1, "heading": 0.02, "yaw_rate": 0.001, "sway": 0.1, "rudder": 0.05}
+BY_A_BRIDGE = {
+    "set_point": 0.1, "heading": 0.02, "yaw_rate": 0.001, "sway": 0.1, "surge": 7.5, "rudder": 0.05,
+    "rate_of_turn": 0.003, "cross_track": 30.0, "course": 0.05, "next_turn_distance": 200.0,
+    "next_turn_angle": 0.6, "second_turn_distance": 2000.0, "second_turn_angle": -0.4,
+}  # fmt: skip
+ALONG_ARCS = Task.of("PathFollowing-v1", dt=2 * DT)
+PILOTS = {
+    "lq": LQ.from_model(MARINER, dt=2 * DT),
+    "turn_rate": TurnRate.from_model(MARINER, dt=2 * DT),
+    "wheel_over": WheelOver.from_model(MARINER, task=ALONG_ARCS),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "version"), [("lq", "2.0"), ("lq", "3.0"), ("turn_rate", "2.0"), ("wheel_over", "3.0")]
+)
+def test_an_autopilot_decides_once_in_each_of_its_intervals(name, version, tmp_path):
+    agent, path = PILOTS[name], tmp_path / f"{name}.fmu"
+    source = autopilot_source(agent, name)
+    write_fmu(source, path, version)
+    given = {one: BY_A_BRIDGE[one] for one in source.inputs}
     found, bridge = run(path, given, given.values()), Autopilot(agent)
     orders = np.repeat([bridge.step(given) for _ in range(STEPS // 2)], 2)
     np.testing.assert_allclose(found["order"][1:], orders, rtol=0.0, atol=1e-12)

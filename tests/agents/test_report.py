@@ -76,7 +76,16 @@ def test_a_report_has_less_than_3_megabytes(source):
 
 
 def test_all_sections_are_there_and_in_the_contents(page):
-    expected = ["data", "coefficients", "prediction", "manoeuvres", "autopilots", "ranking", "origin"]
+    expected = [
+        "data",
+        "coefficients",
+        "prediction",
+        "manoeuvres",
+        "autopilots",
+        "ranking",
+        "tracks",
+        "origin",
+    ]
     assert page.sections == expected
     assert page.links == ["#verdict", *(f"#{name}" for name in expected)]
 
@@ -95,7 +104,7 @@ def test_the_report_tells_what_the_metrics_hold(chain, page):
 
 def test_every_figure_has_a_caption_and_a_place(source):
     names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', source)
-    assert len(names) == len(set(names)) == source.count("<figcaption>") == 7
+    assert len(names) == len(set(names)) == source.count("<figcaption>") == 8
     for name in names:
         assert f'id="plot-{name}"' in source
 
@@ -106,13 +115,13 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
     browser = Browser()
     try:
         browser.open(address)
-        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 7")
+        browser.wait("document.querySelectorAll('.plot.js-plotly-plot').length === 8")
         browser.run("window.print = () => { window.printed = true; }")
         browser.click(".print")
         browser.wait("window.printed")
         widths = "[...document.querySelectorAll('.js-plotly-plot')].map((plot) => plot._fullLayout.width)"
         browser.run("window.dispatchEvent(new Event('beforeprint'))")
-        assert browser.run(widths) == 7 * [690]  # as wide as the paper
+        assert browser.run(widths) == 8 * [690]  # as wide as the paper
         browser.run("window.dispatchEvent(new Event('afterprint'))")
         assert min(browser.run(widths)) > 690
         assert (browser.complaints, browser.requests) == ([], [address])
@@ -164,7 +173,7 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     )  # fmt: skip
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
-    assert Page(source).scripts == 9  # plotly.js, seven figures, printing
+    assert Page(source).scripts == 10  # plotly.js, eight figures, printing
     assert "<script>alert" not in source
     assert f"{HOSTILE}0" in " ".join(Page(source).text)
     assert HOSTILE.upper() in " ".join(Page(source).text)

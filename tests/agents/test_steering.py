@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, PID, IntegralLineOfSight, load_agent
+from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver, load_agent
 from agents.cli import app
 from agents.deployment.nmea import Link, Reading, readings, sentences
+from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, steer
 from shipgym.errors import InputError
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 
 
@@ -39,6 +41,17 @@ PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
         (
             sentence("GPVTG", 90.0, "T", "", "M", 10.0, "N"),
             [("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP")],
+        ),
+        (
+            sentence("GPRMC", "120000", "A", "5430.0", "N", "00815.0", "W", "10.0", "90.0", "010126"),
+            [
+                ("latitude", np.radians(54.5), "GP"), ("longitude", np.radians(-8.25), "GP"),
+                ("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP"),
+            ],
+        ),
+        (
+            sentence("ECBWC", "", "", "", "", "", "45.0", "T", "", "M", "2.0", "N", "1"),
+            [("waypoint_bearing", np.pi / 4, "EC"), ("waypoint_distance", 3704.0, "EC")],
         ),
         (sentence("GPGLL", "5400.0", "N", "00700.0", "E"), []),
         (sentence("HEHDT", "", "T"), []),
@@ -125,6 +138,93 @@ def test_it_hands_over_when_the_rudder_does_not_follow(rate_deg_s, state):
         found.watch(1.0, now)
     assert found.state == state
     assert found.alarm == ("" if state == STEERING else "the rudder does not follow its order")
+
+
+def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
+    found = helm(order_deg=2.0, off_heading_deg=3.0)
+    found.steer(0.0)
+    assert found.order == pytest.approx(np.radians(2.0))
+    assert found.status == "steering, off heading"
+    assert "AGALR,,002,A,V,OFF HEADING" in found.sentences()
+    assert found.state == STEERING
+    for one in (("speed", 8.0), ("waypoint_distance", 400.0)):
+        found.sensors.take(Reading(*one, "EC"), 0.0)
+    found.watch(1.0, 0.0)
+    assert found.warnings == ["off heading", "course change ahead"]
+
+
+def test_a_plotters_bearing_to_the_waypoint_is_steered_if_it_was_heard_first():
+    found = Helm(PID_MARINER, None, Limits())
+    tell(found, 0.0)
+    for one in (("waypoint_bearing", 0.7), ("to_steer", 0.9)):
+        found.sensors.take(Reading(*one, "EC"), 0.0)
+    assert found.given(0.0)["set_point"] == 0.7
+
+
+TURN_RATE = TurnRate.from_model(MARINER)
+
+
+@pytest.mark.parametrize(("heading", "rate", "set_point"), [(None, -0.004, 0.0), (1.0, 0.002, 1.0)])
+def test_a_rate_of_turn_is_steered_or_limits_the_way_to_a_heading(heading, rate, set_point):
+    found = Helm(TURN_RATE, heading, Limits(), rate=rate)
+    tell(found, 0.0)
+    given = found.given(0.0)
+    assert given["set_point"] == set_point
+    assert given["rate_of_turn"] == (rate if heading is None else 0.0)
+    assert found.pilot.agent.gains["rate"] == (TURN_RATE.gains["rate"] if heading is None else rate)
+
+
+WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1"))
+ROUTE = "latitude,longitude\n54.0,7.5\n54.02,7.5\n54.03,7.52\n"
+
+
+def test_a_route_is_kept_to_over_tcp_and_ends_in_the_helmsmans_hands(tmp_path):
+    (tmp_path / "route.csv").write_text(ROUTE)
+    route = Route.from_csv(tmp_path / "route.csv", WHEEL_OVER.gains["path_radius"])
+    found, _, told = sailed(WHEEL_OVER, seconds=600.0, limits=Limits(off_track_m=60.0), route=route)
+    assert found.alarm == "the end of the route is reached"
+    states = [line.partition(" s: ")[2] for line in told[1:-1]]
+    assert states == ["steering", "steering, course change ahead", "steering"]
+    assert 450.0 < float(told[-1].partition(" s")[0]) < 560.0
+
+
+def test_turns_ahead_are_those_of_the_path_following_environment():
+    route = Route(np.array([[0.0, 0.0], [0.1, 0.0], [0.1, 0.1]]), 600.0)
+    given = route.given(np.radians(0.05), np.radians(0.001))
+    assert given["set_point"] == pytest.approx(0.0)
+    assert given["cross_track"] == pytest.approx(111.3, abs=0.1)
+    assert given["next_turn_angle"] == pytest.approx(np.pi / 2)
+    assert given["next_turn_distance"] == pytest.approx(0.05 * 110574.0 - 600.0, abs=2.0)
+    assert not route.ended
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("latitude,longitude\n54,7\n", "1 waypoints found, expected at least 2"),
+        ("latitude,longitude\n54,7\n95,7\n", r"line 3 \(data row 2\), column 'latitude': 95 found"),
+        ("latitude,longitude\n54,7\n54,\n", "column 'longitude': nan found"),
+        ("lat,lon\n54,7\n", "column 'latitude' not found"),
+        ("latitude,longitude\n54,7\n54.001,7\n54.001,7.001\n", "are 1.* m apart, expected at least"),
+        ("latitude,longitude\n54,7\n58,7\n", "445 km from the first found, expected at most 100 km"),
+    ],
+)
+def test_a_route_that_cannot_be_sailed_is_refused_with_its_place(text, message, tmp_path):
+    (tmp_path / "route.csv").write_text(text)
+    with pytest.raises(InputError, match=message):
+        Route.from_csv(tmp_path / "route.csv", 600.0)
+
+
+def test_what_steers_no_route_and_no_rate_is_refused():
+    route = Route(np.array([[54.0, 7.5], [54.1, 7.5]]), 600.0)
+    with pytest.raises(InputError, match="autopilot 'pid' with a route found, expected 'wheel-over'"):
+        Helm(PID_MARINER, None, Limits(), route)
+    with pytest.raises(InputError, match="autopilot 'wheel-over' without a route found"):
+        Helm(WHEEL_OVER, None, Limits())
+    with pytest.raises(InputError, match="rate of turn: autopilot 'lq' found, expected 'turn-rate'"):
+        Helm(LQ_MARINER, None, Limits(), rate=0.01)
+    with pytest.raises(InputError, match=r"rate of turn: 1 found, expected .* rad/s, to a heading"):
+        Helm(TURN_RATE, 0.5, Limits(), rate=1.0)
 
 
 def test_speeds_are_those_over_ground_where_no_log_tells_them():

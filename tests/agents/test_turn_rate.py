@@ -1,0 +1,70 @@
+"""Rate-of-turn autopilot: what it holds in a turn, how it comes to a heading, and its limits."""
+
+import numpy as np
+import pytest
+
+from agents import TurnRate, check_controller, load_agent, step_response
+from agents.controllers.turn_rate import steady_turns
+from shipgym.errors import InputError
+from shipgym.manoeuvres import turning_circle
+from shipgym.ships import load_model
+from shipgym.ships.linear import straight_running
+
+MARINER, TANKER = load_model("mariner"), load_model("tanker")
+
+
+def turned(agent, model, rate, seconds):
+    """Yaw rates, rad/s, and rudder orders of a ship that is ordered a rate of turn, from straight running."""
+    dt, state, memory = agent.design["dt"], model.service_state.copy(), np.zeros((1, 2))
+    rates, orders = [], []
+    for step in range(int(seconds / dt)):
+        seen = {name: np.zeros(1) for name in agent.observation_names} | {"heading_error_cos": np.ones(1)}
+        seen |= {"yaw_rate": state[None, model.state_names.index("r")], "rate_of_turn": np.array([rate])}
+        order, memory = agent.steer(seen, memory, np.array([step == 0]))
+        limited = np.clip(order, -model.steering.limit, model.steering.limit)
+        commands = np.tile(model.service_command, (2, 1))
+        commands[:, 0] = limited[0]
+        trial = model.simulate(commands, 0.5 * dt, state=state)
+        state = np.array([trial[name][-1] for name in model.state_names])
+        rates.append(state[model.state_names.index("r")])
+        orders.append(float(order[0]))
+    return np.array(rates), np.array(orders)
+
+
+@pytest.mark.parametrize("model", [MARINER, TANKER], ids=["mariner", "tanker"])
+def test_the_table_is_that_of_steady_turning_circles_also_of_an_unstable_ship(model):
+    rates, rudders = steady_turns(model, straight_running(model).rudder)
+    steady = turning_circle(model, 10.0, 3000.0, 1.0)["r"][-1]
+    assert np.interp(steady, rates, rudders) == pytest.approx(np.radians(10.0), rel=0.04)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_ordered_rate_of_turn_is_reached_and_kept(side):
+    agent = TurnRate.from_model(MARINER)
+    wanted = side * 0.8 * agent.gains["rate"]
+    rates, orders = turned(agent, MARINER, wanted, 400.0)
+    assert rates[-200:] == pytest.approx(wanted, rel=0.02)
+    assert np.abs(rates).max() < 1.1 * abs(wanted)
+    assert np.abs(orders).max() < np.radians(20.0)
+
+
+@pytest.mark.parametrize("model", [MARINER, TANKER], ids=["mariner", "tanker"])
+def test_a_course_is_changed_at_its_rate_without_overshoot(model):
+    agent = TurnRate.from_model(model, rate_deg_min=15.0)
+    found = step_response(agent, model, 40.0)
+    rates = np.degrees(np.gradient(found.heading[0], found.t)) * 60.0
+    assert rates.max() == pytest.approx(15.0, rel=0.05)
+    assert np.degrees(found.heading[0].max()) < 40.5
+    assert np.degrees(found.heading[0, -1]) == pytest.approx(40.0, abs=0.5)
+
+
+def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
+    agent = TurnRate.from_model(MARINER)
+    check_controller(agent, MARINER, n_steps=20)
+    assert agent.margins.phase_margin_deg > 45.0
+    assert agent.margins.gain_margin > 3.0
+    agent.save(tmp_path / "it.json")
+    again = load_agent(tmp_path / "it.json", MARINER)
+    assert np.array_equal(again.rudders, agent.rudders)
+    with pytest.raises(InputError, match=r"rate_deg_min: 1000 found, expected"):
+        TurnRate.from_model(MARINER, rate_deg_min=1000.0)
