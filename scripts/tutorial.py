@@ -20,10 +20,10 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+from gallery import DPI, SIZE, STYLE
 
 import shipgym
 from agents.identifying import identification_settings, identify_ship
-from gallery import DPI, SIZE, STYLE
 from shipgym import Current, Trial, Weather, manoeuvres
 from tests.ships.mmg import mmg_ship
 
