@@ -1,6 +1,7 @@
 """Write `docs/api`: a page for each public package, with the names of its `__init__.pyi`.
 
-`python scripts/document_api.py`; a test compares the pages with what this writes. mkdocstrings puts the docstrings in.
+`python scripts/document_api.py`; a test compares the pages with what this writes. mkdocstrings puts the
+docstrings in.
 """
 
 from __future__ import annotations

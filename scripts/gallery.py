@@ -1,7 +1,7 @@
 """Draw the pictures of the gallery and write its page.
 
 `python scripts/gallery.py` draws all, `python scripts/gallery.py turning_circle zigzag` some, into
-`docs/images/gallery`, and writes `docs/gallery.md` with the lines of each function below, docstrings as headings.
+`docs/images/gallery`, and writes `docs/gallery.md` with the lines of each function below.
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def wave_spectra() -> None:
 
 @topic("Autopilots")
 def heading_change() -> None:
-    """A change of heading by 20 degrees: PID and LQ on 20 models drawn from one that two zigzags determine."""
+    """A change of heading by 20 degrees: PID and LQ on 20 models that two zigzags allow."""
     model = shipgym.load_model("container-two-zigzags")
     for k, design in enumerate((PID, LQ)):
         found = step_response(design.from_model(model), model.sample(20, seed=0), 20)
@@ -186,7 +186,7 @@ def heading_change() -> None:
 
 @topic("Autopilots")
 def around_the_corners() -> None:
-    """A path with sharp turns: line of sight, and wheel-over, which begins each turn where the ship needs it."""
+    """A path with sharp turns: line of sight, and wheel-over, which begins turns where the ship needs it."""
     kvlcc2 = shipgym.load_model("kvlcc2")
     waypoints = [[0, 0], [3500, 0], [5500, 3000], [2500, 5500], [2500, 9000]]
     env = gym.make("shipgym/PathFollowing-v0", model=kvlcc2, waypoints=waypoints).unwrapped
@@ -244,7 +244,7 @@ def learning_curve() -> None:
 
 def home() -> None:
     """Draw the first page's picture: trials, the model with its uncertainty, an autopilot on a path."""
-    figure, panels = plt.subplots(1, 3, figsize=(12.0, 2.7), dpi=100, layout="constrained")
+    _, panels = plt.subplots(1, 3, figsize=(12.0, 2.7), dpi=100, layout="constrained")
     plt.sca(panels[0])
     for trial in shipgym.ShipFile.load(shipgym.example_ship()).trials():
         plt.plot(trial.t, np.degrees(trial["psi"] - trial["psi"][0]), label=trial.name.removesuffix(".csv"))
@@ -285,8 +285,9 @@ def page() -> str:
             title = str(draw.__doc__)
             source = inspect.getsource(draw).split('"""', 2)[2]
             code = textwrap.dedent(source.replace("\n\n\n", "\n")).strip()
-            width, height = Image.open(IMAGES / f"{draw.__name__}.webp").size
-            picture = f"![{title}](images/gallery/{draw.__name__}.webp){{ loading=lazy width={width} height={height} }}"
+            file = f"{draw.__name__}.webp"
+            width, height = Image.open(IMAGES / file).size
+            picture = f"![{title}](images/gallery/{file}){{ loading=lazy width={width} height={height} }}"
             lines += [f"**{title}**", picture, f"```python\n{code}\n```"]
     return "\n\n".join(lines) + "\n"
 

@@ -1,7 +1,7 @@
 """Run the notebooks and keep what they print and draw; the site shows them so.
 
-`python scripts/run_notebooks.py` runs all of `notebooks/`, with names behind it those; it ends with 1 where a cell
-raises an error. Counters and other metadata that change with every run are left out.
+`python scripts/run_notebooks.py` runs all of `notebooks/`, with names behind it those; it ends with 1 where a
+cell raises an error. Counters and other metadata that change with every run are left out.
 """
 
 from __future__ import annotations

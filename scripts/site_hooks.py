@@ -1,7 +1,7 @@
 """What the site is built with beside its plugins: equations as MathML, notebooks as pages.
 
-mkdocs calls these functions (`hooks` in `mkdocs.yml`). Equations are drawn by the browser itself, so that no script
-is loaded from elsewhere.
+mkdocs calls these functions (`hooks` in `mkdocs.yml`). Equations are drawn by the browser itself, so that no
+script is loaded from elsewhere.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
-"""Run the commands of `docs/tutorial.md` and put what they print, shortened, and their pictures into the page.
+"""Run the commands of `docs/tutorial.md` and put what they print, shortened, and pictures into the page.
 
-`python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all that the commands write.
+`python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all that is written.
 
-The log is that of a simulated ship, as a bridge would have written it: time of the day, latitude and longitude of an
-antenna forward of midship, heading, and the rudder positive to port, in a current of three quarters of a knot.
+The log is that of a simulated ship, as a bridge would have written it: time of the day, latitude and longitude
+of an antenna forward of midship, heading, and the rudder positive to port, in a current of 0.76 knots.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ SEA = Weather(current=Current(0.39, towards_deg=120.0))
 ANTENNA = 30.0  # m forward of midship
 LATITUDE, LONGITUDE, EARTH = 54.2, 7.6, 6371e3  # degrees north and east, m
 BEGINS = pd.Timestamp("2026-05-04 09:00")
-#: A shell block, and the output behind it that is replaced; `sed` lines edit the ship file and are not shown.
+#: A shell block, and the output behind it, which is replaced.
 BLOCK = re.compile(r"```sh\n(?P<command>.*?)```\n(?P<output>\n```text\n.*?```\n)?", re.DOTALL)
 #: What is shown of the output of commands that print much: so many lines from one that begins so.
 SHOWN = {
@@ -108,7 +108,7 @@ def shortened(lines: list[str], wanted: dict[str, int]) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    """That of this process, with a terminal of 100 columns without colours and the programs of its Python first."""
+    """That of this process, with 100 columns, without colours, and its own programs first."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     return os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb", "PATH": path}
 
