@@ -7,6 +7,7 @@ A contestant is named on the command line as
     tuned-best                 of these the one that costs least in each task
     best-known                 the lowest cost that anything reached in each episode, kept with the suite
     ppo                        the pretrained agents of `agents/pretrained`
+    one-for-all                the pretrained agent for all ships, made for each task's
     runs/agent.json            a file of an agent or controller
     runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
     a.json+b.json              training runs, one by one
@@ -31,18 +32,22 @@ from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from agents.agent_file import load_agent
+from agents.agent_file import find_agent, read_agent
 from agents.controllers.controller import Controller, Policy, model_hash
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import controller_class, controller_kinds, register_controller
 from agents.engines.job import working_folder
+from agents.policies.one_for_all import ONE_FOR_ALL, OneForAll
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_table, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
+
+if TYPE_CHECKING:
+    from agents.agent_file import Agent
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
@@ -126,11 +131,12 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     if not one.is_text or names_code(one.source):
         return
     pairs = [(path, task) for task in tasks for path in _files(one.source, task)]
-    agents = {path: load_agent(path) for path in {path for path, _ in pairs}}
+    agents = {path: read_agent(path) for path in {path for path, _ in pairs}}
     refusals: list[str] = []
     for path, task in pairs:
         try:
-            check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
+            made = _for_task(agents[path], task)
+            check_fits(made, task.task, task.ship, f"'{path}' on task '{task.name}'")
         except InputError as error:
             refusals.append(str(error))
     if pairs and len(refusals) == len(pairs):
@@ -194,7 +200,8 @@ def _check_object(source: Any, name: str) -> None:
 
 def _known() -> tuple[str, ...]:
     """Names of contestants."""
-    return (*controller_kinds(), *LEARNED, BEST_KNOWN, *(TUNED + kind for kind in ("best", *CLASSICAL)))
+    searched = (TUNED + kind for kind in ("best", *CLASSICAL))
+    return (*controller_kinds(), *LEARNED, ONE_FOR_ALL, BEST_KNOWN, *searched)
 
 
 def _check_text(text: str) -> None:
@@ -249,6 +256,8 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
     name = task.handed_out.name
     if text in LEARNED:
         return pretrained(name, text)
+    if text == ONE_FOR_ALL:
+        return [find_agent(text)]
     if names_code(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
@@ -279,7 +288,12 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not paths:
         what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"
         raise InputError(f"there is no file of {what} for task '{task.name}'")
-    return [load_agent(path) for path in paths]
+    return [_for_task(read_agent(path), task) for path in paths]
+
+
+def _for_task(agent: Agent | OneForAll, task: BenchmarkTask) -> Agent:
+    """An agent of a file; one for all ships is made for that of the task."""
+    return agent.for_ship(task.ship, task.task) if isinstance(agent, OneForAll) else agent
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:

@@ -28,11 +28,21 @@ and of kind "shielded":
     envelope             null, or as in a model file
     limits               when the fallback takes over (`agents.policies.shield.Limits`)
     weights              as above; null where no policy has any
+
+and of kind "one-for-all" (`agents.policies.one_for_all`):
+
+    format, kind         1, "one-for-all"
+    observation_names    what it observes, in order
+    context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
+    network              as above, on observations, base action and context
+    decision             how long an output is repeated, times to travel a ship length
+    authority            as above
+    training, weights    as above
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -44,10 +54,12 @@ from numpy.typing import NDArray
 from agents.controllers.controller import FORMAT, check_names
 from agents.controllers.controller_file import read_controller, read_scales
 from agents.policies.network import Layer, Network
+from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll
 from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
 from shipgym.checks import (
+    check_array,
     check_format,
     check_keys,
     check_number,
@@ -67,18 +79,21 @@ LEARNED = (
 )  # fmt: skip
 LATER = {"action_repeat": 1}  # what older files lack, and what it means
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
+FOR_ALL = (
+    "format", "kind", "observation_names", "context", "network", "decision", "authority", "training",
+)  # fmt: skip
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
 
-def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shielded:
-    """A learned or shielded policy from the JSON at `path`, and the weights beside it.
+def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shielded | OneForAll:
+    """A learned or shielded policy, or one for all ships, from the JSON at `path`, and the weights beside it.
 
     Raises InputError naming the file and the field at fault.
     """
     where = str(path)
-    learned = content["kind"] == "learned"
+    expected, read = READERS[content["kind"]]
     content = _current(content)
-    _check_fields(content, (*(LEARNED if learned else SHIELDED), "weights"), where)
+    _check_fields(content, (*expected, "weights"), where)
     tensors: Tensors = {}
     if content["weights"] is not None:
         table = check_table(content["weights"], f"{where}: weights")
@@ -86,7 +101,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
         sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
         tensors = read_weights(weights_path(path), sha256, path)
     own = {name: value for name, value in content.items() if name != "weights"}
-    agent = (_learned if learned else _shielded)(own, tensors, "", where)
+    agent: LearnedPolicy | Shielded | OneForAll = read(own, tensors, "", where)
     if tensors:
         raise InputError(
             f"{weights_path(path)}: unknown {quoted(tensors)} found beside the weights; {REMEDY}"
@@ -153,6 +168,28 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
             envelope=read_envelope(content["envelope"], f"{where}: envelope"),
             limits=Limits(**numbers),
         )
+
+
+def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> OneForAll:
+    """A policy for all ships; its weights are taken out of `tensors`."""
+    at = f"{where}: context"
+    told = check_table(content["context"], at)
+    check_keys(told, CONTEXT, at, CONTEXT)
+    with placed(where):
+        return OneForAll(
+            network=_network(content["network"], tensors, prefix, f"{where}: network"),
+            observation_names=_names(content["observation_names"], f"{where}: observation_names"),
+            fleet=np.stack([check_array(told[name], (4,), f"{at}.{name}") for name in CONTEXT]),
+            decision=content["decision"],
+            authority=content["authority"],
+            training=dict(check_table(content["training"], f"{where}: training")),
+        )
+
+
+#: Fields of each kind of file, and what reads it.
+READERS: Mapping[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
+    "learned": (LEARNED, _learned), "shielded": (SHIELDED, _shielded), ONE_FOR_ALL: (FOR_ALL, _for_all)
+}  # fmt: skip
 
 
 def _network(value: Any, tensors: Tensors, prefix: str, where: str) -> Network:
