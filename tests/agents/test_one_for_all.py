@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.agents.policies import random_network
 
 from agents.agent_file import load_agent, read_agent
 from agents.benchmarking.contestants import contestants
@@ -15,6 +14,7 @@ from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.scaling import scale_model
 from shipgym.tasks.task import Task
+from tests.agents.policies import random_network
 
 SHIP, TASK = load_model("container-abc-lssvr"), Task.of("PathFollowing-v1")
 TOLD = context(SHIP, TASK)
