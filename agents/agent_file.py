@@ -48,8 +48,7 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     if hasattr(agent, "for_ship"):
         if model is None:
             raise InputError(
-                f"{path}: a policy for all ships found, without a ship to make it for; give her model, "
-                "load_agent(path, model), or a file that the policy made for her was saved to"
+                f"{path}: made for each ship; give her model: load_agent(path, model).save(file)"
             )
         return agent.for_ship(model)
     if model is not None:

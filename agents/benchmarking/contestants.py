@@ -32,7 +32,7 @@ from functools import partial
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from agents.agent_file import find_agent, read_agent
 from agents.controllers.controller import Controller, Policy, model_hash
@@ -45,9 +45,6 @@ from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_table, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, read_bytes
-
-if TYPE_CHECKING:
-    from agents.agent_file import Agent
 
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
@@ -135,8 +132,7 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     refusals: list[str] = []
     for path, task in pairs:
         try:
-            made = _for_task(agents[path], task)
-            check_fits(made, task.task, task.ship, f"'{path}' on task '{task.name}'")
+            check_fits(agents[path], task.task, task.ship, f"'{path}' on task '{task.name}'")
         except InputError as error:
             refusals.append(str(error))
     if pairs and len(refusals) == len(pairs):
@@ -288,12 +284,8 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not paths:
         what = f"a pretrained {source} agent" if source in LEARNED else f"'{source}'"
         raise InputError(f"there is no file of {what} for task '{task.name}'")
-    return [_for_task(read_agent(path), task) for path in paths]
-
-
-def _for_task(agent: Agent | OneForAll, task: BenchmarkTask) -> Agent:
-    """An agent of a file; one for all ships is made for that of the task."""
-    return agent.for_ship(task.ship, task.task) if isinstance(agent, OneForAll) else agent
+    found = [read_agent(path) for path in paths]
+    return [one.for_ship(task.ship, task.task) if isinstance(one, OneForAll) else one for one in found]
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:

@@ -54,22 +54,8 @@ def context(model: ShipModel, task: Task) -> Floats:
     with moderate rudder (`own_turn`); turn radius and corridor of the path. A ship scaled by Froude's law, or
     mirrored, has the same.
 
-    Parameters
-    ----------
-    model : ShipModel
-        The ship, as identified.
-    task : Task
-        Path following of version 1.
-
-    Returns
-    -------
-    array of shape (12,)
-        In the order of `CONTEXT`.
-
-    Raises
-    ------
-    InputError
-        If the model has no straight course, or does not turn.
+    `model`: as identified; `task`: path following of version 1. Returns an array of shape (12,), in the order
+    of `CONTEXT`. Raises InputError if the model has no straight course, or does not turn.
     """
     gear, p = model.steering, model.particulars
     A, B = steering_state_space(model)
@@ -89,34 +75,16 @@ def context(model: ShipModel, task: Task) -> Floats:
 class OneForAll:
     """A policy for a fleet, from which `for_ship` makes that of one ship and path.
 
-    Attributes
-    ----------
-    network : Network
-        On what is observed, the base's action and the context.
-    observation_names : tuple of str
-        What is observed.
-    fleet : array of shape (12, 4)
-        Mean, standard deviation, least and largest of the context in the fleet that it was trained on, by
-        `CONTEXT`.
-    decision : float
-        How long an output of the network is repeated, times to travel a ship length at service speed.
-    authority : float
-        Share of the rudder limit by which it may differ from the base.
-    training : dict
-        How it was made, as JSON has it.
-
-    Raises
-    ------
-    InputError
-        Naming the field whose value does not fit.
+    Raises InputError naming the field whose value does not fit.
     """
 
-    network: Network
-    observation_names: tuple[str, ...]
-    fleet: Floats
-    decision: float
-    authority: float
-    training: Mapping[str, Any] = field(default_factory=dict)
+    network: Network  # on what is observed, the base's action and the context
+    observation_names: tuple[str, ...]  # what is observed
+    #: mean, standard deviation, least and largest of the context in the fleet that it was trained on
+    fleet: Floats  # shape (12, 4)
+    decision: float  # how long an output is repeated, times to travel a ship length at service speed
+    authority: float  # share of the rudder limit by which it may differ from the base
+    training: Mapping[str, Any] = field(default_factory=dict)  # how it was made, as JSON has it
 
     def __post_init__(self) -> None:
         check_number(self.decision, "decision", above=0.0)
@@ -133,26 +101,12 @@ class OneForAll:
         return np.clip((told - self.fleet[:, 0]) / self.fleet[:, 1], -LARGEST, LARGEST)
 
     def for_ship(self, model: ShipModel, task: Task | None = None) -> LearnedPolicy:
-        """Make the policy of one ship; nothing is searched or learned.
+        """Make the policy of one ship from her model; nothing is searched or learned.
 
-        Parameters
-        ----------
-        model : ShipModel
-            As identified: the base is designed on her, and the context is hers.
-        task : Task, optional
-            The path to follow, by default that of PathFollowing-v1.
-
-        Returns
-        -------
-        LearnedPolicy
-            Its `training` says under "outside" by how much of the fleet's range the ship or the path is
-            outside it, by `CONTEXT`.
-
-        Raises
-        ------
-        InputError
-            If the task is no path of version 1, the wheel-over autopilot cannot be designed for the ship, or
-            she is far from all that it was trained on.
+        `task`: the path to follow, by default that of PathFollowing-v1. The policy's `training` says under
+        "outside" by how much of the fleet's range the ship or the path is outside it, by `CONTEXT`. Raises
+        InputError if the path is not of version 1, wheel-over cannot be designed for the ship, or she is far
+        from all that it was trained on.
         """
         asked = task or Task.of("PathFollowing-v1")
         observed = asked.observed(model)[: len(self.observation_names)]
@@ -178,16 +132,16 @@ class OneForAll:
 
     def outside(self, told: Floats, name: str) -> dict[str, float]:
         """By how much of the fleet's range a context is outside it; InputError, with the ship, where far."""
-        low, high = self.fleet[:, 2:].T
-        beyond = np.maximum(np.maximum(low - told, told - high) / (high - low), 0.0)
-        worst = int(np.argmax(beyond))
-        if not beyond[worst] <= FAR:
-            raise InputError(
-                f"model {name!r}: {CONTEXT[worst]} {told[worst]:.3g} found, {ONE_FOR_ALL} was trained on "
-                f"{low[worst]:.3g} to {high[worst]:.3g} and would be guessing; take wheel-over, or train an "
-                "agent for this ship"
-            )
-        return {one: round(float(by), 3) for one, by in zip(CONTEXT, beyond, strict=True) if by > 0.0}
+        found = {}
+        for one, value, (_, _, low, high) in zip(CONTEXT, told.tolist(), self.fleet.tolist(), strict=True):
+            beyond = max(low - value, value - high) / (high - low)
+            if not beyond <= FAR:
+                raise InputError(
+                    f"model {name!r}: {one} {value:.3g} found, {ONE_FOR_ALL} was trained on {low:.3g} to "
+                    f"{high:.3g} and would be guessing; take wheel-over, or train an agent for this ship"
+                )
+            found |= {one: round(beyond, 3)} if beyond > 0.0 else {}
+        return found
 
     def save(self, path: str | Path) -> None:
         """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""

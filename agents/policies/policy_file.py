@@ -32,12 +32,9 @@ and of kind "shielded":
 and of kind "one-for-all" (`agents.policies.one_for_all`):
 
     format, kind         1, "one-for-all"
-    observation_names    what it observes, in order
     context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
-    network              as above, on observations, base action and context
     decision             how long an output is repeated, times to travel a ship length
-    authority            as above
-    training, weights    as above
+    observation_names, network, authority, training, weights as above
 """
 
 from __future__ import annotations
@@ -79,9 +76,7 @@ LEARNED = (
 )  # fmt: skip
 LATER = {"action_repeat": 1}  # what older files lack, and what it means
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
-FOR_ALL = (
-    "format", "kind", "observation_names", "context", "network", "decision", "authority", "training",
-)  # fmt: skip
+FOR_ALL = ("format", "kind", "observation_names", "context", "network", "decision", "authority", "training")
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
 
@@ -149,11 +144,8 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
     """A shielded policy; its weights are taken out of `tensors`."""
     _check_fields(content, SHIELDED, where)
     inner, at = _current(_table(content["policy"], "policy", where)), f"{where}: policy"
-    policy: Any
-    if inner.get("kind") == "learned":
-        policy = _learned(inner, tensors, f"{prefix}policy.", at)
-    elif inner.get("kind") == "shielded":
-        policy = _shielded(inner, tensors, f"{prefix}policy.", at)
+    if inner.get("kind") in ("learned", "shielded"):
+        policy = READERS[inner["kind"]][1](inner, tensors, f"{prefix}policy.", at)
     else:
         policy = read_controller(inner, at)
     limits = {"turn_lengths": 0.0, **_table(content["limits"], "limits", where)}  # older files have none
