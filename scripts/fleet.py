@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
@@ -23,10 +22,9 @@ from agents.controllers.wheel_over import WheelOver
 from agents.policies.one_for_all import CONTEXT, OneForAll, context
 from agents.policies.weights_file import as_json
 from agents.rollouts.rollout import episode_costs, rollout
-from agents.training.algorithms import StaggeredShips
 from agents.training.residual import ResidualVecEnv
-from shipgym.envs.engine import Engine
-from shipgym.envs.ship_vector_env import ShipVectorEnv
+from shipgym.envs.engine import Engine, episode_keys
+from shipgym.envs.ship_env import spaces as spaces_of
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Current, Weather
 from shipgym.ships import ShipModel, load_model
@@ -42,6 +40,7 @@ LEAST_STABILITY = -1.0  # prime determinant; the tanker, unstable on her course,
 TRIES = 20
 MEAN_COST = 100.0  # of an episode under wheel-over, whatever the path: rewards are scaled to it
 FIRST_SEED = 900_000
+NOTHING: dict[str, Any] = {}  # info of a row whose episode goes on
 
 
 @dataclass(frozen=True)
@@ -243,42 +242,48 @@ class Pilots:
 
 
 class Fleets(VecEnv):
-    """Several fleets as one vector environment of stable-baselines3."""
+    """Several fleets as one vector environment of stable-baselines3; without infos but what ends episodes."""
 
     def __init__(self, fleets: Sequence[Fleet]) -> None:
-        self.parts = [ships_of(fleet) for fleet in fleets]
-        self.bounds = np.cumsum([0, *(part.num_envs for part in self.parts)])
-        first = self.parts[0]
-        super().__init__(int(self.bounds[-1]), first.observation_space, first.action_space)
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Ship i of all has the seed `seed + i`."""
-        return [
-            one for part, first in zip(self.parts, self.bounds, strict=False)
-            for one in part.seed(None if seed is None else seed + int(first))
-        ]  # fmt: skip
+        self.engines = [fleet.engine() for fleet in fleets]
+        self.bounds = np.cumsum([0, *(engine.num_envs for engine in self.engines)])
+        super().__init__(int(self.bounds[-1]), *spaces_of(fleets[0].task, fleets[0].lanes[0].model))
 
     def reset(self) -> Any:
-        """Begin an episode in each row."""
-        return np.concatenate([part.reset() for part in self.parts])
+        """Begin an episode in each row, each of another age: a rollout is to show all parts of episodes."""
+        for engine, first in zip(self.engines, self.bounds, strict=False):
+            n, longest = engine.num_envs, engine.task.episode_steps
+            engine.begin(episode_keys((self._seeds[0] or 0) + first + np.arange(n)))
+            engine.write("steps", np.arange(n) * longest // n)
+        return np.concatenate([engine.observations for engine in self.engines])
 
     def step_async(self, actions: Any) -> None:
-        """Hand each fleet its actions."""
-        for part, first, last in zip(self.parts, self.bounds, self.bounds[1:], strict=False):
-            part.step_async(actions[first:last])
+        """Keep the actions for `step_wait`."""
+        self.actions = actions
 
     def step_wait(self) -> Any:
-        """Observations, rewards, whether episodes ended, and infos of all."""
-        columns = list(zip(*(part.step_wait() for part in self.parts), strict=True))
-        return (*(np.concatenate(one) for one in columns[:3]), [info for one in columns[3] for info in one])
+        """Observations, rewards, whether episodes ended, and infos of those."""
+        columns, infos = [], [NOTHING] * self.num_envs
+        for engine, first, last in zip(self.engines, self.bounds, self.bounds[1:], strict=False):
+            engine.order(self.actions[first:last])
+            ended, shown = engine.advance(anew=True), engine.shown
+            dones = shown.terminated | shown.truncated
+            for row in np.flatnonzero(dones) if ended else ():
+                late = bool(shown.truncated[row] and not shown.terminated[row])
+                final = shown.observations[row].copy()
+                infos[first + row] = {"terminal_observation": final, "TimeLimit.truncated": late}
+            if ended:
+                engine.begin_next(dones)
+            columns.append((shown.observations, shown.outcomes[0].astype(np.float32), dones))
+        return (*(np.concatenate(one) for one in zip(*columns, strict=True)), infos)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Of the fleets, each as often as it has ships; all of them."""
-        return [one for part in self.parts for one in part.get_attr(attr_name)]
+        """Nothing is known of the rows."""
+        return [None] * self.num_envs
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """As of the first fleet."""
-        return [self.parts[0].env_is_wrapped(wrapper_class, [0])[0]] * self.num_envs
+        """By nothing."""
+        return [False] * self.num_envs
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Not needed to learn."""
@@ -287,19 +292,7 @@ class Fleets(VecEnv):
     env_method = set_attr
 
     def close(self) -> None:
-        """Close all."""
-        for part in self.parts:
-            part.close()
-
-
-def ships_of(fleet: Fleet) -> StaggeredShips:
-    """A fleet's ships as a vector environment of stable-baselines3."""
-    ships = ShipVectorEnv(
-        len(fleet.lanes), fleet.lanes[0].ship, "PathFollowing-v1", allow_unstable=True,
-        autoreset_mode=AutoresetMode.SAME_STEP, **fleet.options,
-    )  # fmt: skip
-    ships._use(fleet.engine())
-    return StaggeredShips(ships)
+        """Nothing stays open."""
 
 
 class Told(VecEnvWrapper):

@@ -59,8 +59,8 @@ FLEET_SEED, VALIDATION_SEED = 1, 2
 PATHS, SHIPS, LANES = 2, 8, 5  # around each shipped model: paths, ships on each, and how often she is there
 DECISION = 16  # control intervals
 SETTINGS = {
-    "base": "wheel-over", "total_steps": 640_000, "ships": 640, "n_steps": 32, "batch_size": 2048,
-    "n_epochs": 6, "learning_rate": 5e-4, "gamma": 0.92, "gae_lambda": 0.95, "authority": 0.3,
+    "base": "wheel-over", "total_steps": 327_680, "ships": 640, "n_steps": 32, "batch_size": 2048,
+    "n_epochs": 6, "learning_rate": 1e-3, "gamma": 0.92, "gae_lambda": 0.95, "authority": 0.3,
     "action_repeat": DECISION, "log_std_init": -1.5, "log_std_end": -2.5, "net_arch": [64, 64],
     "reward_scale": 5.0,
 }  # fmt: skip
@@ -99,7 +99,7 @@ class Annealing(BaseCallback):
 
     def _on_rollout_start(self) -> None:
         set_deviation(self.model, self.settings)
-        if self.num_timesteps // 122_880 >= len(self.curve):
+        if self.num_timesteps // 163_840 > len(self.curve):
             ratio = self.validation(_network(self.model))
             self.curve.append([self.num_timesteps, round(ratio, 4)])
             print(
@@ -130,6 +130,11 @@ def train(seeds: Sequence[int], out: Path) -> None:
             print(f"  {name:14s}" + " ".join(f"{value:8.3f}" for value in numbers), flush=True)
         for seed in missing:
             learn(seed, fleets, lambda agent: ratio_on(validation, zero, agent), like, out)
+            publish([one for one in seeds if (out / f"{one}.json").is_file()], out)
+
+
+def publish(seeds: Sequence[int], out: Path) -> None:
+    """Ship the best on the validation fleet, with the record of all."""
     agents = [read_agent(out / f"{seed}.json") for seed in seeds]
     best = min(agents, key=lambda one: one.training["validation"])
     runs = [{name: one.training[name] for name in ("seed", "validation", "curve")} for one in agents]
