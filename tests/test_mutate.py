@@ -3,6 +3,7 @@
 import ast
 from pathlib import Path
 
+import covered_tests
 import mutate
 import pytest
 
@@ -70,3 +71,21 @@ def test_a_copy_of_the_tree_is_what_is_changed(tmp_path):
     assert (copy / name).read_bytes() == (mutate.ROOT / name).read_bytes()
     assert Path(copy / "pyproject.toml").is_file()
     assert not (copy / ".git").exists()
+
+
+def test_tests_that_reach_a_line_come_first_and_the_cheapest_file_before_others(monkeypatch):
+    known = {
+        "slow.py": {"tests": {"s1": 3.0, "s2": 1.0, "s3": 0.1}, "lines": {"m.py": {"7": [0, 1], "9": [2]}}},
+        "fast.py": {"tests": {"f1": 0.5, "f2": 0.2}, "lines": {"m.py": {"8": [0]}, "n.py": {"7": [1]}}},
+    }
+    monkeypatch.setattr(covered_tests.Maps, "read", lambda maps, folder, test, plain: known[test])
+    maps = covered_tests.Maps(Path("nowhere"))
+    first, seconds = maps.ordered(Path(), list(known), "m.py", range(7, 9), plain=False)
+    assert list(first.items()) == [("f1", 0.5), ("s2", 1.0), ("s1", 3.0)]
+    assert seconds == known["slow.py"]["tests"] | known["fast.py"]["tests"]
+
+
+def test_a_statement_is_all_its_lines_and_a_compound_one_its_head():
+    source = "def f(\n    x,\n):\n    y = g(\n        x,\n    )\n    return y\n"
+    found = [list(mutate.statement(source, line)) for line in (2, 5, 7)]
+    assert found == [[1, 2, 3], [4, 5, 6], [7]]

@@ -237,3 +237,9 @@ def test_searches_may_be_as_small_as_they_say(optimiser: Any, least: dict[str, i
     for name, value in least.items():
         with pytest.raises(InputError, match=f"{name}: {value - 1} found"):
             optimiser(**{name: value - 1}).minimise(sphere, BOX)
+
+
+@pytest.mark.parametrize("seed", [-1, 0.5])
+def test_a_seed_is_a_whole_number_from_0(seed: Any) -> None:
+    with pytest.raises(InputError, match=f"seed: {seed} found"):
+        TunedLSSVM(seed=seed).fit(*regression(40))
