@@ -24,7 +24,8 @@ FOUND, PICTURE = ROOT / "build" / "learning_curves.json", ROOT / "docs" / "image
 SEEDS = (0, 1, 2)
 #: Classical autopilots by id.
 CLASSICAL = {"shipgym/CourseKeeping-v0": ("lq",), "shipgym/PathFollowing-v1": ("ilos", "wheel-over")}
-SETTINGS = {"base": "none", "evaluate_every": 32_768}  # a million decisions
+SETTINGS = {"base": "none", "evaluate_every": 32_768}
+STEPS = {"shipgym/CourseKeeping-v0": 1_000_000, "shipgym/PathFollowing-v1": 600_000}  # decisions
 
 
 def curves() -> dict[str, Any]:
@@ -37,7 +38,8 @@ def curves() -> dict[str, Any]:
         runs = found.setdefault(env_id, {"model": task.model, "classical": lines, "runs": []})["runs"]
         for seed in SEEDS[len(runs) :]:
             before = time.process_time()
-            result = train(make_plan(Given("ppo", environment=env_id, settings=SETTINGS, seed=seed)))
+            settings = SETTINGS | {"total_steps": STEPS[env_id]}
+            result = train(make_plan(Given("ppo", environment=env_id, settings=settings, seed=seed)))
             seconds = time.process_time() - before
             run = {"seed": seed, "processor_s": round(seconds, 1), "best_cost": result.best_cost}
             print(f"{env_id}: {lines}, {run}", flush=True)

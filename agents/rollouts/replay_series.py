@@ -42,7 +42,7 @@ QUANTITIES = (
 )
 
 
-def _points(path: Floats | None) -> list[list[float | None]] | None:
+def _points(path: Floats | None) -> list[list[float]] | None:
     return None if path is None else [rounded(point) for point in path]
 
 
