@@ -154,7 +154,7 @@ def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
     rudder.
     """
     travel = model.travel_time
-    times = {"duration": DURATION * travel, "dt": travel / STEPS}
+    times: dict[str, Any] = {"duration": DURATION * travel, "dt": travel / STEPS}
     limit = model.steering.rudder_limit_deg
     found: dict[str, Manoeuvre] = {}
     for angle in (5.0, 10.0, 20.0, min(35.0, limit)):

@@ -76,7 +76,12 @@ def pose(
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     smooth = options.preprocessing or options.smooth
-    sampling = {"samples": options.samples, "window": options.window, "gear": steering, "smooth": smooth}
+    sampling: dict[str, Any] = {
+        "samples": options.samples,
+        "window": options.window,
+        "gear": steering,
+        "smooth": smooth,
+    }
     regress = partial(structure_samples, structure=table, particulars=ship, shaft_speed=shaft, **sampling)
     regression = regress(used)
     if options.wind == "constant":

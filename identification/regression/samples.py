@@ -136,7 +136,9 @@ def build_samples(
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
-        *(np.concatenate([getattr(part, name) for part in parts]) for name in ("start", "duration", "trial")),
+        np.concatenate([part.start for part in parts]),
+        np.concatenate([part.duration for part in parts]),
+        np.concatenate([part.trial for part in parts]),
         max(part.window for part in parts),
     )
 

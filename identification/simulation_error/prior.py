@@ -110,7 +110,7 @@ def reference_turns(reference: str | ShipModel, blank: ShipModel) -> list[Trial]
 def virtual_trials(model: ShipModel) -> list[Trial]:
     """Zigzags and turning circles to both sides, up to the rudder's limit, with the channel n."""
     travel = model.travel_time
-    timing = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
+    timing: dict[str, Any] = {"duration": DURATION_LENGTHS * travel, "dt": STEP_LENGTHS * travel}
     limit = model.steering.rudder_limit_deg
     runs = [zigzag(model, min(rudder, limit), heading, port, **timing) for rudder, heading, port in ZIGZAGS]
     runs += [turning_circle(model, float(np.clip(rudder, -limit, limit)), **timing) for rudder in TURNS]

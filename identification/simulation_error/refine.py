@@ -239,12 +239,15 @@ class _Problem:
         def shot(z: bytes) -> Shooting:
             return self.shooter.shoot(np.frombuffer(z), segments, scales)
 
+        def residuals(z: Floats) -> Floats:
+            return np.concatenate([shot(z.tobytes()).residuals, weights * (z - self.first)])
+
+        def jacobian(z: Floats) -> Floats:
+            return np.vstack([shot(z.tobytes()).jacobian, np.diag(weights)])
+
         found = least_squares(
-            lambda z: np.concatenate([shot(z.tobytes()).residuals, weights * (z - self.first)]),
-            start,
-            lambda z: np.vstack([shot(z.tobytes()).jacobian, np.diag(weights)]),
-            method="trf", x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30,
-        )  # fmt: skip
+            residuals, start, jacobian, method="trf", x_scale="jac", ftol=1e-6, xtol=1e-6, max_nfev=30
+        )
         return found, shot(found.x.tobytes())
 
     def _mean_cost(self, shooting: Shooting) -> float:
