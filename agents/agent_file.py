@@ -13,6 +13,7 @@ from shipgym.files import read_json
 from shipgym.ships import ShipModel
 
 if TYPE_CHECKING:
+    from agents.policies.one_for_all import OneForAll
     from agents.policies.policy import LearnedPolicy
     from agents.policies.shield import Shielded
 
@@ -30,7 +31,8 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     path : str or Path
         A file, or the name of a pretrained agent, `mariner-calm-ppo` (`list_pretrained`).
     model : ShipModel, optional
-        The ship to steer; one with other observation scales is refused.
+        The ship to steer; one with other observation scales is refused. A policy for all ships is made for
+        her (`OneForAll.for_ship`).
 
     Returns
     -------
@@ -42,18 +44,26 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     InputError
         Naming the file and the field at fault, or the difference to the model.
     """
-    file, where = find_agent(path), str(path)
-    content = read_json(file, "controller file", REMEDY)
-    agent: Agent
-    if content.get("kind") in POLICIES:
-        from agents.policies.policy_file import read_policy
-
-        agent = read_policy(content, file)
-    else:
-        agent = read_controller(content, where)
+    agent = read_agent(path)
+    if hasattr(agent, "for_ship"):
+        if model is None:
+            raise InputError(
+                f"{path}: made for each ship; give her model: load_agent(path, model).save(file)"
+            )
+        return agent.for_ship(model)
     if model is not None:
         agent.check_fits_model(model)
     return agent
+
+
+def read_agent(path: str | Path) -> Agent | OneForAll:
+    """What is in a file, or a pretrained agent, as `load_agent`; one for all ships as it is."""
+    content = read_json(file := find_agent(path), "controller file", REMEDY)
+    if content.get("kind") not in POLICIES:
+        return read_controller(content, str(path))
+    from agents.policies.policy_file import read_policy
+
+    return read_policy(content, file)
 
 
 def list_pretrained() -> list[str]:

@@ -124,5 +124,6 @@ def test_links_of_a_page_lead_somewhere(page):
 def test_the_site_has_every_page():
     named = re.findall(r": (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
     pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
+    pages |= {f"notebooks/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")}
     assert set(named) == pages
     assert len(named) == len(pages)

@@ -41,7 +41,9 @@ def new_ship_command(
     speeds = []
     for log in logs:
         with suppress(InputError):  # `look` says what is wrong with it
-            if (known := quantity(guess_trial(log)[2], "speed")) is not None:
+            _, other, seen = guess_trial(log)
+            side = other if other == "port" else side  # starboard is also what a log says that does not tell
+            if (known := quantity(seen, "speed")) is not None:
                 speeds.append(float(np.quantile(known, 0.9)))
     page = render(
         "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,

@@ -50,7 +50,8 @@ FIELDS = (
     "model", "margins", "design",
 )  # fmt: skip
 MORE_FIELDS = ("arrays", "autopilot", "ship")  # of kinds that have any
-POLICIES = ("learned", "shielded")  # whose files are described in `agents.policies.policy_file`
+#: Kinds whose files are described in `agents.policies.policy_file`.
+POLICIES = ("learned", "shielded", "one-for-all")
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:

@@ -253,19 +253,14 @@ class LearnedPolicy:
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
         """What stands in its JSON, and its weights by name."""
-        network, tensors = self.network, Tensors()
-        for i, (weight, bias) in enumerate(network.layers):
-            tensors[f"layers.{i}.weight"] = np.ascontiguousarray(weight)
-            tensors[f"layers.{i}.bias"] = np.ascontiguousarray(bias)
+        network, tensors = network_fields(self.network)
         content = {
             "format": FORMAT,
             "kind": "learned",
             "observation_names": list(self.observation_names),
             "observation_scales": list(self.observation_scales),
             "action": self.action,
-            "network": {
-                "activation": network.activation, "output": network.output, "sizes": list(network.sizes)
-            },
+            "network": network,
             "frame_stack": self.frame_stack,
             "base": None if self.base is None else self.base.to_dict(),
             "authority": self.authority,
@@ -283,6 +278,15 @@ def toward(outputs: Numbers, before: Numbers, rate_limit: float) -> Numbers:
     step = np.float32(rate_limit)
     limited: Numbers = np.clip(np.clip(outputs, -1.0, 1.0), before - step, before + step)
     return limited
+
+
+def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:
+    """What a policy's JSON says of its network, and the weights by name."""
+    tensors = Tensors()
+    for i, (weight, bias) in enumerate(network.layers):
+        tensors[f"layers.{i}.weight"] = np.ascontiguousarray(weight)
+        tensors[f"layers.{i}.bias"] = np.ascontiguousarray(bias)
+    return {"activation": network.activation, "output": network.output, "sizes": list(network.sizes)}, tensors
 
 
 def order_numbers(action: ArrayLike) -> NDArray[np.int64]:

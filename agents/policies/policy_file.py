@@ -29,11 +29,18 @@ and of kind "shielded":
     envelope             null, or as in a model file
     limits               when the fallback takes over (`agents.policies.shield.Limits`)
     weights              as above; null where no policy has any
+
+and of kind "one-for-all" (`agents.policies.one_for_all`):
+
+    format, kind         1, "one-for-all"
+    context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
+    decision             how long an output is repeated, times to travel a ship length
+    observation_names, network, authority, training, weights as above
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -45,10 +52,12 @@ from numpy.typing import NDArray
 from agents.controllers.controller import FORMAT, check_names
 from agents.controllers.controller_file import read_controller, read_scales
 from agents.policies.network import Layer, Network
+from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll
 from agents.policies.policy import NO_LIMIT, LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
 from shipgym.checks import (
+    check_array,
     check_format,
     check_keys,
     check_number,
@@ -68,18 +77,19 @@ LEARNED = (
 )  # fmt: skip
 LATER = {"action_repeat": 1, "rate_limit": NO_LIMIT}  # what older files lack, and what it means
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
+FOR_ALL = ("format", "kind", "observation_names", "context", "network", "decision", "authority", "training")
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
 
-def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shielded:
-    """A learned or shielded policy from the JSON at `path`, and the weights beside it.
+def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shielded | OneForAll:
+    """A learned or shielded policy, or one for all ships, from the JSON at `path`, and the weights beside it.
 
     Raises InputError naming the file and the field at fault.
     """
     where = str(path)
-    learned = content["kind"] == "learned"
+    expected, read = READERS[content["kind"]]
     content = _current(content)
-    _check_fields(content, (*(LEARNED if learned else SHIELDED), "weights"), where)
+    _check_fields(content, (*expected, "weights"), where)
     tensors: Tensors = {}
     if content["weights"] is not None:
         table = check_table(content["weights"], f"{where}: weights")
@@ -87,7 +97,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
         sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
         tensors = read_weights(weights_path(path), sha256, path)
     own = {name: value for name, value in content.items() if name != "weights"}
-    agent = (_learned if learned else _shielded)(own, tensors, "", where)
+    agent: LearnedPolicy | Shielded | OneForAll = read(own, tensors, "", where)
     if tensors:
         raise InputError(
             f"{weights_path(path)}: unknown {quoted(tensors)} found beside the weights; {REMEDY}"
@@ -138,11 +148,8 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
     """A shielded policy; its weights are taken out of `tensors`."""
     _check_fields(content, SHIELDED, where)
     inner, at = _current(_table(content["policy"], "policy", where)), f"{where}: policy"
-    policy: Any
-    if inner.get("kind") == "learned":
-        policy = _learned(inner, tensors, f"{prefix}policy.", at)
-    elif inner.get("kind") == "shielded":
-        policy = _shielded(inner, tensors, f"{prefix}policy.", at)
+    if inner.get("kind") in ("learned", "shielded"):
+        policy = READERS[inner["kind"]][1](inner, tensors, f"{prefix}policy.", at)
     else:
         policy = read_controller(inner, at)
     limits = {"turn_lengths": 0.0, **_table(content["limits"], "limits", where)}  # older files have none
@@ -157,6 +164,28 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: 
             envelope=read_envelope(content["envelope"], f"{where}: envelope"),
             limits=Limits(**numbers),
         )
+
+
+def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: str) -> OneForAll:
+    """A policy for all ships; its weights are taken out of `tensors`."""
+    at = f"{where}: context"
+    told = check_table(content["context"], at)
+    check_keys(told, CONTEXT, at, CONTEXT)
+    with placed(where):
+        return OneForAll(
+            network=_network(content["network"], tensors, prefix, f"{where}: network"),
+            observation_names=_names(content["observation_names"], f"{where}: observation_names"),
+            fleet=np.stack([check_array(told[name], (4,), f"{at}.{name}") for name in CONTEXT]),
+            decision=content["decision"],
+            authority=content["authority"],
+            training=dict(check_table(content["training"], f"{where}: training")),
+        )
+
+
+#: Fields of each kind of file, and what reads it.
+READERS: Mapping[str, tuple[tuple[str, ...], Callable[..., Any]]] = {
+    "learned": (LEARNED, _learned), "shielded": (SHIELDED, _shielded), ONE_FOR_ALL: (FOR_ALL, _for_all)
+}  # fmt: skip
 
 
 def _network(value: Any, tensors: Tensors, prefix: str, where: str) -> Network:

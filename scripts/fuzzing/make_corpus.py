@@ -19,6 +19,7 @@ import agents
 import shipgym
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.policies.network import Network
+from agents.policies.one_for_all import CONTEXT, OneForAll, context
 from agents.policies.policy import LearnedPolicy
 from agents.policies.shield import Shielded
 from agents.suites.suite import FOLDER
@@ -27,7 +28,7 @@ from agents.training.plan import Given, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.ships.catalogue import xu_ship
-from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
+from shipgym.tasks.task import OBSERVATION_NAMES, Task, observation_scales
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
 EXAMPLE = Path(shipgym.__file__).parent / "examples" / "mariner"
@@ -141,6 +142,7 @@ def policies(folder: Path) -> None:
         "residual": residual,
         "discrete": discrete,
         "shielded": shielded,
+        "one-for-all": one_for_all(),
     }
     for name, policy in made.items():
         folder.joinpath("policy", name).mkdir(parents=True)
@@ -155,6 +157,15 @@ def sb3(folder: Path) -> None:
     ships = shipgym.ShipVecEnv("shipgym/CourseKeeping-v0", 2, model="mariner", seed=0)
     agent = PPO("MlpPolicy", ships, n_steps=8, batch_size=8, seed=0, policy_kwargs={"net_arch": [4]})
     agent.learn(16).save(folder / "sb3" / "ppo.zip")
+
+
+def one_for_all() -> OneForAll:
+    """Told of ships around the container ship."""
+    task = Task.of("PathFollowing-v1")
+    told = context(shipgym.load_model("container-abc-lssvr"), task)
+    names = tuple(one.name for one in task.observed(SHIP))
+    fleet = np.stack([told, np.ones(len(CONTEXT)), told - 1.0, told + 1.0], axis=1).round(4)
+    return OneForAll(network(len(names) + 1 + len(CONTEXT), 4, 1), names, fleet, 0.4, 0.5)
 
 
 def episode(folder: Path) -> None:

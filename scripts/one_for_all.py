@@ -1,0 +1,269 @@
+"""Train the agent for all ships, and say what it costs on ships that it never saw.
+
+    python scripts/one_for_all.py train --out runs/one-for-all       # fleet and runs, what is missing
+    python scripts/one_for_all.py evaluate --out runs/one-for-all    # the table of docs/one_for_all.md
+
+The fleet is drawn around the shipped models of container ship, KVLCC2 and tanker (scripts/fleet.py). The
+Mariner and the two ships of tests/ships/mmg.py are in no way a part of it. Each training seed learns on the
+same fleet; published is the one whose costs on a second fleet, which nobody learned on, are least. Killed,
+it goes on with the training seed that was under way.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from certainty import sea_trials
+from direct_search import tune
+from fleet import Fleet, Learner, Pilots, draw_fleet, learning_ships
+from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
+
+ROOT = Path(__file__).parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+import shipgym  # noqa: E402 - the folder above has to be found first
+from agents.agent_file import read_agent  # noqa: E402
+from agents.controllers.designs import design  # noqa: E402
+from agents.policies.network import Network  # noqa: E402
+from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll  # noqa: E402
+from agents.policies.policy_extraction import _network  # noqa: E402
+from agents.rollouts.rollout import episode_costs  # noqa: E402
+from agents.suites.suite import FIRST_SEED, N_EPISODES, BenchmarkTask  # noqa: E402
+from agents.training.algorithms import sb3_arguments, scaled_rewards, set_deviation  # noqa: E402
+from agents.training.run_folder import versions  # noqa: E402
+from agents.training.settings import load_settings  # noqa: E402
+from identification import identify  # noqa: E402
+from shipgym.envs.engine import Engine  # noqa: E402
+from shipgym.files import read_json, write_json  # noqa: E402
+from shipgym.sea.conditions import Current, Weather  # noqa: E402
+from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
+
+#: The shipped models around which the fleet is drawn.
+BASES = (
+    "container-4dof-output-error", "container-abc-lssvr", "container-two-zigzags", "container-nomoto",
+    "kvlcc2-mmg", "kvlcc2-rm-svm", "kvlcc2-nomoto", "tanker-tls-svm",
+)  # fmt: skip
+FLEET_SEED, VALIDATION_SEED = 1, 2
+PATHS, SHIPS, LANES = 2, 8, 5  # around each shipped model: paths, ships on each, and how often she is there
+DECISION = 16  # control intervals
+SETTINGS = {
+    "base": "wheel-over", "total_steps": 327_680, "ships": 640, "n_steps": 32, "batch_size": 2048,
+    "n_epochs": 6, "learning_rate": 1e-3, "gamma": 0.92, "gae_lambda": 0.95, "authority": 0.3,
+    "action_repeat": DECISION, "log_std_init": -1.5, "log_std_end": -2.5, "net_arch": [64, 64],
+    "reward_scale": 5.0,
+}  # fmt: skip
+BUDGET = 24, 16  # of tuning: settings, episodes
+OBSERVED = 15  # quantities: helm, path and turns
+
+
+def draw_fleets(seed: int, paths: int, ships: int, out: Path) -> list[Fleet]:
+    """The fleets of a seed: for each shipped model ships on some paths; kept in the folder."""
+    file, random = out / f"fleet-{seed}.json", np.random.default_rng(seed)
+    if not file.is_file():
+        drawn = [draw_fleet(name, ships, random) for name in BASES for _ in range(paths)]
+        write_json([fleet.to_dict() for fleet in drawn], file)
+    return [Fleet.from_dict(one) for one in json.loads(file.read_text())]
+
+
+def untrained(fleets: Sequence[Fleet]) -> OneForAll:
+    """A policy that adds nothing, with the range of the fleets' contexts."""
+    told = np.concatenate([fleet.told for fleet in fleets])
+    observed = fleets[0].task.observed(fleets[0].lanes[0].model)[:OBSERVED]
+    n_in = OBSERVED + 1 + len(CONTEXT)
+    nothing = Network(((np.zeros((1, n_in), np.float32), np.zeros(1, np.float32)),))
+    numbers = np.stack([told.mean(0), told.std(0), told.min(0), told.max(0)], axis=1)
+    names = tuple(one.name for one in observed)
+    return OneForAll(
+        nothing, names, numbers, decision=0.05 * DECISION, authority=float(SETTINGS["authority"]),
+    )  # fmt: skip
+
+
+class Annealing(BaseCallback):
+    """Sets the exploration at each rollout and tells of the run."""
+
+    def __init__(self, settings: Any, validation: Any) -> None:
+        super().__init__()
+        self.settings, self.validation, self.began, self.curve = settings, validation, time.process_time(), []
+
+    def _on_rollout_start(self) -> None:
+        set_deviation(self.model, self.settings)
+        if self.num_timesteps // 163_840 > len(self.curve):
+            ratio = self.validation(_network(self.model))
+            self.curve.append([self.num_timesteps, round(ratio, 4)])
+            print(
+                f"  {self.num_timesteps:8d} {ratio:.4f} {time.process_time() - self.began:6.0f} s", flush=True
+            )
+
+    def _on_step(self) -> bool:
+        return True
+
+
+def ratio_on(fleets: Sequence[Fleet], zero: Sequence[Any], agent: OneForAll) -> float:
+    """Mean over fleets of the cost over that of wheel-over, each the mean of a fleet's ships."""
+    costs = [fleet.cost_of(Learner(agent, fleet, DECISION)) for fleet in fleets]
+    return float(np.mean([one.mean() / other.mean() for one, other in zip(costs, zero, strict=True)]))
+
+
+def train(seeds: Sequence[int], out: Path) -> None:
+    """Train what is missing, and publish the best on the validation fleet."""
+    missing = [seed for seed in seeds if not (out / f"{seed}.json").is_file()]
+    if missing:
+        began = time.process_time()
+        fleets = [one.times(LANES) for one in draw_fleets(FLEET_SEED, PATHS, SHIPS, out)]
+        validation = draw_fleets(VALIDATION_SEED, 1, 4, out)
+        zero = [fleet.cost_of(Pilots(fleet.pilots)) for fleet in validation]
+        like = untrained(fleets)
+        print(f"{sum(len(fleet.lanes) for fleet in fleets)} ships, {time.process_time() - began:.0f} s")
+        for name, numbers in zip(CONTEXT, like.fleet, strict=True):
+            print(f"  {name:14s}" + " ".join(f"{value:8.3f}" for value in numbers), flush=True)
+        for seed in missing:
+            learn(seed, fleets, lambda agent: ratio_on(validation, zero, agent), like, out)
+            publish([one for one in seeds if (out / f"{one}.json").is_file()], out)
+
+
+def publish(seeds: Sequence[int], out: Path) -> None:
+    """Ship the best on the validation fleet, with the record of all."""
+    agents = [read_agent(out / f"{seed}.json") for seed in seeds]
+    best = min(agents, key=lambda one: one.training["validation"])
+    runs = [{name: one.training[name] for name in ("seed", "validation", "curve")} for one in agents]
+    replace(best, training={**best.training, "runs": runs}).save(
+        ROOT / "agents" / "pretrained" / f"{ONE_FOR_ALL}.json"
+    )
+
+
+def learn(seed: int, fleets: Sequence[Fleet], validation: Any, like: OneForAll, out: Path) -> None:
+    """One training seed."""
+    print(f"training seed {seed}", flush=True)
+    settings, began = load_settings("ppo", "path-following", given=SETTINGS), time.process_time()
+    ships = scaled_rewards(learning_ships(fleets, like, DECISION), settings)
+    agent = PPO("MlpPolicy", ships, seed=1000 * seed, **sb3_arguments(settings))
+    told = Annealing(settings, lambda network: validation(replace(like, network=network)))
+    agent.learn(settings.total_steps, told)
+    network = _network(agent)
+    ratio = validation(replace(like, network=network))
+    record = {
+        "algorithm": "ppo", "seed": seed, "command": f"python scripts/one_for_all.py train --seeds {seed}",
+        "fleet": {"models": list(BASES), "seed": FLEET_SEED, "paths": PATHS, "ships": SHIPS},
+        "settings": settings.to_dict(), "steps": agent.num_timesteps, "curve": told.curve,
+        "validation": round(ratio, 5), "versions": versions(),
+    }  # fmt: skip
+    replace(like, network=network, training=record).save(out / f"{seed}.json")
+    print(f"  {agent.num_timesteps:8d} {ratio:.4f} {time.process_time() - began:6.0f} s", flush=True)
+
+
+def unseen(folder: Path) -> list[tuple[str, Path, Any]]:
+    """Ships that nothing was learned on: name, file of the model that is known of her, and the ship."""
+    found = [("mariner", ROOT / "shipgym/ships/library/mariner-tls-svm.json", shipgym.load_model("mariner"))]
+    for name in MMG_SHIPS:
+        ship, file = mmg_ship(name), folder / f"{name}-abkowitz.json"
+        if not file.is_file():
+            trials = sea_trials(ship, "zigzags and turn", 0)
+            identify(trials, "abkowitz", particulars=ship.particulars, steering=ship.steering).model.save(
+                file
+            )
+        found.append((name, file, ship))
+    return found
+
+
+def kinds(ship: Any) -> dict[str, dict[str, Any]]:
+    """Options of the paths, laid down before anything was trained."""
+    speed, time_of_length = ship.particulars["speed"], ship.particulars["length"] / ship.particulars["speed"]
+    current = Current(0.2 * speed, variation=0.05 * speed, time_constant=20.0 * time_of_length)
+    sharp = {"max_turn_deg": 120.0, "turn_radius": 3.0, "leg_lengths": [12.0, 18.0], "ground": 8.0}
+    return {
+        "as it comes": {},
+        "sharp turns": sharp,
+        "current": {"sea": Weather(current=current), "ground": 6.0},
+        "narrow": {"corridor": 0.25, "ground": 1.0, "max_turn_deg": 45.0},
+    }
+
+
+def evaluate(seeds: Sequence[int], out: Path) -> None:
+    """Costs on the unseen ships: what is missing, then the table."""
+    results = out / "unseen.json"
+    rows: dict[str, Any] = read_json(results, "results", "delete it") if results.is_file() else {}
+    agents = {str(seed): read_agent(out / f"{seed}.json") for seed in seeds}
+    for name, file, ship in unseen(out):
+        for kind, options in kinds(ship).items():
+            row = rows.setdefault(f"{name}, {kind}", {})
+            task = BenchmarkTask("", "path-following-v1", str(file), "", options)
+            for who, policy in contestants(task, agents, row):
+                engine = Engine(ship, N_EPISODES, task.task)
+                row[who] = episode_costs(policy(), engine, FIRST_SEED + np.arange(N_EPISODES)).tolist()
+                print(f"{name}, {kind}: {who} {np.mean(row[who]):.1f}", flush=True)
+                write_json(rows, results)
+    if agents:
+        print(table(rows, list(agents)))
+
+
+def contestants(task: BenchmarkTask, agents: dict[str, Any], done: Any) -> list[tuple[str, Any]]:
+    """Who is missing in a row, and what makes them from the model."""
+    who: dict[str, Any] = {"wheel-over": lambda: design("wheel-over", task), "tuned": lambda: tuned(task)}
+    for seed, agent in agents.items():
+        who[seed] = lambda agent=agent: agent.for_ship(task.ship, task.task)
+    return [(name, make) for name, make in who.items() if name not in done]
+
+
+def tuned(task: BenchmarkTask) -> Any:
+    """Wheel-over and the LQ that it leads, tuned on the model with the budget of suite shipgym-v2."""
+    lq = tune("lq", task, None, *BUDGET).settings
+    return design("wheel-over", task, tune("wheel-over", task, {"lq": lq}, *BUDGET).settings)
+
+
+def table(rows: dict[str, Any], seeds: Sequence[str]) -> str:
+    """In Markdown: mean costs, and the agents' over that of the tuned wheel-over with 95 % intervals."""
+    random, lines = np.random.default_rng(0), [
+        "| ship, path | wheel-over | tuned | training seeds | mean | over tuned | over wheel-over |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]  # fmt: skip
+    ratios = []
+    for name, row in rows.items():
+        costs = np.array([row[seed] for seed in seeds])
+        parts = []
+        for other in ("tuned", "wheel-over"):
+            base, n = np.array(row[other]), costs.shape[1]
+            drawn = [
+                costs[np.ix_(random.integers(len(seeds), size=len(seeds)), which)].mean() / base[which].mean()
+                for which in random.integers(n, size=(1000, n))
+            ]  # fmt: skip
+            low, high = np.percentile(drawn, (2.5, 97.5))
+            parts.append(f"{costs.mean() / base.mean():.3f} ({low:.3f} to {high:.3f})")
+        ratios.append([costs.mean() / np.mean(row[other]) for other in ("tuned", "wheel-over")])
+        each = ", ".join(f"{cost:.1f}" for cost in costs.mean(axis=1))
+        own, best = (f"{np.mean(row[who]):.1f}" for who in ("wheel-over", "tuned"))
+        lines.append(f"| {name} | {own} | {best} | {each} | {costs.mean():.1f} | {parts[0]} | {parts[1]} |")
+    means = " | ".join(f"{one:.3f}" for one in np.exp(np.mean(np.log(ratios), axis=0)))
+    return "\n".join([*lines, f"| geometric mean | | | | | {means} |"])
+
+
+def main() -> None:
+    """Train or evaluate."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("what", choices=("draw", "train", "evaluate"))
+    parser.add_argument("--seeds", default="0,1,2,3,4", help="training seeds, separated by commas")
+    parser.add_argument("--out", type=Path, default=Path("runs/one-for-all"), help="folder of the runs")
+    asked = parser.parse_args()
+    torch.set_num_threads(1)
+    warnings.simplefilter("ignore")
+    asked.out.mkdir(parents=True, exist_ok=True)
+    seeds = [int(seed) for seed in asked.seeds.split(",") if seed]
+    if asked.what == "draw":
+        draw_fleets(FLEET_SEED, PATHS, SHIPS, asked.out), draw_fleets(VALIDATION_SEED, 1, 4, asked.out)
+        return
+    train(seeds, asked.out) if asked.what == "train" else evaluate(seeds, asked.out)
+
+
+if __name__ == "__main__":
+    main()

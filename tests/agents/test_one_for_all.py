@@ -1,0 +1,120 @@
+"""One agent for all ships: what it is told, and what is made of it for a ship."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.agent_file import load_agent, read_agent
+from agents.benchmarking.contestants import contestants
+from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll, context
+from agents.suites.suite import load_suite
+from shipgym.errors import InputError
+from shipgym.ships import load_model
+from shipgym.ships.scaling import scale_model
+from shipgym.tasks.task import Task
+from tests.agents.policies import random_network
+
+SHIP, TASK = load_model("container-abc-lssvr"), Task.of("PathFollowing-v1")
+TOLD = context(SHIP, TASK)
+OBSERVED = TASK.observed(SHIP)
+N_SEEN = len(OBSERVED) + 1  # and the base's action
+AGENT = OneForAll(
+    random_network(N_SEEN + len(CONTEXT), 16, 1),
+    tuple(one.name for one in OBSERVED),
+    np.stack([TOLD + 0.5, np.full(12, 2.0), TOLD - 1.0, TOLD + 1.0], axis=1),
+    decision=0.4,
+    authority=0.5,
+)
+SEEN = np.random.default_rng(1).uniform(-0.5, 0.5, (5, len(OBSERVED))).astype(np.float32)
+
+
+def mirrored(model):
+    """The ship's mirror image: in surge terms odd in sway, yaw and rudder change sign, else even ones."""
+    table, coefficients = model.dynamics, dict(model.coefficients)
+    for equation in table.equations:
+        for name, term in zip(table.names(equation), table.terms(equation), strict=True):
+            odd = term.power("v", "r", "delta") % 2 == 1
+            coefficients[name] *= -1.0 if odd == (equation == "u") else 1.0
+    return replace(model, coefficients=coefficients)
+
+
+@pytest.mark.parametrize("similar", [lambda ship: scale_model(ship, 7.0), mirrored])
+def test_context_is_that_of_a_ship_scaled_by_froudes_law_or_mirrored(similar):
+    assert context(similar(SHIP), TASK) == pytest.approx(TOLD, rel=2e-3)
+
+
+def test_context_is_the_prime_linear_dynamics():
+    told = dict(zip(CONTEXT, TOLD, strict=True))
+    mariner = dict(zip(CONTEXT, context(load_model("mariner"), TASK.changed(corridor=0.5)), strict=True))
+    assert told["rudder_limit"] == pytest.approx(np.radians(35.0))
+    assert (told["path_radius"], told["corridor"], mariner["corridor"]) == (4.0, 1.0, 0.5)
+    assert mariner["rudder_gain"] / mariner["stability"] == pytest.approx(3.854, abs=1e-3)  # Nomoto's K'
+    tanker = dict(zip(CONTEXT, context(load_model("tanker"), TASK), strict=True))
+    assert tanker["stability"] < 0.0  # unstable on her course
+    assert tanker["drift"] < 0.0  # the bow turns into the turn: sway to port in a turn to starboard
+
+
+def test_policy_of_a_ship_is_the_network_told_her_context():
+    policy = AGENT.for_ship(SHIP)
+    base, _ = policy.base.predict(SEEN)
+    inputs = np.concatenate([SEEN, base, np.tile(AGENT.inputs(TOLD), (5, 1))], axis=1).astype(np.float32)
+    expected = np.clip(base + 0.5 * np.clip(AGENT.network(inputs), -1.0, 1.0), -1.0, 1.0)
+    action, _ = policy.predict(SEEN)
+    assert action == pytest.approx(expected, abs=1e-5)
+    assert policy.base.kind == "wheel-over"
+    assert policy.action_repeat == 8  # 0.4 of 20.9 s for a ship length, in intervals of 1 s
+    assert AGENT.for_ship(scale_model(SHIP, 7.0)).action_repeat == pytest.approx(
+        0.4 * 7.0 / 1.68 / 0.2, abs=0.5
+    )
+
+
+def test_what_it_is_told_is_within_three_deviations():
+    assert np.abs(AGENT.inputs(TOLD + 100.0)).max() == 3.0
+
+
+def test_file_holds_all_of_it(tmp_path):
+    AGENT.save(tmp_path / "all.json")
+    found = read_agent(tmp_path / "all.json")
+    assert found.fleet.tolist() == AGENT.fleet.tolist()
+    for agent in (found.for_ship(SHIP), load_agent(tmp_path / "all.json", SHIP)):
+        assert agent.predict(SEEN)[0].tolist() == AGENT.for_ship(SHIP).predict(SEEN)[0].tolist()
+    with pytest.raises(InputError, match="give her model"):
+        load_agent(tmp_path / "all.json")
+    text = (tmp_path / "all.json").read_text()
+    (tmp_path / "all.json").write_text(text.replace('"drift"', '"drifts"'))
+    with pytest.raises(InputError, match=r"context: unknown key 'drifts'.*'drift'"):
+        read_agent(tmp_path / "all.json")
+
+
+def test_a_ship_outside_the_fleet_is_told_and_one_far_outside_refused():
+    sluggish = replace(SHIP, steering=replace(SHIP.steering, rudder_limit_deg=35.0, time_constant=27.0))
+    assert AGENT.for_ship(sluggish).training["outside"] == {"gear_lag": pytest.approx(0.12, abs=0.02)}
+    assert AGENT.for_ship(SHIP).training["outside"] == {}
+    dead = replace(SHIP, steering=replace(SHIP.steering, time_constant=60.0))
+    with pytest.raises(
+        InputError, match=r"gear_lag 2.87 found, one-for-all was trained on .* take wheel-over"
+    ):
+        AGENT.for_ship(dead)
+
+
+def test_paths_of_version_0_are_refused():
+    with pytest.raises(InputError, match="one-for-all on 'PathFollowing'"):
+        AGENT.for_ship(SHIP, Task.of("PathFollowing"))
+
+
+def test_the_shipped_one_is_made_for_the_model_of_a_task():
+    (one,), task = contestants(ONE_FOR_ALL), load_suite("shipgym-v2").task("failing-gear")
+    (policy,) = one.policies(task, "shipgym-v2")
+    file = Path(next(iter(one.fingerprint(task))))
+    assert file.stat().st_size + file.with_suffix(".safetensors").stat().st_size < 300_000
+    assert (policy.model_name, policy.name) == ("container-abc-lssvr", ONE_FOR_ALL)
+
+
+def test_the_shipped_one_is_the_best_of_its_training_seeds_on_the_fleet_held_out():
+    agent = read_agent(ONE_FOR_ALL)
+    by_seed = {run["seed"]: run["validation"] for run in agent.training["runs"]}
+    assert len(by_seed) >= 1
+    assert agent.training["seed"] == min(by_seed, key=by_seed.get)
+    assert not any("mariner" in name for name in agent.training["fleet"]["models"])

@@ -1,0 +1,82 @@
+"""Every Python block of the pages runs, page by page, top to bottom, in one namespace and an empty folder.
+
+Comments of a page, which readers do not see, say what is special:
+
+    <!-- not run: REASON -->            the next block is not run
+    <!-- before: CODE -->               run first: what the page leaves to the reader
+
+Numbers of ships, steps and draws are made small (`SMALLER`). The notebooks are run by `make evidence`.
+"""
+
+import ast
+import contextlib
+import io
+import os
+import re
+import shutil
+import traceback
+from pathlib import Path
+
+import pytest
+from plotly.basedatatypes import BaseFigure
+
+from shipgym import example_ship
+
+ROOT = Path(__file__).parents[1]
+BLOCK = re.compile(
+    r"(?:<!-- (?P<mark>not run|before): (?P<said>.*?) -->\n)?\n?^```python\n(?P<code>.*?)^```", re.M | re.S
+)
+PAGES = [
+    path
+    for path in [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    if "```python" in path.read_text(encoding="utf-8") and path.name != "gallery.md"  # made by its script
+]
+SMALLER = {
+    "num_envs=1024": "num_envs=3", "range(1000)": "range(3)", "n_draws=200": "n_draws=3",
+    "threads=2": "threads=1", ".engine(100)": ".engine(3)", "task.seeds,": "task.seeds[:3],",
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(example_ship().parent, tmp_path, dirs_exist_ok=True)
+    for folder in ("examples", "agents"):
+        (tmp_path / folder).symlink_to(ROOT / folder)
+    if not (child := os.fork()):  # whatever a page registers ends with it
+        status = 1
+        try:
+            run(page)
+            status = 0
+        except BaseException:
+            traceback.print_exc()
+        finally:
+            os._exit(status)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+
+
+def run(page):
+    """Run the blocks of a page."""
+    BaseFigure.show = lambda _: None
+    names = {"__name__": page.stem}
+    for found in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        mark, said, code = found["mark"], found["said"], found["code"]
+        if mark == "not run":
+            ast.parse(code)
+            assert len(said) > 10
+            continue
+        if mark == "before":
+            exec(said, names)
+        for large, small in SMALLER.items():
+            code = code.replace(large, small)
+        with contextlib.redirect_stdout(io.StringIO()):
+            exec(compile(code, str(page), "exec"), names)
+
+
+def test_every_block_that_is_not_run_is_parsed_and_has_its_mark():
+    text = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    found = BLOCK.findall(text)
+    assert len(found) == text.count("\n```python\n")
+    marks = text.count("<!-- not run: ") + text.count("<!-- before: ")
+    assert marks == sum(bool(mark) for mark, _, _ in found)
