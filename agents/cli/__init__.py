@@ -24,7 +24,6 @@ from agents.cli.command import (
     EngineName,
     IdentifyCommand,
     IdentifyOptions,
-    Json,
     ShipFileArgument,
     Workers,
     answered,
@@ -203,7 +202,6 @@ def autopilot_command(
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
-    as_json: Json = False,
 ) -> None:
     """The whole chain: identify, predict, design autopilots, run them on drawn models, write a report.
 
@@ -215,30 +213,29 @@ def autopilot_command(
     from agents.verification.chain import DESIGNS, build_autopilot
 
     designs = DESIGNS if autopilots is None else [name.strip() for name in autopilots.split(",")]
-    with progress_bars(not as_json) as progress:
+    with progress_bars() as progress:
         result = build_autopilot(
             ship, out, draws=draws, seed=seed, options=options, agents=agents or (), designs=designs,
             standards=standards, progress=progress, where=JobEngine(engine, workers, address),
         )  # fmt: skip
-    _print_result(result, out / "report.html", draws, as_json)
+    _print_result(result, out / "report.html", draws)
 
 
-def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bool) -> None:
+def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result of the chain; fail for an unstable model, and where every design is refused."""
     from agents.cli.terminal import (
+        answer,
         console,
         criteria_notes,
         criteria_table,
         prediction_table,
-        print_json,
         ranking_table,
         warn,
     )
     from identification.validation.warnings import held_out_error, model_warnings
 
-    if as_json:
-        print_json({**result.metrics, "report": str(report)})
-    elif result.verification is not None:
+    answer({**result.metrics, "report": str(report)})
+    if result.verification is not None:
         found = result.verification.manoeuvres
         console.print(held_out_error(result.identification), soft_wrap=True)
         console.print(prediction_table(result.identification))
@@ -265,8 +262,7 @@ def _print_result(result: AutopilotResult, report: Path, draws: int, as_json: bo
         warn(warning)
     for name, reason in (result.verification.refused if result.verification else {}).items():
         warn(f"no {name.upper()} autopilot: {reason}")
-    if not as_json:
-        console.print(f"report: {report}", soft_wrap=True)
+    console.print(f"report: {report}", soft_wrap=True)
 
 
 @add("replay")

@@ -54,7 +54,7 @@ def main() -> None:
             cluster.add_node(num_cpus=1)
         options.address = cluster.address
     ray.init(address=options.address or "local", log_to_driver=False)
-    register_env("course-keeping", lambda config: gym.make("shipgym/CourseKeeping-v0", **config))
+    register_env("course-keeping", lambda config: gym.make("shipgym:shipgym/CourseKeeping-v0", **config))
     config = (
         PPOConfig()
         .environment("course-keeping", env_config={"model": options.model})
