@@ -54,7 +54,7 @@ class ScheduledLQ(Controller):
     neutral: Floats
 
     def __post_init__(self) -> None:
-        rising(self.speeds.tolist(), "speeds", above=0.0)
+        rising(self.speeds.tolist(), "speeds")
 
     @classmethod
     def from_model(
@@ -93,9 +93,7 @@ class ScheduledLQ(Controller):
         """
         interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         service = model.particulars["speed"]
-        listed = rising(
-            [service * part for part in SPEEDS] if speeds is None else speeds, "speeds", above=0.0
-        )
+        listed = rising([service * part for part in SPEEDS] if speeds is None else speeds, "speeds")
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
             ship = sample_ship(model, interval, speed=speed)
@@ -136,7 +134,7 @@ class ScheduledLQ(Controller):
         return order, memory
 
 
-def rising(values: Sequence[float], name: str, above: float | None = None) -> Floats:
+def rising(values: Sequence[float], name: str, above: float | None = 0.0) -> Floats:
     """Numbers in rising order as an array; InputError names them if they are not, or one is too small."""
     listed = [check_number(one, f"{name}[{i}]", above=above) for i, one in enumerate(values)]
     if len(listed) < 2 or np.any(np.diff(listed) <= 0.0):

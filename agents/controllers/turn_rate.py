@@ -58,7 +58,7 @@ class TurnRate(Stateful):
     rudders: Floats
 
     def __post_init__(self) -> None:
-        rising(self.rates.tolist(), "rates")
+        rising(self.rates.tolist(), "rates", above=None)
 
     @classmethod
     def from_model(

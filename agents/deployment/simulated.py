@@ -83,7 +83,7 @@ class SimulatedShip:
 
     def sentences(self) -> str:
         """What her instruments send now."""
-        known = self.measured()
+        known: dict[str, Any] = self.measured()
         north, east = (degrees(known[name]) for name in ("latitude", "longitude"))
         minutes, seconds = divmod(self.steps * self.step, 60.0)
         text = render(

@@ -9,7 +9,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from agents import LQ, PID
+from agents import LQ, PID, TurnRate, WheelOver
+from agents.deployment.autopilot import Autopilot
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 
 PAGE = (Path(__file__).parents[2] / "docs" / "deployment.md").read_text(encoding="utf-8")
@@ -66,3 +68,66 @@ def test_every_field_is_described(design):
     described = set(re.findall(r"`(\w+)`", SECTION))
     content = design.from_model(MARINER).to_dict()
     assert {*content, *content["gains"], *content["margins"], "dt"} <= described
+
+
+def between(x, points, values):
+    """On straight lines, that of the nearest beyond them."""
+    k = max(j for j, point in enumerate(points) if point <= max(x, points[0]))
+    if k == len(points) - 1:
+        return values[-1]
+    share = (max(x, points[0]) - points[k]) / (points[k + 1] - points[k])
+    return values[k] + share * (values[k + 1] - values[k])
+
+
+def wrap(angle):
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def turn_rate_by_hand(file, given, memory):
+    """The four steps of the page; the memory is followed rate and integral part."""
+    gains, arrays, dt = file["gains"], file["arrays"], file["design"]["dt"]
+    share = dt * file["design"]["frequency"] / (1.0 + dt * file["design"]["frequency"])
+    scales = dict(zip(file["observation_names"], file["observation_scales"], strict=True))
+    to_heading = wrap(given["set_point"] - given["heading"]) / gains["heading_time"]
+    wanted = given["rate_of_turn"] or max(-gains["rate"], min(gains["rate"], to_heading))
+    followed, part = memory or (given["yaw_rate"], 0.0)
+    followed += share * (wanted - followed)
+    off = followed - given["yaw_rate"]
+    order = between(followed, arrays["rates"], arrays["rudders"]) + gains["proportional"] * off + part
+    if abs(order) < scales["rudder"]:
+        part += gains["integral"] * dt * off
+    return max(-scales["rudder"], min(scales["rudder"], order)), (followed, part)
+
+
+def test_a_rate_of_turn_is_steered_as_the_page_says():
+    agent, random, memory = TurnRate.from_model(MARINER), np.random.default_rng(0), None
+    file, bridge = json.loads(json.dumps(agent.to_dict())), Autopilot(agent)
+    for step in range(300):
+        given = dict(zip(("set_point", "heading", "yaw_rate"), random.normal(0, 0.01, 3), strict=True))
+        given["rate_of_turn"] = 0.003 if step % 100 > 60 else 0.0
+        order, memory = turn_rate_by_hand(file, given, memory)
+        assert bridge.step(given) == pytest.approx(order, abs=1e-12)
+
+
+def test_wheel_over_is_what_the_page_says():
+    agent, random = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")), np.random.default_rng(1)
+    bridge, gains, integral = Autopilot(agent), agent.gains, 0.0
+    helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
+    sizes = {"surge": 1.0, "sway": 0.3, "cross_track": 80.0, "next_turn_distance": 300.0}
+    for step in range(300):
+        given = {name: random.normal(0.0, sizes.get(name, 0.05)) for name in bridge.inputs}
+        given |= {"surge": 7.5 + given["surge"], "second_turn_distance": 900.0, "second_turn_angle": -0.5}
+        crab = wrap(given["course"] - given["heading"] - math.atan2(given["sway"], given["surge"]))
+        bend = 0.0
+        for one in ("next", "second"):
+            angle, ahead = given[f"{one}_turn_angle"], gains["turn_reach"] - given[f"{one}_turn_distance"]
+            bend += math.copysign(max(0.0, min(abs(angle), ahead / gains["path_radius"])), angle)
+        wanted = given["set_point"] - math.atan(given["cross_track"] / gains["lookahead"]) + bend
+        error = wrap(wanted - gains["crab_share"] * crab - given["heading"])
+        integral += error * helm["design"]["dt"] if step and abs(error) <= math.radians(10.0) else 0.0
+        of, neutral = helm["gains"], helm["neutral_rudder"]
+        order = neutral + of["heading_error"] * error + of["heading_error_integral"] * integral
+        order += of["yaw_rate"] * given["yaw_rate"] + of["sway"] * (given["sway"] - helm["neutral_sway"])
+        order += of["rudder"] * (given["rudder"] - neutral)
+        limit = MARINER.steering.limit
+        assert bridge.step(given) == pytest.approx(max(-limit, min(limit, order)), abs=1e-9)

@@ -45,8 +45,8 @@ PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
         (
             sentence("GPRMC", "120000", "A", "5430.0", "N", "00815.0", "W", "10.0", "90.0", "010126"),
             [
-                ("latitude", np.radians(54.5), "GP"), ("longitude", np.radians(-8.25), "GP"),
-                ("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP"),
+                ("course", np.pi / 2, "GP"), ("speed", 5.1444, "GP"), ("latitude", np.radians(54.5), "GP"),
+                ("longitude", np.radians(-8.25), "GP"),
             ],
         ),
         (
