@@ -133,7 +133,7 @@ class OneForAll:
 
     def outside(self, told: Floats, name: str) -> dict[str, float]:
         """By how much of the fleet's range a context is outside it; InputError, with the ship, where far."""
-        found = {}
+        found: dict[str, float] = {}
         for one, value, (_, _, low, high) in zip(CONTEXT, told.tolist(), self.fleet.tolist(), strict=True):
             beyond = max(low - value, value - high) / (high - low)
             if not beyond < FAR:
