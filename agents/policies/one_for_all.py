@@ -40,7 +40,7 @@ CONTEXT = (
     "turn_radius", "turn_reach", "path_radius", "corridor",
 )  # fmt: skip
 LARGEST = 3.0  # deviation from the fleet's mean, in its standard deviations, that the network is shown
-FAR = 0.5  # of the range that the fleet covers: how far beyond it a ship is refused
+FAR = 0.2  # of the range that the fleet covers: beyond it by so much nothing is added, and a ship is refused
 
 
 def context(model: ShipModel, task: Task) -> Floats:
@@ -104,15 +104,16 @@ class OneForAll:
         """Make the policy of one ship from her model; nothing is searched or learned.
 
         `task`: the path to follow, by default that of PathFollowing-v1. The policy's `training` says under
-        "outside" by how much of the fleet's range the ship or the path is outside it, by `CONTEXT`. Raises
-        InputError if the path is not of version 1, wheel-over cannot be designed for the ship, or she is far
-        from all that it was trained on.
+        "outside" by how much of the fleet's range the ship or the path is outside it, by `CONTEXT`; the
+        farther, the less it adds to its base. Raises InputError if the path is not of version 1, wheel-over
+        cannot be designed for the ship, or she is far from all that it was trained on.
         """
         asked = task or Task.of("PathFollowing-v1")
         observed = asked.observed(model)[: len(self.observation_names)]
         where = f"{ONE_FOR_ALL} on '{asked.name}'"
         check_names([one.name for one in observed], self.observation_names, where)
         base, told = WheelOver.from_model(model, task=asked), context(model, asked)
+        outside = self.outside(told, model.name)
         ((weight, bias), *rest), n_in = self.network.layers, len(observed) + 1
         first = weight[:, :n_in].copy(), (bias + weight[:, n_in:] @ self.inputs(told)).astype(np.float32)
         time = model.particulars["length"] / model.particulars["speed"]
@@ -121,26 +122,26 @@ class OneForAll:
             observation_names=self.observation_names,
             observation_scales=tuple(one.scale for one in observed),
             base=base,
-            authority=self.authority,
+            authority=self.authority * (1.0 - max(outside.values(), default=0.0) / FAR),
             action_repeat=max(1, round(self.decision * time / asked.interval(model))),
             env_id=ENV_ID,
             env_options=as_json(asked.options),
             model_name=model.name,
             model_sha256=model_hash(model),
-            training={**self.training, "algorithm": ONE_FOR_ALL, "outside": self.outside(told, model.name)},
+            training={**self.training, "algorithm": ONE_FOR_ALL, "outside": outside},
         )
 
     def outside(self, told: Floats, name: str) -> dict[str, float]:
         """By how much of the fleet's range a context is outside it; InputError, with the ship, where far."""
-        found = {}
+        found: dict[str, float] = {}
         for one, value, (_, _, low, high) in zip(CONTEXT, told.tolist(), self.fleet.tolist(), strict=True):
             beyond = max(low - value, value - high) / (high - low)
-            if not beyond <= FAR:
+            if not beyond < FAR:
                 raise InputError(
                     f"model {name!r}: {one} {value:.3g} found, {ONE_FOR_ALL} was trained on {low:.3g} to "
                     f"{high:.3g} and would be guessing; take wheel-over, or train an agent for this ship"
                 )
-            found |= {one: round(beyond, 3)} if beyond > 0.0 else {}
+            found |= {one: beyond} if beyond > 0.0 else {}
         return found
 
     def save(self, path: str | Path) -> None:
