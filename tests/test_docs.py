@@ -19,6 +19,7 @@ import traceback
 import types
 from pathlib import Path
 
+import document_api
 import pytest
 import sklearn.linear_model  # noqa: F401 - what many pages need is loaded once, before they fork
 from plotly.basedatatypes import BaseFigure
@@ -86,3 +87,8 @@ def test_every_block_that_is_not_run_is_parsed_and_has_its_mark():
     assert len(found) == text.count("\n```python\n")
     marks = text.count("<!-- not run: ") + text.count("<!-- before: ")
     assert marks == sum(bool(mark) for mark, _, _ in found)
+
+
+def test_the_reference_has_every_public_name():
+    written = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md")}
+    assert written == document_api.pages()

@@ -24,8 +24,8 @@ BOX = "e.getBoundingClientRect()"
 WIDE, TELEPHONE = (1280, 800), (375, 667)
 NARROW = (
     "index.html", "tutorial.html", "gallery.html", "identification.html", "reproduction.html",
-    "theory/motion.html", "theory/identification.html", "theory/autopilots.html", "howto/nmea.html", "api/shipgym.html",
-    "notebooks/identify.html",
+    "theory/motion.html", "theory/identification.html", "theory/autopilots.html", "howto/nmea.html",
+    "api/shipgym.html", "notebooks/identify.html",
 )  # fmt: skip
 
 
