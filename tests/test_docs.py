@@ -65,7 +65,8 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
 def run(page):
     """Run the blocks of a page."""
     BaseFigure.show = lambda _: None
-    module = sys.modules[page.stem] = types.ModuleType(page.stem)  # jobs are functions of modules
+    name = f"page_{page.stem}"
+    module = sys.modules[name] = types.ModuleType(name)  # jobs are functions of modules
     names = vars(module)
     for found in BLOCK.finditer(page.read_text(encoding="utf-8")):
         mark, said, code = found["mark"], found["said"], found["code"]
