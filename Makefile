@@ -7,7 +7,8 @@
 # make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
 # make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
-# make docs      the site
+# make docs      the site, and whether its links, pictures and pages work in a browser
+# make site-test the latter alone
 
 PYTHON ?= python3
 VENV := .venv
@@ -16,7 +17,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs clean
+.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -29,7 +30,7 @@ INTERPRETED := $(patsubst %,tests/shipgym/test_%.py,$(INTERPRETED))
 test: lint type
 	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "not compiled" $(INTERPRETED)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m compiled $(INTERPRETED)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(addprefix --ignore=,$(INTERPRETED))
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(addprefix --ignore=,$(INTERPRETED) tests/test_site.py)
 
 lint: $(VENV)/dev-installed
 	$(BIN)/ruff format --check .
@@ -68,12 +69,20 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite --no-page
 	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
 	$(BIN)/python scripts/transfer.py --data $(DATA)
+	$(BIN)/python scripts/run_notebooks.py
+	$(BIN)/python scripts/gallery.py
+	$(BIN)/python scripts/tutorial.py
 
-docs: $(VENV)/docs-installed
+docs: $(VENV)/dev-installed
 	$(BIN)/python scripts/document_options.py
 	$(BIN)/python scripts/document_settings.py
+	$(BIN)/python scripts/document_api.py
 	$(BIN)/python scripts/draw_architecture.py
-	$(BIN)/mkdocs build --strict
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+	SHIPGYM_SITE=site $(BIN)/python -m pytest tests/test_site.py
+
+site-test: $(VENV)/dev-installed
+	$(BIN)/python -m pytest tests/test_site.py
 
 $(VENV)/bin/python:
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "shipgym needs Python 3.11 or later; set PYTHON=")'
@@ -86,10 +95,6 @@ $(VENV)/demo-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PIP) -e ".[dev]"
-	touch $@
-
-$(VENV)/docs-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
-	$(PIP) -e ".[docs]"
 	touch $@
 
 # other people's libraries, in a virtual environment of their own

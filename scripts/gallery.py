@@ -287,7 +287,7 @@ def page() -> str:
             code = textwrap.dedent(source.replace("\n\n\n", "\n")).strip()
             file = f"{draw.__name__}.webp"
             width, height = Image.open(IMAGES / file).size
-            picture = f"![{title}](images/gallery/{file}){{ loading=lazy width={width} height={height} }}"
+            picture = f"![{title}](images/gallery/{file}){{ width={width} height={height} }}"
             lines += [f"**{title}**", picture, f"```python\n{code}\n```"]
     return "\n\n".join(lines) + "\n"
 

@@ -2,8 +2,8 @@
 
 `python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all that is written.
 
-The log is that of a simulated ship, as a bridge would have written it: time of day, latitude and longitude
-of an antenna forward of midship, heading, and the rudder positive to port, in a current of 0.76 knots.
+The log is that of a simulated ship, as a bridge would have written it: time of the day, latitude and
+longitude of an antenna forward of midship, heading, and the rudder positive to port, in a current.
 """
 
 from __future__ import annotations

@@ -324,7 +324,7 @@ def parquet_changed(random: Random, content: bytes) -> Change:
 def zip_changed(random: Random, content: bytes) -> Change:
     """A change to one member, which is JSON, another zip or bytes, or to which members there are."""
     with zipfile.ZipFile(io.BytesIO(content)) as file:
-        members = [[one.filename, file.read(one)] for one in file.infolist()]
+        members: list[list[Any]] = [[one.filename, file.read(one)] for one in file.infolist()]
     k = random.randrange(len(members))
     name, inner = members[k]
     what = random.randrange(12)

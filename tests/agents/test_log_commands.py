@@ -54,3 +54,11 @@ def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
     (log / "bad.csv").write_text("a;b\n1;2\n")
     code, said = command(monkeypatch, capsys, "look", "bad.csv")
     assert (code, "no column is named like a channel" in said) == (2, True)
+
+
+def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(log, monkeypatch, capsys):
+    rows = (log / "log.csv").read_text().splitlines()
+    straight = [rows[0], *(f"{row.rsplit(';', 1)[0]};0,0" for row in rows[1:60])]
+    (log / "straight.csv").write_text("\n".join(straight))
+    code, said = command(monkeypatch, capsys, "new-ship", "straight.csv", "log.csv", "--length", "150")
+    assert (code, "a positive rudder steers to port" in said) == (0, True)
