@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -82,7 +81,10 @@ def pose(
         "gear": steering,
         "smooth": smooth,
     }
-    regress = partial(structure_samples, structure=table, particulars=ship, shaft_speed=shaft, **sampling)
+
+    def regress(some: Sequence[Trial]) -> Samples:
+        return structure_samples(some, table, ship, shaft_speed=shaft, **sampling)
+
     regression = regress(used)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
