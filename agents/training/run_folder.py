@@ -18,7 +18,7 @@ from typing import Any
 
 from agents.output import check_writable, present
 from agents.training.plan import Given, Plan, check_same
-from agents.training.settings import present_names
+from agents.training.settings import LATER, present_names
 from shipgym.checks import Shape, check_keys, check_shape, check_table, check_whole, data_only, placed
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
@@ -117,5 +117,5 @@ def _content(folder: Path) -> Mapping[str, Any]:
         raise InputError(f"{path}: format {content['format']!r} found, expected {FORMAT}; {REMEDY}")
     configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
     if isinstance(settings := configuration.get("settings"), Mapping):
-        configuration["settings"] = present_names(settings)
+        configuration["settings"] = {**LATER, **present_names(settings)}
     return {**content, "configuration": configuration}

@@ -323,6 +323,10 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
     return named_values(texts, where, "gamma=0.98")
 
 
+#: What settings mean that older runs do not have.
+LATER = {one.name: one.default for one in fields(Settings) if one.default is not MISSING}
+
+
 def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Settings by their present names, where some have older ones."""
     return {RENAMED.get(name, name): value for name, value in settings.items()}

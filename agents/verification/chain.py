@@ -157,6 +157,7 @@ def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verificati
     refusal = None
     if len(lost) == len(designed):
         refusal = f"{', '.join(key.upper() for key in lost)}: {lost[designed[0].key]}; run {remedy}"
+        refused |= {track.key: "what steers on its course loses control" for track in found.tracks}
     return replace(found, refused=refused), refusal
 
 

@@ -127,6 +127,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
+    monkeypatch.setattr("agents.training.bases.suite_of", lambda name: "shipgym-v1")
     costs = {"mpc": 1.0, "lq-adaptive": 2.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)

@@ -150,7 +150,8 @@ def episode(**changes):
         "n_steps": n, "dt": 0.5, "states": states, "info": {"cross_track": np.full(n + 1, 7.0)},
         "waypoints": np.array([[0.0, 0.0], [100.0, 0.0], [100.0, 60.0]]), "corridor": 20.0,
     }  # fmt: skip
-    return SimpleNamespace(**given | changes)
+    given |= changes
+    return SimpleNamespace(**given, path=given["waypoints"])  # a path without turns
 
 
 def test_tracks_are_drawn_with_the_corridor_beside_them():
@@ -159,14 +160,13 @@ def test_tracks_are_drawn_with_the_corridor_beside_them():
     assert len(track.x) == page_figures.SAMPLES + 1
     assert (track.x[0], track.x[-1], track.y[0], track.y[-1]) == (0.0, 50.0, 0.0, 100.0)
     assert list(only(figure, "path").x) == [0.0, 0.0, 60.0]
-    along, across, disc = traces(figure, "corridor")
-    np.testing.assert_allclose(
-        np.stack([along.x, along.y]), [[20, 20, -20, -20], [0, 100, 100, 0]], atol=1e-5
-    )
-    np.testing.assert_allclose(
-        np.stack([across.x, across.y]), [[0, 60, 60, 0], [80, 80, 120, 120]], atol=1e-5
-    )
-    np.testing.assert_allclose(np.hypot(np.array(disc.x), np.array(disc.y) - 100.0), 20.0, rtol=1e-5)
+    shape = only(figure, "corridor")  # two strips and the disc between them, parted by NaN
+    points = np.array([shape.x, shape.y])
+    ends = np.flatnonzero(np.isnan(points[0]))
+    along, across, disc = (points[:, first:end] for first, end in zip([0, *ends[:-1] + 1], ends, strict=True))
+    np.testing.assert_allclose(along, [[20, 20, -20, -20], [0, 100, 100, 0]], atol=1e-5)
+    np.testing.assert_allclose(across, [[0, 60, 60, 0], [80, 80, 120, 120]], atol=1e-5)
+    np.testing.assert_allclose(np.hypot(disc[0], disc[1] - 100.0), 20.0, rtol=1e-5)
     free = page_figures.tracks_figure({"pid": episode(waypoints=None)}, ["pid"])
     assert [trace.name for trace in free.data] == ["pid"]
 

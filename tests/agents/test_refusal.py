@@ -63,7 +63,7 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     result = chain[1]
     monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
     found, why = links._decided(result.verification, result.identification)
-    assert set(found.refused) == {"pid", "lq"}
+    assert set(found.refused) == {"pid", "lq", "lq-scheduled", "turn-rate", "wheel-over"}
     refused = replace(result, verification=found, refusal=why)
     (tmp_path / "report").mkdir()
     links._write(refused, tmp_path / "report")
@@ -91,7 +91,7 @@ def test_gains_have_one_sign_in_report_and_metrics(chain):
     found = chain[1].verification
     shown = {name: gains for name, _, gains in verification_view(found)["gains"]}
     told = verification_metrics(found)["controllers"]
-    names = list(verification_view(found)["designs"])
+    names = list(verification_view(found)["linear"])
     assert dict(shown["yaw rate"])["derivative"] == told["pid"]["gains"]["derivative"]
     assert shown["yaw rate"][names.index("LQ")] == ("yaw_rate", told["lq"]["gains"]["yaw_rate"])
 
