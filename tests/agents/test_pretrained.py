@@ -14,7 +14,7 @@ from agents.training.settings import present_names
 
 SUITE = load_suite()
 SECOND = [task for task in load_suite("shipgym-v2").tasks if task.on == "ship"]
-SEEDS = 2  # training seeds of the second suite's agents
+SEEDS = 5  # training seeds of the second suite's agents
 PARTS = 1e-4  # of a cost: what rounding of other processors comes to over an episode
 
 
