@@ -68,7 +68,7 @@ evidence: $(VENV)/dev-installed
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
 	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite --no-page
 	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
-	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,ppo --out build/suite-v2 --no-page
+	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite-v2 --no-page
 	$(BIN)/python scripts/train_pretrained.py --table build/suite-v2
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 	$(BIN)/python scripts/certainty.py

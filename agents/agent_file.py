@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
-from shipgym.checks import did_you_mean, quoted
+from shipgym.checks import did_you_mean
 from shipgym.errors import InputError
 from shipgym.files import read_json
 from shipgym.ships import ShipModel
@@ -84,7 +84,7 @@ def find_agent(name: str | Path) -> Path:
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(
-            f"agent: '{name}' found, expected a file, or a pretrained agent: {quoted(known)}."
-            f"{did_you_mean(str(name), known)}"
+            f"agent: '{name}' found, expected a file, or one of {len(known)} pretrained agents, such as "
+            f"'{known[0]}'.{did_you_mean(str(name), known)}"
         )
     return PRETRAINED / f"{name}.json"
