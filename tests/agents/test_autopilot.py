@@ -122,7 +122,8 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
 
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
-    with pytest.raises(InputError, match="agent: 'mariner-clam-ppo' found, expected a file, or a pretrained"):
+    expected = "agent: 'mariner-clam-ppo' found, expected a file, or one of .*Did you mean 'mariner-calm-ppo'"
+    with pytest.raises(InputError, match=expected):
         build_autopilot("examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"])
     assert list(tmp_path.iterdir()) == []
 
