@@ -163,5 +163,4 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
 def smoothed(trial: Trial) -> Trial:
     """The trial without the noise of heading and velocities, which extremes would be read from."""
     names = [name for name in ("psi", "u", "v", "r") if name in trial]
-    channels = {**trial.channels, **smoothed_channels(trial, names, "spline")}
-    return Trial(trial.t, channels, name=trial.name, kind=trial.kind)
+    return trial.with_channels(smoothed_channels(trial, names, "spline"))
