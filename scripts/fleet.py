@@ -286,8 +286,10 @@ class Fleets(VecEnv):
         return [False] * self.num_envs
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Not needed to learn."""
-        raise NotImplementedError
+        """Refused: the engines of a fleet have no attributes that a learner could change."""
+        raise TypeError(
+            f"{attr_name!r}: a fleet of engines has neither attributes to set nor methods to call"
+        )
 
     env_method = set_attr
 

@@ -157,6 +157,9 @@ def test_a_word_is_found(browser, address):
     browser.open(f"{address}/index.html")
     browser.page.locator("input.md-search__input").fill("overshoot")
     browser.wait("document.querySelectorAll('.md-search-result__item').length > 2")
+    items = "[...document.querySelectorAll('.md-search-result__item')]"
+    found = browser.run(f"{items}.map((one) => one.textContent)")
+    assert all("overshoot" in text.lower() for text in found[:3])
 
 
 def test_figures_are_drawn_when_printed(browser, address):
