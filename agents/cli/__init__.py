@@ -197,7 +197,10 @@ def autopilot_command(
         ),
     ] = None,
     standards: Annotated[
-        bool, typer.Option("--standards", help="Simulate what ISO 11674 and IEC 62065 ask for.")
+        bool,
+        typer.Option(
+            "--standards", help="Simulate topics of ISO 11674 and IEC 62065, with limits of our own."
+        ),
     ] = False,
     engine: EngineName = "local",
     workers: Workers = 1,
