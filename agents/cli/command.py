@@ -59,13 +59,14 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
-        from agents.cli.terminal import set_output
+        from agents.cli.terminal import printing
         from agents.engines.jobs import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
-        set_output(*(kwargs.get(name, False) if name in own else kwargs.pop(name, False) for name in SHARED))
+        shared = [kwargs.get(name, False) if name in own else kwargs.pop(name, False) for name in SHARED]
         try:
-            command(*args, **kwargs)
+            with printing(*shared):
+                command(*args, **kwargs)
             sys.stdout.flush()
         except InputError as error:
             fail(str(error), WRONG_INPUT)

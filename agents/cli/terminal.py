@@ -71,10 +71,16 @@ def plain_table(title: str, *headings: str) -> Table:
     return table
 
 
-def set_output(as_json: bool, quiet: bool) -> None:
-    """Say what is printed from now on: JSON in place of tables, nothing but errors and JSON, or all."""
-    AS_JSON.set(as_json)
+@contextmanager
+def printing(as_json: bool, quiet: bool) -> Iterator[None]:
+    """What is printed within: JSON in place of tables, nothing but errors and JSON, or all."""
+    before = AS_JSON.set(as_json), out.quiet, err.quiet
     out.quiet, err.quiet = as_json or quiet, quiet
+    try:
+        yield
+    finally:
+        AS_JSON.reset(before[0])
+        out.quiet, err.quiet = before[1:]
 
 
 def answer(fields: Mapping[str, Any]) -> None:

@@ -195,3 +195,14 @@ def test_what_was_run_again_is_the_same_close_or_differs():
     assert [line.split()[2:] for line in text[-3:]] == [
         ["5", "none", "the", "same"], ["5", "1.5e-09", "close"], ["5", "1.5e-09", "differs"]
     ]  # fmt: skip
+
+
+def state():
+    return terminal.AS_JSON.get(), terminal.out.quiet, terminal.err.quiet
+
+
+def test_what_is_printed_after_a_quiet_command_is_printed():
+    with terminal.printing(as_json=True, quiet=True):
+        assert state() == (True, True, True)
+        terminal.fail("said even so")
+    assert state() == (False, False, False)
