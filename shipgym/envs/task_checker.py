@@ -16,7 +16,7 @@ from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
 from shipgym.engine.records import flat, leaves
 from shipgym.envs.engine import Engine
-from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
+from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
 
 STEPS, PLAIN_STEPS = 400, 40

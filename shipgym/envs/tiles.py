@@ -57,12 +57,9 @@ def ship_columns(pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bo
         if drawn and model.particulars["length"] == base.particulars["length"]:
             numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
-        per_scale = [
-            1.0 / task.scale(path, ship) if task.scale(path, ship) else 0.0 for path in task.definition.seen
-        ]
-        columns.append(
-            np.concatenate([numbers, envelope_numbers(model), known.get(kind, np.zeros(0)), per_scale])
-        )
+        scales = [task.scale(path, ship) for path in task.definition.seen]
+        per_scale = [1.0 / scale if scale else 0.0 for scale in scales]
+        columns.append([*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale])
     return np.stack(columns)
 
 

@@ -3,61 +3,68 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, get_args
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_number, check_whole
+from shipgym.checks import check_keys, check_number, check_whole
 from shipgym.engine.records import Record, field_types, is_list, is_record
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Setting
 
 
-def annotated(record: Record, kind: type, prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """What the fields of a record, and of those within it, are annotated with, by their paths."""
+@dataclass(frozen=True)
+class Configurable:
+    """What a file defines that has settings."""
+
+    name: str
+    source: str  # where it was read from, for messages
+    Settings: Record
+
+    @cached_property
+    def settings(self) -> dict[str, Setting]:
+        """Bounds of each setting by its keyword."""
+        return {name: setting for name, setting, _ in keywords(self.Settings)}
+
+    def make_settings(self, options: Mapping[str, Any]) -> Any:
+        """Settings by keywords; InputError for an unknown keyword, or a value out of its range."""
+        check_keys(options, self.settings, f"{self.name} options")
+        return make_settings(self.Settings, options, getattr(self, "listed", np.asarray))
+
+
+def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
+    """Name and type of each field of a record, and what of a kind it is annotated with, if it is."""
     for name, hint in field_types(record, notes=True).items():
-        base = get_args(hint)[0] if get_args(hint) else hint
-        if is_record(base):
-            yield from annotated(base, kind, f"{prefix}{name}.")
-            continue
         notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, kind)]
-        yield prefix + name, notes[0] if notes else None
+        yield name, getattr(hint, "__origin__", hint) if notes else hint, notes[0] if notes else None
 
 
 def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
     """Name, bounds and default of each keyword: fields, and those of records within with defaults."""
-    for name, hint in field_types(record, notes=True).items():
-        kind = get_args(hint)[0] if get_args(hint) else hint
-        notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, Setting)]
+    for name, kind, setting in annotated(record, Setting):
         if is_record(kind) and kind._field_defaults:
             yield from keywords(kind)
         else:
-            yield name, notes[0] if notes else Setting(""), record._field_defaults.get(name)  # type: ignore[attr-defined]
+            yield name, setting or Setting(""), record._field_defaults.get(name)  # type: ignore[attr-defined]
 
 
-def make_settings(
-    record: Record, options: Mapping[str, Any], listed: Callable[[Any], Any] = np.asarray
-) -> Any:
-    """A record of settings, the given ones in place of its defaults.
-
-    Raises
-    ------
-    InputError
-        For a value out of its range.
-    """
-    bounds = {name: setting for name, setting, _ in keywords(record)}
+def make_settings(record: Record, options: Mapping[str, Any], listed: Callable[[Any], Any]) -> Any:
+    """A record of settings, the given ones in place of its defaults; InputError for one out of its range."""
     values: dict[str, Any] = {}
-    for name, hint in field_types(record).items():
-        if is_record(hint) and hint._field_defaults:
-            values[name] = make_settings(hint, options, listed)
+    for name, kind, setting in annotated(record, Setting):
+        bounds = setting or Setting("")
+        if is_record(kind) and kind._field_defaults:
+            values[name] = make_settings(kind, options, listed)
         elif name not in options:
             values[name] = record._field_defaults[name]  # type: ignore[attr-defined]
-        elif is_list(hint):
-            values[name] = _list_of_numbers(options[name], name, bounds[name], listed)
-        elif is_record(hint):
-            values[name] = _small_record(hint, options[name], name, bounds[name])
+        elif is_list(kind):
+            values[name] = _list_of_numbers(options[name], name, bounds, listed)
+        elif is_record(kind):
+            values[name] = _small_record(kind, options[name], name, bounds)
         else:
-            values[name] = _number(options[name], name, bounds[name])
+            values[name] = _number(options[name], name, bounds)
     return record(**values)
 
 
@@ -68,11 +75,10 @@ def _number(value: Any, name: str, bounds: Setting) -> float:
 
 
 def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
-    words = " and ".join(f"the {word}" for word in kind._fields)
-    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(kind._fields):
-        raise InputError(f"{name}: {value!r} found, expected {words}")
-    pairs = zip(value, kind._fields, strict=True)
-    return kind(*[_number(one, f"{name}: the {word}", bounds) for one, word in pairs])
+    words = [f"the {word}" for word in kind._fields]
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(words):
+        raise InputError(f"{name}: {value!r} found, expected {' and '.join(words)}")
+    return kind(*[_number(one, f"{name}: {word}", bounds) for one, word in zip(value, words, strict=True)])
 
 
 def _list_of_numbers(value: Any, name: str, bounds: Setting, listed: Callable[[Any], Any]) -> Any:

@@ -16,10 +16,7 @@ from shipgym.errors import InputError
 def load_file(path: Path) -> ModuleType:
     """A Python file as a module, executed once however often it is asked for while it stays the same.
 
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be executed.
+    Raises InputError if there is none, or it cannot be executed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected a Python file")
@@ -70,40 +67,30 @@ def check_namespace(
     records: Sequence[str],
     functions: Mapping[str, Sequence[str]],
     optional: Sequence[str] = (),
-) -> None:
-    """Refuse what lacks a record or a function, or has one of another form.
+) -> dict[str, Any]:
+    """Records and functions of a namespace by name, without optional ones that it lacks.
 
-    Raises
-    ------
-    InputError
-        Naming the file, the name and what is expected.
+    `functions` has the arguments of each. Raises InputError naming the file, the name and what is expected.
     """
+    found = {}
     for name in (*records, *functions):
-        if not hasattr(namespace, name):
-            if name in optional:
-                continue
-            what = _what(name, functions)
-            raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
-        found = getattr(namespace, name)
+        if name in optional and not hasattr(namespace, name):
+            continue
+        what = f"a NamedTuple {name!r} of floats"
         if name in functions:
-            _check_function(found, name, where, functions)
-        elif not is_record(found):
-            raise InputError(f"{where}: {name} is no NamedTuple, expected {_what(name, functions)}")
-        else:
-            _check_record(found, name, where)
-
-
-def _what(name: str, functions: Mapping[str, Sequence[str]]) -> str:
-    if name in functions:
-        return f"a function {name}({', '.join(functions[name])})"
-    return f"a NamedTuple {name!r} of floats"
-
-
-def _check_function(function: Any, name: str, where: str, functions: Mapping[str, Sequence[str]]) -> None:
-    code = getattr(function, "__code__", None)
-    if code is None or code.co_argcount != len(functions[name]):
-        found = f"{code.co_argcount} arguments" if code is not None else "no plain function"
-        raise InputError(f"{where}: {name}: {found} found, expected {_what(name, functions)}")
+            what = f"a function {name}({', '.join(functions[name])})"
+        if not hasattr(namespace, name):
+            raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
+        found[name] = value = getattr(namespace, name)
+        code = getattr(value, "__code__", None)
+        if name not in functions:
+            if not is_record(value):
+                raise InputError(f"{where}: {name} is no NamedTuple, expected {what}")
+            _check_record(value, name, where)
+        elif code is None or code.co_argcount != len(functions[name]):
+            count = "no plain function" if code is None else f"{code.co_argcount} arguments"
+            raise InputError(f"{where}: {name}: {count} found, expected {what}")
+    return found
 
 
 def _check_record(record: Any, name: str, where: str) -> None:
@@ -115,6 +102,8 @@ def _check_record(record: Any, name: str, where: str) -> None:
         raise InputError(f"{where}: {name}: no fields found, expected one number at least")
     for field, kind in kinds.items():
         default = record._field_defaults.get(field)
+        if name == "Settings" and field not in record._field_defaults:
+            raise InputError(f"{where}: Settings.{field}: no default found, expected one")
         if is_record(kind):
             _check_record(kind, f"{name}.{field}", where)
         elif is_list(kind) and not name.startswith("Settings"):
@@ -123,19 +112,3 @@ def _check_record(record: Any, name: str, where: str) -> None:
             raise InputError(
                 f"{where}: {name}.{field}: {default!r} found, expected a number, or a list as the last field"
             )
-
-
-def check_settings(record: Any, where: str) -> None:
-    """Refuse settings without defaults.
-
-    Raises
-    ------
-    InputError
-        Naming the field.
-    """
-    for name in record._fields:
-        if name not in record._field_defaults:
-            raise InputError(f"{where}: Settings.{name}: no default found, expected one")
-
-
-__all__ = ["check_namespace", "check_settings", "kept_source", "load_file", "read_source"]

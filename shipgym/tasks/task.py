@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
-from shipgym.instruments.sensor_set import SensorSet, read_sensors
+from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
+from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.definition import TaskDefinition, read_definition
 from shipgym.tasks.steering import Helm
 
@@ -229,7 +230,7 @@ class Task:
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
-        self.definition.check(self.settings, model)
+        self.definition.check_fits(self.settings, model)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
@@ -240,6 +241,10 @@ class Task:
             for path, seen in self.definition.seen.items()
             if seen.option in shown
         )
+
+    def instruments(self, windy: bool) -> SensorSet:
+        """What shows the ship, in weather or in calm water."""
+        return self.sensors or shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
 
     def _options(self, model: ShipModel) -> tuple[str, ...]:
         """Options that show a quantity."""
@@ -285,21 +290,6 @@ class Task:
             if name in record._fields:
                 return getattr(record, name)
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
-
-
-def ship_of(model: ShipModel, water_depth: float = float("inf")) -> Ship:
-    """What every ship has beside her coefficients, as a record."""
-    gear, p = model.steering, model.particulars
-    return Ship(
-        length=p["length"],
-        speed=p["speed"],
-        rudder_limit=gear.limit,
-        rudder_rate=gear.rate,
-        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-        shaft=float(model.service_shaft_speed),
-        water_depth=water_depth,
-        scale_speed=p["speed"],
-    )
 
 
 def control_interval(model: ShipModel) -> float:
