@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -19,14 +22,29 @@ from shipgym.engine.voyages import voyages
 from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import STEP_OUTCOME, Outputs
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.stability import refuse_unstable
-from shipgym.envs.tiles import Threads
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observation = NDArray[np.float32]
 N_FIXED = 22  # words of a loop's world before those of its outputs
+
+
+class Threads:
+    """Threads that share the tiles of an engine; the first share is done by the thread that asks."""
+
+    def __init__(self, tiles: int, threads: int) -> None:
+        count = min(threads, tiles)
+        bounds = np.linspace(0, tiles, count + 1).astype(int).tolist()
+        self.shares: list[tuple[int, int]] = list(pairwise(bounds))
+        self._pool = ThreadPoolExecutor(count - 1, "shipgym") if count > 1 else None
+
+    def run(self, loop: Any, worlds: Sequence[NDArray[np.int64]], asked: int) -> list[int]:
+        """What the loop returns for each share."""
+        if self._pool is None:
+            return [loop(worlds[0], asked)]
+        waiting = [self._pool.submit(loop, world, asked) for world in worlds[1:]]
+        return [loop(worlds[0], asked), *(share.result() for share in waiting)]
 
 
 class Engine(Lanes):
@@ -164,21 +182,10 @@ class Engine(Lanes):
         return self.begin(episode_keys(seeds))
 
     def begin(self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
-        """Begin an episode in each lane.
+        """Begin an episode in the lanes of a mask, the others go on; returns observations as `reset` does.
 
-        Parameters
-        ----------
-        keys : array-like of uint64, shape (num_envs,)
-            Of the random numbers of each lane (`episode_keys`); an episode is a function of its key and
-            number alone.
-        episodes : array-like of int, shape (num_envs,)
-            Number of the episode under that key.
-        mask : array-like of bool, shape (num_envs,)
-            Lanes to begin anew; the others go on.
-
-        Returns
-        -------
-        float32 array of shape (num_envs, n_observations)
+        An episode is a function of its key (`episode_keys`) and number under that key alone; keys, uint64,
+        numbers and mask are of shape (num_envs,).
         """
         which = np.zeros(self.num_envs, dtype=np.bool_)
         which[:] = mask
@@ -209,23 +216,10 @@ class Engine(Lanes):
         self._orders[...] = array
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """One control interval; a lane whose episode is over stays as it is and earns 0.
+        """One control interval by orders (`order`); a lane whose episode is over stays and earns 0.
 
-        Parameters
-        ----------
-        actions : array-like of shape (num_envs, n_commands)
-            See `order`.
-
-        Returns
-        -------
-        observations : float32 array of shape (num_envs, n_observations)
-        rewards : array of shape (num_envs,)
-        terminated, truncated : bool arrays of shape (num_envs,)
-
-        Raises
-        ------
-        InputError
-            If an action is not a number or their shape is another.
+        Returns float32 observations of shape (num_envs, n_observations), rewards, and whether episodes were
+        terminated and truncated, of shape (num_envs,); copies.
         """
         self.order(actions)
         self.advance()
@@ -235,9 +229,8 @@ class Engine(Lanes):
     def refuse_rewards(self) -> None:
         """Raise an InputError that says which part of the last rewards is not finite, in which lane."""
         bad = ~np.isfinite(self.reward_parts)
-        lane, part = (
-            np.argwhere(bad)[0] if bad.any() else (int(np.argmax(~np.isfinite(self.shown.outcomes[0]))), 0)
-        )
+        sums = ~np.isfinite(self.shown.outcomes[0])
+        lane, part = np.argwhere(bad)[0] if bad.any() else (int(np.argmax(sums)), 0)
         name = self.task.reward_parts[part]
         raise InputError(
             f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
@@ -292,3 +285,17 @@ def episode_keys(seeds: ArrayLike) -> NDArray[np.uint64]:
 def episode_key(random: np.random.Generator) -> int:
     """All that an environment's generator is asked for."""
     return int(random.integers(2**63))
+
+
+def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
+    """InputError for models found unstable when they were identified; a warning if `allow_unstable`."""
+    marked = [model.name for model in models if (model.provenance or {}).get("stable") is False]
+    if not marked:
+        return
+    found = f"model {marked[0]!r} was found unstable when it was identified: it runs away where ships do not"
+    if not allow_unstable:
+        raise InputError(
+            f"{found}, expected a stable one; identify it from more trials or with the guard, or give "
+            "allow_unstable=True to sail it all the same"
+        )
+    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=4)

@@ -10,13 +10,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_table, shown
+from shipgym.engine.envelope import Envelope
 from shipgym.engine.episodes import Rules
-from shipgym.engine.records import LANES, flat
+from shipgym.engine.motion import Ship
+from shipgym.engine.records import LANES, flat, leaves
 from shipgym.engine.voyages import Voyages
 from shipgym.envs.outputs import STEP_FLAGS, STEP_OUTCOME, OutputPool, Outputs
 from shipgym.envs.randomisation import Pool
-from shipgym.envs.tiles import lanes_of, ship_columns, ship_tiles
 from shipgym.errors import InputError
+from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 from shipgym.trials.sensors import SEA_TRIAL
@@ -222,3 +224,48 @@ class Lanes:
         """Go on from what `memory` of the same engine, or of one made alike, gave."""
         self._states[:], self._keys[:] = memory["states"], memory["keys"]
         self._ships[:] = memory["ships"]
+
+
+def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
+    return tiles.reshape(len(tiles), -1, LANES)
+
+
+def ship_columns(pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:
+    """Numbers of ships and of the seas they meet, a row each; the sea worked out once for each kind of ship.
+
+    Ships that are drawn for an episode are seen in the scales of the environment's model.
+    """
+    known: dict[tuple[int, int], Floats] = {}
+    columns = []
+    for model, sea in pool:
+        kind = (id(model.particulars), id(sea))
+        if windy and kind not in known:
+            known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
+        numbers = model.ship_numbers(task.water_depth)
+        if drawn and model.particulars["length"] == base.particulars["length"]:
+            numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
+        ship = Ship(*numbers[: len(Ship._fields)].tolist())
+        scales = [task.scale(path, ship) for path in task.definition.seen]
+        per_scale = [1.0 / scale if scale else 0.0 for scale in scales]
+        columns.append([*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale])
+    return np.stack(columns)
+
+
+def envelope_numbers(model: ShipModel) -> Floats:
+    """The envelope of a model's data in the order of its record; without one everything is inside."""
+    if model.envelope is None:
+        numbers = np.zeros(len(leaves(Envelope)))
+        numbers[:4], numbers[4:8] = -np.inf, np.inf
+        return numbers
+    data = model.envelope
+    return np.concatenate([data.low, data.high, data.centre, data.shape[np.triu_indices(4)]])
+
+
+def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
+    """One vector for all lanes, or a tile for each tile of states."""
+    if len(columns) == 1 and not own:
+        return columns.copy()
+    rest = np.tile(columns[:1], (max(tiles * LANES - len(columns), 0), 1))
+    lanes = np.concatenate([columns[: tiles * LANES], rest])
+    return np.ascontiguousarray(lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)

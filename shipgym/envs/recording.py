@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from glob import escape
@@ -225,20 +226,14 @@ def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
 
 def plain(value: Any) -> Any:
     """An argument of an environment as JSON can hold it: a model by its name, a weather by its fields."""
+    return json.loads(json.dumps(value, default=_told), parse_constant=lambda text: repr(float(text)))
+
+
+def _told(value: Any) -> Any:
     if isinstance(value, ShipModel):
         return value.name
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else repr(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if hasattr(value, "to_dict"):
-        return plain(value.to_dict())
-    return str(value)
+        return dict(value)
+    return value.to_dict() if hasattr(value, "to_dict") else str(value)

@@ -9,8 +9,7 @@ from typing import Any
 
 from shipgym.engine.records import Record
 from shipgym.instruments import bridge, perfect
-from shipgym.tasks.settings import Configurable
-from shipgym.tasks.source import check_namespace, read_source
+from shipgym.tasks.source import Configurable, check_namespace, read_source
 
 FUNCTIONS = {
     "measure": ("motion", "sea", "memory", "frequency", "interval", "settings", "random"),

@@ -18,8 +18,7 @@ from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen
-from shipgym.tasks.settings import Configurable, annotated, keywords
-from shipgym.tasks.source import check_namespace, read_source
+from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -62,23 +61,7 @@ def nothing(settings: Any) -> float:
 
 @dataclass(frozen=True)
 class TaskDefinition(Configurable):
-    """Records and functions of a task (`shipgym.tasks.contract`).
-
-    Attributes
-    ----------
-    name : str
-        Of the task.
-    source : str
-        Where it was read from, for messages.
-    Settings, State, Reward, Observation : type
-        Its records.
-    begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
-        Its functions.
-    reported : tuple of str
-        Fields of the state that `info` has.
-    episode_steps : int
-        Control intervals after which an episode is truncated, by default.
-    """
+    """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`)."""
 
     State: Record
     Reward: Record
@@ -92,8 +75,8 @@ class TaskDefinition(Configurable):
     plan_length: Callable[[Any], float] = nothing
     check: Callable[[Any, Any], None] | None = None
     listed: Callable[[Any], Any] = np.asarray
-    reported: tuple[str, ...] = ()
-    episode_steps: int = 600
+    reported: tuple[str, ...] = ()  # fields of the state that `info` has
+    episode_steps: int = 600  # control intervals after which an episode is truncated, by default
 
     @cached_property
     def seen(self) -> dict[str, Seen]:

@@ -37,25 +37,13 @@ OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
 
 
 class Observed(NamedTuple):
-    """One quantity that is observed.
-
-    Attributes
-    ----------
-    name : str
-        Of the quantity.
-    low, high : float
-        Bounds of the observation.
-    scale : float
-        Physical value of 1, SI units.
-    path : str
-        Where it stands in the task's `Observation`.
-    """
+    """One quantity that is observed."""
 
     name: str
-    low: float
+    low: float  # bounds of the observation
     high: float
-    scale: float
-    path: str
+    scale: float  # physical value of 1, SI units
+    path: str  # where it stands in the task's `Observation`
 
 
 @dataclass(frozen=True)
@@ -134,10 +122,7 @@ class Task:
     def of(cls, definition: Any, **options: Any) -> Self:
         """A task by keywords: those of all tasks, and the settings of its own.
 
-        Raises
-        ------
-        InputError
-            For a keyword that it does not have, or a value out of range.
+        Raises InputError for a keyword that it does not have, or a value out of range.
         """
         task = read_definition(definition, options.pop("reward", None))
         sensors = None if options.get("sensors") is None else read_sensors(options["sensors"])
@@ -157,13 +142,7 @@ class Task:
 
     @classmethod
     def option_names(cls, definition: TaskDefinition, sensors: SensorSet | None = None) -> tuple[str, ...]:
-        """Keywords of a task with a sensor set.
-
-        Raises
-        ------
-        InputError
-            If two of them have one name.
-        """
+        """Keywords of a task with a sensor set; InputError if two of them have one name."""
         names = (*definition.settings, *cls.common_names())
         if sensors is not None:
             names = (*names, *sensors.settings)
@@ -211,13 +190,7 @@ class Task:
         return self.interval(model) / self.substeps(model)
 
     def check_fits(self, model: ShipModel) -> None:
-        """Refuse a ship that lacks what the task needs.
-
-        Raises
-        ------
-        InputError
-            Naming the argument.
-        """
+        """Refuse a ship that lacks what the task needs; InputError names the argument."""
         model.check_depth(self.water_depth)
         if self.dt is not None:
             longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
