@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Optimiser, Recorder
 from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 
@@ -15,7 +15,7 @@ Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
-class ArtificialBeeColony:
+class ArtificialBeeColony(Optimiser):
     """Artificial bee colony (Karaboga 2005; Zhu 2018, section 5.3.3).
 
     Employed bees move each food source along one dimension towards or away from another; onlookers do the
@@ -37,22 +37,17 @@ class ArtificialBeeColony:
     rounds: int = 30
     limit: int = 20
 
-    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
-        """Minimise; see `Optimiser.minimise`."""
+    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        low, high = check_bounds(bounds)
-        rng = np.random.default_rng(seed)
-        record = Recorder(objective)
         sources = low + (high - low) * rng.random((n, len(low)))
         values = record(sources)
         record.end_round()
         idle = np.zeros(n, dtype=np.int64)
         for _ in range(self.rounds):
-            for employed in (True, False):
-                chances = None if employed else _chances(values)
-                chosen = np.arange(n) if chances is None else chances.searchsorted(rng.random(n), "right")
+            for onlookers in (False, True):
+                chosen = _chances(values).searchsorted(rng.random(n), "right") if onlookers else np.arange(n)
                 moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)
                 _settle(sources, values, idle, chosen, moved, record(moved))
             left = np.flatnonzero(idle > self.limit)
@@ -61,7 +56,6 @@ class ArtificialBeeColony:
                 values[left] = record(sources[left])
                 idle[left] = 0
             record.end_round()
-        return record.result()
 
 
 def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Optimiser, Recorder
+from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 
 
 @dataclass(frozen=True)
-class DifferentialEvolution:
+class DifferentialEvolution(Optimiser):
     """SciPy's differential evolution (Storn & Price 1997), without its final polish.
 
     Parameters
@@ -27,14 +27,11 @@ class DifferentialEvolution:
     members: int = 20
     rounds: int = 60
 
-    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
-        """Minimise; see `Optimiser.minimise`."""
+    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         from scipy.optimize import Bounds, differential_evolution
 
         check_whole(self.members, "members", at_least=5, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        low, high = check_bounds(bounds)
-        record = Recorder(objective)
 
         def of_columns(x: Any, /) -> Any:
             # a column for each candidate; SciPy takes no infinite values
@@ -42,7 +39,6 @@ class DifferentialEvolution:
 
         differential_evolution(
             of_columns, Bounds(low, high), maxiter=self.rounds, popsize=self.members, tol=0.0, atol=0.0,
-            rng=np.random.default_rng(seed), polish=False, vectorized=True, updating="deferred",
+            rng=rng, polish=False, vectorized=True, updating="deferred",
             callback=lambda intermediate_result: record.end_round(),
         )  # fmt: skip
-        return record.result()

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from identification.search.search import MOST, Objective, Recorder, SearchResult, check_bounds
+from identification.search.search import MOST, Optimiser, Recorder
+from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 
 
 @dataclass(frozen=True)
-class ParticleSwarm:
+class ParticleSwarm(Optimiser):
     """Particle swarm optimisation with inertia (Shi & Eberhart 1998; Zhu 2018, section 5.3.2).
 
     Parameters
@@ -34,13 +34,9 @@ class ParticleSwarm:
     own: float = 1.49618
     common: float = 1.49618
 
-    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
-        """Minimise; see `Optimiser.minimise`."""
+    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        low, high = check_bounds(bounds)
-        rng = np.random.default_rng(seed)
-        record = Recorder(objective)
         shape = (n, len(low))
         place = low + (high - low) * rng.random(shape)
         velocity = np.zeros(shape)
@@ -59,4 +55,3 @@ class ParticleSwarm:
             better = found < values
             best[better], values[better] = place[better], found[better]
             record.end_round()
-        return record.result()
