@@ -25,8 +25,7 @@ from identification.uncertainty.bootstrap import bootstrap_covariance, influence
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
+from identification.validation.guard import GuardedFit, guarded_fit, reasons_unstable, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
 from shipgym.arrays import Floats

@@ -17,28 +17,14 @@ class Adapted:
     """An estimator with scikit-learn's interface, and the moment and covariance that it lacks.
 
     These are those of least squares on the features whose coefficients are not 0: an approximation for an
-    estimator that shrinks its coefficients.
-
-    Parameters
-    ----------
-    inner : object
-        With `fit(X, y)`, which sets `coef_`; not fitted.
-
-    Attributes
-    ----------
-    coef_, inverse_moment_, covariance_
-        As of `Estimator`.
+    estimator that shrinks its coefficients. `inner` has a `fit(X, y)` that sets `coef_`.
     """
 
     def __init__(self, inner: Any) -> None:
         self.inner = inner
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
-        """Fit to features of shape (n_samples, n_features) and targets of shape (n_samples,).
-
-        Raises InputError for an estimator that sets no `coef_`, or one that is not a finite number for each
-        feature.
-        """
+        """Fit; InputError for an estimator that sets no `coef_` of a finite number for each feature."""
         features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
         self.inner.fit(features, targets)
         found = np.asarray(getattr(self.inner, "coef_", np.nan), dtype=float).ravel()
@@ -58,7 +44,7 @@ class Adapted:
         return self
 
     def predict(self, X: ArrayLike) -> Floats:
-        """Targets of features of shape (n_samples, n_features)."""
+        """Targets, shape (n_samples,)."""
         prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
         return prediction
 

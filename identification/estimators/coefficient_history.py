@@ -94,16 +94,9 @@ def coefficient_history(
             f"method: {method!r} found, which fits all samples at once; expected a recursive one"
         )
     ship = particulars.completed() if table.quantity == "force" else particulars
-    if isinstance(source, Samples):
-        regression = source
-    else:
+    if not isinstance(source, Samples):
         trials = [source] if isinstance(source, Trial) else list(source)
-        regression = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    histories = [
-        clone(estimator).fit_history(regression.features[q], regression.targets[q]) for q in table.equations
-    ]
-    matrix = table.acceleration_matrix(ship, shaft_speed)
-    values = np.linalg.solve(matrix, np.hstack(histories).T).T
-    return CoefficientHistory(
-        table.coefficient_names, regression.start + regression.duration, regression.trial, values
-    )
+        source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
+    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.equations]
+    values = np.linalg.solve(table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T).T
+    return CoefficientHistory(table.coefficient_names, source.start + source.duration, source.trial, values)

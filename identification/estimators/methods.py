@@ -8,12 +8,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from sklearn.base import clone
 
 from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.free_running import fit_free_running
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -21,11 +19,16 @@ from identification.estimators.recursive import (
     StochasticGradient,
 )
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
-from identification.estimators.tuned import TunedLSSVM
+from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
+
+
+def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
+    """One estimator for each equation, fitted."""
+    return {q: estimator().fit(X, samples.targets[q]) for q, X in samples.features.items()}
 
 
 def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
@@ -40,16 +43,12 @@ class Method:
     name: str  # as `identify` knows it
     estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
     regularised: bool = True  # whether the guard against models that run away may penalise it
-    #: fits estimators, made by its first argument, to the task that is its second, and returns them by
-    #: equation. By default each equation by itself, from the samples alone
+    #: fits estimators, made by its first argument, to the task that is its second
     fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = each_equation
     refined: bool = False  # whether what was fitted is the start of a refinement by simulation (`refine`)
 
     def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
-        """Estimators of all equations, fitted with the settings.
-
-        Raises InputError for settings that the method does not know.
-        """
+        """Estimators of all equations, fitted; InputError for settings that the method does not know."""
         unknown = [name for name in settings if not self.knows(name)]
         if unknown:
             raise InputError(
@@ -80,21 +79,8 @@ def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
     return LSSVM(C=1.0 / alpha if alpha else np.inf, fit_intercept=False, **settings)
 
 
-def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
-    template, samples = make(), task.samples
-    assert isinstance(template, TunedLSSVM)
-    if template.objective == "free-running":
-        return dict(fit_free_running(template, task))
-    return {
-        q: clone(template).fit(samples.features[q], samples.targets[q], samples.trial)
-        for q in samples.features
-    }
-
-
 _TLS_SVM = partial(TruncatedLSSVM, fit_intercept=False)
 _TUNED = partial(TunedLSSVM, fit_intercept=False)
-_MILS = partial(MultiInnovationLeastSquares, inverse_free=False)
 
 METHODS = {
     method.name: method
@@ -103,15 +89,15 @@ METHODS = {
         Method("ridge", _ridge),
         Method("ls-svm", partial(LSSVM, fit_intercept=False)),
         Method("tls-svm", _TLS_SVM),
-        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=searched),
-        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=searched),
-        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=searched),
-        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=searched),
+        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=fit_tuned),
+        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=fit_tuned),
+        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=fit_tuned),
+        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=fit_tuned),
         Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
         Method("rls", RecursiveLeastSquares, regularised=False),
         Method("sg", StochasticGradient, regularised=False),
         Method("nisg", partial(StochasticGradient, omega=0.5), regularised=False),
-        Method("mils", _MILS, regularised=False),
+        Method("mils", partial(MultiInnovationLeastSquares, inverse_free=False), regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _TLS_SVM, refined=True),
         Method("rm-svm", RMSVM, fit=fit_rm_svm),
@@ -119,15 +105,13 @@ METHODS = {
 }
 
 #: Estimators that use more than the samples of one equation.
-FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
+FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: fit_tuned, RMSVM: fit_rm_svm}
 
 
 def get_method(method: str | Any) -> Method:
-    """A method by name, or that of an estimator object.
+    """A method by name, or that of an estimator object, of which each equation has a copy.
 
-    The estimator of each equation is a copy of the object, without a constant term: the equations of motion
-    have none but that of the structure. Raises InputError if there is none of that name, and for an object
-    without `fit`.
+    Without a constant term: the equations of motion have none but that of the structure.
     """
     if isinstance(method, str):
         return METHODS[check_choice(method, METHODS, "method")]
@@ -141,14 +125,8 @@ def get_method(method: str | Any) -> Method:
             f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; "
             "write identify(..., kernel='rbf') for a ship with a kernel"
         )
-    together = [fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)]
-    fit = together[0] if together else each_equation
+    fit = next((fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)), each_equation)
     return Method(type(method).__name__, lambda: without_constant(method), regularised=False, fit=fit)
-
-
-def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
-    """One estimator for each equation, fitted."""
-    return {q: estimator().fit(samples.features[q], samples.targets[q]) for q in samples.features}
 
 
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
@@ -161,8 +139,6 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)
     return {
-        q: LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(
-            samples.features[q], samples.targets[q]
-        )
-        for q in samples.features
+        q: LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(X, samples.targets[q])
+        for q, X in samples.features.items()
     }

@@ -27,7 +27,7 @@ from identification.regression.integrals import (
 )
 from identification.regression.rudder import rebuild, straight
 from shipgym.arrays import Floats, integral
-from shipgym.checks import check_choice, check_whole
+from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -129,9 +129,7 @@ def build_samples(
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
     if window is not None:
         check_whole(window, "window", at_least=1, hint="in sampling steps")
-    preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
-    check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
-    sampling = _Sampling(structure, particulars, samples, window, gear, preprocessing, shaft_speed)
+    sampling = _Sampling(structure, particulars, samples, window, gear, smooth, shaft_speed)
     parts = [part for index, trial in enumerate(trials) for part in sampling.parts(trial, index)]
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
@@ -152,7 +150,7 @@ class _Sampling:
     samples: str
     window: int | None
     gear: SteeringGear | None
-    preprocessing: str
+    smooth: bool | str
     shaft_speed: float
 
     def parts(self, trial: Trial, index: int) -> list[Samples]:
@@ -169,7 +167,7 @@ class _Sampling:
 
     def _part(self, trial: Trial, index: int, window: int) -> Samples:
         t, equations = trial.t, self.structure.equations
-        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.preprocessing)
+        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.smooth)
         integrals, moments = self._integrals(trial, channels)
         if "q" in integrals:
             memory = twice_integrated(t, integrals.pop("q"), moments["q"])

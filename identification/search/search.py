@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -45,6 +45,10 @@ class SearchResult:
     course: Floats
     evaluations: int
     variable: str = LOG_C
+
+    def of(self, dimension: int, variable: str = LOG_C) -> SearchResult:
+        """What was found of one dimension."""
+        return replace(self, x=self.x[[dimension]], course=self.course[:, [dimension]], variable=variable)
 
 
 @dataclass(eq=False)

@@ -18,8 +18,7 @@ from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
 from identification.simulation_error.prior import Prior, Pulled, reference_prior
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import with_coefficients
+from identification.validation.guard import reasons_unstable, with_coefficients
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors
 from shipgym.ships import ShipModel, get_structure, register_structure

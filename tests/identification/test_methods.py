@@ -9,8 +9,8 @@ from sklearn.linear_model import Ridge
 from sklearn.neighbors import KNeighborsRegressor
 
 from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
-from identification.estimators.free_running import free_running_error
 from identification.estimators.methods import METHODS
+from identification.estimators.tuned import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

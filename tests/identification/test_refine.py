@@ -12,7 +12,7 @@ from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
 from identification.simulation_error.refine import Refinement, refine
 from identification.simulation_error.segments import Shooter, compared_channels, cut
-from identification.validation.guarded_fit import guarded_fit
+from identification.validation.guard import guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 
